@@ -1,0 +1,58 @@
+"""Installs the peers into a folder of their own and says how to start them.
+
+PyPI's mitsuba, numpy and OpenEXR go into a virtual environment, Debian's povray and libllvm19 are unpacked beside it;
+nothing on the system changes.
+"""
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import sysconfig
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+FOLDER = ROOT / "target" / "peers"
+PYPI = ["mitsuba==3.9.1", "numpy", "OpenEXR"]
+DEBIAN = ["povray", "libllvm19"]
+
+
+class Peers:
+    def __init__(self, folder=FOLDER):
+        self.folder = pathlib.Path(folder).resolve()
+        self.python = self.folder / "venv" / "bin" / "python"
+        self.debian = self.folder / "debian"
+        self.libraries = self.debian / "usr" / "lib" / (sysconfig.get_config_var("MULTIARCH") or "x86_64-linux-gnu")
+
+    def install(self):
+        stamp = self.folder / "venv" / "installed"
+        if not stamp.exists() or stamp.read_text().split() != PYPI:
+            print("installing " + ", ".join(PYPI) + f" into {os.path.relpath(self.folder)}", file=sys.stderr)
+            subprocess.run([sys.executable, "-m", "venv", self.folder / "venv"], check=True)
+            subprocess.run([self.python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *PYPI], check=True)
+            stamp.write_text("\n".join(PYPI))
+        subprocess.run([HERE / "debs", self.debian, "bookworm", *DEBIAN], check=True)
+        for what in (self.povray()[0], self.llvm()):
+            if not what or not pathlib.Path(what).exists():
+                sys.exit(f"{what} is missing after the installation")
+
+    def mesa_backports(self):
+        """The environment that selects the lavapipe of Debian's backports."""
+        line = subprocess.run([HERE / "mesa-backports", self.folder / "mesa-25"], check=True, stdout=subprocess.PIPE, text=True)
+        return dict(pair.split("=", 1) for pair in line.stdout.split())
+
+    def povray(self):
+        """POV-Ray's command and environment: unpacked here, or the system's where `debs` found it installed."""
+        unpacked = self.debian / "usr" / "bin" / "povray"
+        if not unpacked.exists():
+            return shutil.which("povray"), {}
+        paths = [str(self.libraries), str(self.libraries / "pulseaudio"), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])]
+        return str(unpacked), {"LD_LIBRARY_PATH": ":".join(paths)}
+
+    def llvm(self):
+        """LLVM 19 for Mitsuba: with 14 and 15 its code generation fails on machines with AVX-512."""
+        system = pathlib.Path("/usr/lib") / self.libraries.name / "libLLVM.so.19.1"
+        return next((str(p) for p in (self.libraries / "libLLVM.so.19.1", system) if p.exists()), None)
+
+    def mitsuba(self):
+        return str(self.python), {"DRJIT_LIBLLVM_PATH": self.llvm() or ""}

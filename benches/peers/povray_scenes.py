@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+"""Writes a wgray scene for POV-Ray 3.7 to standard output: povray_scenes.py SCENE.toml LIGHT_SAMPLES [SIZE]
+
+Phong shading without distance falloff, lights unseen by the camera. POV-Ray's phong highlight has the light's colour,
+so the picture is that of a scene whose materials' `specular` is white; ambient and diffuse colours must be equal.
+
+An area light comes in two ways. As POV-Ray's `area_light`, its own and fastest way, used for timing. It multiplies the
+mean shadow by the mean shading, `mean(V) * mean(f)`, where wgray takes `mean(V * f)`: they differ in penumbrae. Or as a
+point light for each sample, which is wgray's formula.
+"""
+import math
+import sys
+
+sys.dont_write_bytecode = True
+import scenes
+
+
+def vec(v):
+    return "<" + ",".join(f"{x:.9g}" for x in v) + ">"
+
+
+def add(*vs):
+    return [sum(xs) for xs in zip(*vs)]
+
+
+def texture(material, ambient):
+    if material.ambient != material.diffuse:
+        raise ValueError("POV-Ray has one pigment: ambient and diffuse must be the same colour")
+    return (f"texture {{ pigment {{ rgb {vec(material.diffuse)} }} "
+            f"finish {{ ambient rgb {vec(ambient)} diffuse 1 phong 1 phong_size {material.shininess:g} }} }}")
+
+
+def shape(s, ambient):
+    paint = texture(s.material, ambient)
+    if isinstance(s, scenes.Plane):
+        return f"plane {{ {vec(s.normal)}, {scenes.dot(s.normal, s.point):.9g} {paint} }}"
+    if isinstance(s, scenes.Ellipsoid):
+        matrix = ", ".join(f"{x:.9g}" for v in (s.a, s.b, s.c, s.center) for x in v)
+        return f"sphere {{ 0, 1 matrix <{matrix}> {paint} }}"
+    if isinstance(s, scenes.Quad):
+        corners = [add(s.center, scenes.scaled(s.u, i), scenes.scaled(s.v, j)) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        s = scenes.Triangles(corners, [(0, 1, 2), (0, 2, 3)], s.material)
+    faces = " ".join(f"triangle {{ {', '.join(vec(s.vertices[i]) for i in face)} }}" for face in s.faces)
+    return f"mesh {{ {faces} {paint} }}"
+
+
+def light(l, samples, points):
+    n = math.isqrt(samples)
+    if n * n != samples or n < 2:
+        raise ValueError(f"{samples} light samples are no n x n grid")
+    if points:
+        cells = [(2 * i + 1) / n - 1 for i in range(n)]
+        colour = vec(scenes.scaled(l.color, 1 / samples))
+        return "\n".join(f"light_source {{ {vec(add(l.center, scenes.scaled(l.u, s), scenes.scaled(l.v, t)))} rgb {colour} }}"
+                         for s in cells for t in cells)
+    # POV-Ray samples an area light's axes from end to end; these ends are the outermost cell centres of our grid.
+    # area_illumination: shade by every sample, not only shadow by it.
+    axes = [vec(scenes.scaled(axis, 2 * (n - 1) / n)) for axis in (l.u, l.v)]
+    return f"light_source {{ {vec(l.center)} rgb {vec(l.color)} area_light {axes[0]}, {axes[1]}, {n}, {n} area_illumination on }}"
+
+
+def povray(scene, light_samples, width, height, points=False):
+    # POV-Ray's angle is the horizontal one. It samples pixels at their centres, as wgray does (povray_check.py shows it).
+    angle = 2 * math.degrees(math.atan(math.tan(math.radians(scene.fov) / 2) * width / height))
+    return "\n".join([
+        "#version 3.7;",
+        "global_settings { assumed_gamma 1.0 ambient_light rgb 1 max_trace_level 5 }",
+        # POV-Ray's axes are left-handed; the negative `right` makes them ours.
+        f"camera {{ location {vec(scene.position)} right -x*{width}/{height} up y sky {vec(scene.up)} "
+        f"angle {angle:.9g} look_at {vec(scene.look_at)} }}",
+        *(light(l, light_samples, points) for l in scene.lights),
+        *(shape(s, scene.ambient) for s in scene.shapes),
+        "",
+    ])
+
+
+if __name__ == "__main__":
+    scene = scenes.load(sys.argv[1])
+    size = int(sys.argv[3]) if len(sys.argv) > 3 else None
+    sys.stdout.write(povray(scene, int(sys.argv[2]), size or scene.width, size or scene.height))

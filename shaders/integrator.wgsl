@@ -1,0 +1,61 @@
+// Radiance along a ray: direct light by Phong's model.
+
+fn radiance(ray: Ray, pixel: vec2u, sample: u32) -> vec3f {
+    let hit = closest_hit(ray);
+    if hit.primitive == NOTHING {
+        return environment.background;
+    }
+    let q = load_primitive(hit.primitive);
+    let material = load_material(q.material);
+    if material.kind == EMITTER {
+        return material.ambient;
+    }
+    let surface = surface_at(q, ray, hit.t, environment.shadow_epsilon);
+    var sum = environment.ambient * material.ambient;
+    for (var i = 0u; i < AREA_LIGHTS; i++) {
+        let light = load_light(i);
+        let lobes = lobes_of_light(surface, material, light, LIGHT_PATTERN, LIGHT_SIDE, LIGHT_SAMPLES, pixel, sample);
+        sum += reflected(material, light, lobes, environment.light_weight);
+    }
+    for (var i = AREA_LIGHTS; i < AREA_LIGHTS + DELTA_LIGHTS; i++) {
+        let light = load_light(i);
+        let lobes = lobes_of_light(surface, material, light, GRID, 1u, 1u, pixel, sample);
+        sum += reflected(material, light, lobes, 1.0);
+    }
+    return sum;
+}
+
+// Phong's lobes, summed over all samples of a light.
+fn lobes_of_light(surface: Surface, material: Material, light: Light, pattern: u32, side: u32, count: u32,
+                  pixel: vec2u, sample: u32) -> Lobes {
+    let to = segments_to_light(light, surface.start);
+    let key = sample_key(pixel, camera.seed, 1u + light.number);
+    var lobes = Lobes(0.0, 0.0);
+    for (var first = 0u; first < count; first += BLOCK) {
+        let block = Block(pattern, side, first, select(BLOCK, count - first, count - first < BLOCK), sample, key);
+        let hidden = hidden_samples(surface.start, light, block);
+        lobes = phong_block(surface, material, to, block, hidden, EXPONENT_BITS, lobes);
+    }
+    return lobes;
+}
+
+fn reflected(material: Material, light: Light, lobes: Lobes, weight: f32) -> vec3f {
+    let light_color = light.color * weight;
+    return light_color * (material.diffuse * lobes.diffuse + material.specular * lobes.specular);
+}
+
+// The radiance of one sample of a pixel.
+fn pixel_radiance(pixel: vec2u, sample: u32) -> vec3f {
+    let at = sample_square(PIXEL_PATTERN, PIXEL_SIDE, sample, 0u, sample_key(pixel, camera.seed, 0u));
+    return radiance(camera_ray(camera, vec2f(pixel) + at), pixel, sample);
+}
+
+// What the ray through a pixel's centre meets.
+fn pixel_first_hit(pixel: vec2u) -> FirstHit {
+    let ray = camera_ray(camera, vec2f(pixel) + 0.5);
+    let hit = closest_hit(ray);
+    if hit.primitive == NOTHING {
+        return FirstHit(vec3f(0.0), 0.0, vec2f(0.0), NOTHING, NOTHING);
+    }
+    return first_hit(load_primitive(hit.primitive), ray, hit.t);
+}

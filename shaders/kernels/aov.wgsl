@@ -1,0 +1,13 @@
+// Writes what the ray through each pixel's centre meets first.
+
+@group(0) @binding(6) var<storage, read_write> first_hits: array<FirstHit>;
+
+@compute @workgroup_size(8, 8)
+fn aov(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= work.size.x || id.y >= work.size.y {
+        return;
+    }
+    let pixel = work.origin + id.xy;
+    let place = pixel - work.film_origin;
+    first_hits[place.y * work.film_size.x + place.x] = pixel_first_hit(pixel);
+}

@@ -1,0 +1,77 @@
+// Arithmetic that gives the same bits on every device that rounds as IEEE 754 asks: written out, because WGSL's
+// built-in functions become instructions that no decoration protects from contraction.
+
+fn dot(a: vec3f, b: vec3f) -> f32 {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+fn cross(a: vec3f, b: vec3f) -> vec3f {
+    return vec3f(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+}
+
+fn normalize(v: vec3f) -> vec3f {
+    return v * (1.0 / sqrt(dot(v, v)));
+}
+
+fn max(a: f32, b: f32) -> f32 {
+    return select(b, a, a > b);
+}
+
+fn min(a: f32, b: f32) -> f32 {
+    return select(b, a, a < b);
+}
+
+// x to the power n by squaring, for n below 2^bits.
+fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
+    var result = 1.0;
+    var square = x;
+    for (var i = 0u; i < bits; i++) {
+        result = select(result, result * square, ((n >> i) & 1u) == 1u);
+        square = square * square;
+    }
+    return result;
+}
+
+// x to the power y, for x from 0 to 1 and y > 0: 2^(y log2 x). The tests bound its error against f64.
+fn power(x: f32, y: f32) -> f32 {
+    return select(0.0, exp2(y * log2(x)), x >= 1.1754943508222875e-38);
+}
+
+// The logarithm to base 2 of a normal x > 0: exponent, and the series of 2 artanh((m - 1) / (m + 1)) for a mantissa m
+// between the roots of 1/2 and 2 (Abramowitz and Stegun, "Handbook of Mathematical Functions", 4.1.27).
+fn log2(x: f32) -> f32 {
+    let bits = bitcast<i32>(x);
+    let exponent = (bits - 0x3f3504f3) >> 23u;
+    let m = bitcast<f32>(bits - (exponent << 23u));
+    let s = (m - 1.0) / (m + 1.0);
+    let s2 = s * s;
+    let series = 1.0 + s2 * (0.33333334 + s2 * (0.2 + s2 * (0.14285715 + s2 * (0.11111111 + s2 * 0.09090909))));
+    return f32(exponent) + s * series * 2.8853900817779268;
+}
+
+// 2 to the power x, 0 below the normal numbers, for x below 128: the exponential's series (Abramowitz and Stegun,
+// 4.2.1) after splitting off the nearest whole number.
+fn exp2(x: f32) -> f32 {
+    let p = max(x, -126.5);
+    let whole = i32(p + select(0.5, -0.5, p < 0.0));
+    let f = (p - f32(whole)) * 0.6931471805599453;
+    let high = 0.008333334 + f * (0.0013888889 + f * 0.0001984127);
+    let series = 1.0 + f * (1.0 + f * (0.5 + f * (0.16666667 + f * (0.041666668 + f * high))));
+    return select(0.0, series * bitcast<f32>((whole + 127) << 23u), x > -126.5);
+}
+
+// The angle of (x, y) in (-pi, pi]: the arc tangent's series (Abramowitz and Stegun, 4.4.42) of an argument brought
+// below tan(pi / 8). 0 where both are 0.
+fn atan2(y: f32, x: f32) -> f32 {
+    let large = max(abs(x), abs(y));
+    let small = min(abs(x), abs(y));
+    let steep = small > 0.41421357 * large;
+    let t = select(small, small - large, steep) / select(large, small + large, steep);
+    let t2 = t * t;
+    let high = 0.11111111 - t2 * (0.09090909 - t2 * (0.07692308 - t2 * (0.06666667 - t2 * 0.05882353)));
+    let series = 1.0 - t2 * (0.33333334 - t2 * (0.2 - t2 * (0.14285715 - t2 * high)));
+    let octant = select(0.0, 0.7853982, steep) + t * series;
+    let quadrant = select(octant, 1.5707964 - octant, abs(y) > abs(x));
+    let half = select(quadrant, 3.1415927 - quadrant, x < 0.0);
+    return select(0.0, select(half, -half, y < 0.0), large > 0.0);
+}

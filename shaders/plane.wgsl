@@ -1,0 +1,12 @@
+// The infinite plane: z = 0 in local space.
+
+// The distance of the hit if it lies in (0, limit), else `limit`.
+fn intersect_plane(q: Primitive, ray: Ray, limit: f32) -> f32 {
+    let t = plane_distance(q, ray);
+    return select(limit, t, (t > 0.0) & (t < limit));
+}
+
+// Whether it cuts the segment o + s d, s in (0, reach), of local space.
+fn plane_blocks(o: vec3f, d: vec3f, reach: f32) -> bool {
+    return crosses_plane(o, d, reach);
+}

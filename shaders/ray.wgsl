@@ -1,0 +1,43 @@
+// Rays, and the local space that every primitive is intersected in.
+
+// The points origin + t direction, t > 0.
+struct Ray {
+    origin: vec3f,
+    direction: vec3f,      // unit length
+}
+
+// The nearest intersection so far: FAR and NOTHING where there is none.
+struct Hit {
+    t: f32,
+    primitive: u32,
+}
+
+fn point_to_local(q: Primitive, p: vec3f) -> vec3f {
+    return vector_to_local(q, p - q.center);
+}
+
+fn vector_to_local(q: Primitive, v: vec3f) -> vec3f {
+    return vec3f(dot(q.x, v), dot(q.y, v), dot(q.z, v));
+}
+
+// Where the ray meets the plane z = 0 of a flat primitive; not finite if it does not.
+fn plane_distance(q: Primitive, ray: Ray) -> f32 {
+    return dot(q.z, q.center - ray.origin) / dot(q.z, ray.direction);
+}
+
+// Whether the segment o + s d, s in (0, reach), of local space crosses the plane z = 0.
+fn crosses_plane(o: vec3f, d: vec3f, reach: f32) -> bool {
+    return (o.z * d.z < 0.0) & (abs(o.z) < reach * abs(d.z));
+}
+
+// Where it does so, as x |d.z| and y |d.z|: no division.
+fn scaled_crossing(o: vec3f, d: vec3f) -> vec2f {
+    let a = abs(d.z);
+    let s = abs(o.z);
+    return vec2f(o.x * a + s * d.x, o.y * a + s * d.y);
+}
+
+// The hit, or the one at t of primitive i if that is nearer.
+fn closer(hit: Hit, t: f32, i: u32) -> Hit {
+    return Hit(min(t, hit.t), select(hit.primitive, i, t < hit.t));
+}

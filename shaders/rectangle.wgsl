@@ -1,0 +1,15 @@
+// The rectangle: |x| <= 1, |y| <= 1, z = 0 in local space.
+
+// The distance of the hit if it lies in (0, limit), else `limit`.
+fn intersect_rectangle(q: Primitive, ray: Ray, limit: f32) -> f32 {
+    let t = plane_distance(q, ray);
+    let p = ray.origin + ray.direction * t - q.center;
+    let inside = (abs(dot(q.x, p)) <= 1.0) & (abs(dot(q.y, p)) <= 1.0);
+    return select(limit, t, (t > 0.0) & (t < limit) & inside);
+}
+
+// Whether it cuts the segment o + s d, s in (0, reach), of local space.
+fn rectangle_blocks(o: vec3f, d: vec3f, reach: f32) -> bool {
+    let p = scaled_crossing(o, d);
+    return crosses_plane(o, d, reach) & (abs(p.x) <= abs(d.z)) & (abs(p.y) <= abs(d.z));
+}

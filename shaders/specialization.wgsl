@@ -1,0 +1,24 @@
+// What a kernel may take as constant: it is compiled for its scene. `Specialization` in `src/pack.rs` has the same
+// names; a test compares them.
+
+// Primitives are sorted by kind, in this order; in each kind those that can cast a shadow come first.
+override RECTANGLES: u32;
+override BLOCKING_RECTANGLES: u32;
+override TRIANGLES: u32;
+override BLOCKING_TRIANGLES: u32;
+override ELLIPSOIDS: u32;
+override PLANES: u32;
+override BLOCKING_PLANES: u32;
+
+// Lights are sorted: rectangles first, then points and directions.
+override AREA_LIGHTS: u32;
+override DELTA_LIGHTS: u32;
+
+override PIXEL_PATTERN: u32;
+override PIXEL_SIDE: u32;
+override LIGHT_PATTERN: u32;
+override LIGHT_SIDE: u32;
+override LIGHT_SAMPLES: u32;
+
+// Bits of the largest shininess if all are whole numbers, else 0.
+override EXPONENT_BITS: u32;

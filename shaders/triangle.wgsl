@@ -1,0 +1,18 @@
+// The triangle: x >= 0, y >= 0, x + y <= 1, z = 0 in local space; x and y are the barycentric coordinates of its second
+// and third vertex.
+
+// The distance of the hit if it lies in (0, limit), else `limit`.
+fn intersect_triangle(q: Primitive, ray: Ray, limit: f32) -> f32 {
+    let t = plane_distance(q, ray);
+    let p = ray.origin + ray.direction * t - q.center;
+    let x = dot(q.x, p);
+    let y = dot(q.y, p);
+    let inside = (x >= 0.0) & (y >= 0.0) & (x + y <= 1.0);
+    return select(limit, t, (t > 0.0) & (t < limit) & inside);
+}
+
+// Whether it cuts the segment o + s d, s in (0, reach), of local space.
+fn triangle_blocks(o: vec3f, d: vec3f, reach: f32) -> bool {
+    let p = scaled_crossing(o, d);
+    return crosses_plane(o, d, reach) & (p.x >= 0.0) & (p.y >= 0.0) & (p.x + p.y <= abs(d.z));
+}

@@ -1,0 +1,33 @@
+//! Twin of `shaders/light.wgsl`: the samples of one light, as seen from a point.
+
+use glam::{Vec2, Vec3};
+
+use super::ray::vector_to_local;
+use crate::pack::{Light, Primitive};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segments {
+    pub towards: Vec3,
+    pub u: Vec3,
+    pub v: Vec3,
+}
+
+pub fn segments_to_light(light: &Light, p: Vec3) -> Segments {
+    Segments {
+        towards: light.center - p * light.finite,
+        u: light.u,
+        v: light.v,
+    }
+}
+
+pub fn segments_to_local(q: &Primitive, to: Segments) -> Segments {
+    Segments {
+        towards: vector_to_local(q, to.towards),
+        u: vector_to_local(q, to.u),
+        v: vector_to_local(q, to.v),
+    }
+}
+
+pub fn segment(to: Segments, at: Vec2) -> Vec3 {
+    to.towards + to.u * (2.0 * at.x - 1.0) + to.v * (2.0 * at.y - 1.0)
+}

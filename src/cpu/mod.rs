@@ -1,0 +1,24 @@
+//! The CPU path: the twins of the WGSL functions, by the same names, with the same arguments and order of operations,
+//! and a renderer over threads. It is the reference that the GPU path is held against.
+//!
+//! What a function does is said in its WGSL file.
+#![allow(missing_docs, reason = "documented in the WGSL files")]
+
+pub mod camera;
+pub mod ellipsoid;
+pub mod integrator;
+pub mod light;
+pub mod math;
+pub mod phong;
+pub mod plane;
+pub mod ray;
+pub mod rectangle;
+mod renderer;
+pub mod rng;
+pub mod sampling;
+pub mod shadow;
+pub mod surface;
+pub mod traverse;
+pub mod triangle;
+
+pub use renderer::Cpu;

@@ -1,0 +1,47 @@
+//! Twin of `shaders/ray.wgsl`: rays, and the local space that every primitive is intersected in.
+
+use glam::{Vec2, Vec3};
+
+use super::math::{dot, min};
+use crate::pack::Primitive;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    pub origin: Vec3,
+    pub direction: Vec3,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    pub t: f32,
+    pub primitive: u32,
+}
+
+pub fn point_to_local(q: &Primitive, p: Vec3) -> Vec3 {
+    vector_to_local(q, p - q.center)
+}
+
+pub fn vector_to_local(q: &Primitive, v: Vec3) -> Vec3 {
+    Vec3::new(dot(q.x, v), dot(q.y, v), dot(q.z, v))
+}
+
+pub fn plane_distance(q: &Primitive, ray: Ray) -> f32 {
+    dot(q.z, q.center - ray.origin) / dot(q.z, ray.direction)
+}
+
+pub fn crosses_plane(o: Vec3, d: Vec3, reach: f32) -> bool {
+    (o.z * d.z < 0.0) & (o.z.abs() < reach * d.z.abs())
+}
+
+pub fn scaled_crossing(o: Vec3, d: Vec3) -> Vec2 {
+    let a = d.z.abs();
+    let s = o.z.abs();
+    Vec2::new(o.x * a + s * d.x, o.y * a + s * d.y)
+}
+
+pub fn closer(hit: Hit, t: f32, i: u32) -> Hit {
+    Hit {
+        t: min(t, hit.t),
+        primitive: if t < hit.t { i } else { hit.primitive },
+    }
+}

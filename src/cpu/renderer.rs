@@ -1,0 +1,86 @@
+//! The twins over threads.
+
+use std::ops::Range;
+
+use glam::UVec2;
+use rayon::prelude::*;
+
+use super::integrator::{pixel_first_hit, pixel_radiance};
+use crate::error::RenderError;
+use crate::film::{Film, Region};
+use crate::job::Backend;
+use crate::pack::{FirstHit, Packed};
+
+/// A scene on the CPU.
+pub struct Cpu<'a> {
+    scene: &'a Packed,
+    film: Film,
+}
+
+impl<'a> Cpu<'a> {
+    /// A renderer of a scene, on the current pool of threads.
+    pub fn new(scene: &'a Packed) -> Cpu<'a> {
+        Cpu {
+            scene,
+            film: Film::new(Region::whole(0, 0)),
+        }
+    }
+}
+
+/// Pixels of a row that one thread takes at a time.
+const RUN: usize = 32;
+
+impl Backend for Cpu<'_> {
+    fn begin(&mut self, region: Region) -> Result<(), RenderError> {
+        self.film = Film::new(region);
+        Ok(())
+    }
+
+    fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+        let (region, sums) = (self.film.region, &mut self.film.sums);
+        let scene = self.scene;
+        let rows = sums.chunks_mut(region.width() as usize).enumerate();
+        let rows = rows
+            .skip((tile.y0 - region.y0) as usize)
+            .take(tile.height() as usize);
+        let columns = (tile.x0 - region.x0) as usize..(tile.x1 - region.x0) as usize;
+        let runs: Vec<_> = rows
+            .flat_map(|(y, row)| {
+                let runs = row[columns.clone()].chunks_mut(RUN).enumerate();
+                runs.map(move |(i, run)| {
+                    (
+                        UVec2::new(tile.x0 + (i * RUN) as u32, region.y0 + y as u32),
+                        run,
+                    )
+                })
+            })
+            .collect();
+        runs.into_par_iter().for_each(|(first, run)| {
+            for (x, sum) in (first.x..).zip(run) {
+                for sample in samples.clone() {
+                    *sum += pixel_radiance(scene, UVec2::new(x, first.y), sample).extend(1.0);
+                }
+            }
+        });
+        Ok(())
+    }
+
+    fn film(&mut self) -> Result<Film, RenderError> {
+        Ok(std::mem::replace(
+            &mut self.film,
+            Film::new(Region::whole(0, 0)),
+        ))
+    }
+
+    fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
+        let rows = (region.y0..region.y1).into_par_iter();
+        let pixels = rows.flat_map_iter(|y| (region.x0..region.x1).map(move |x| UVec2::new(x, y)));
+        Ok(pixels
+            .map(|pixel| pixel_first_hit(self.scene, pixel))
+            .collect())
+    }
+
+    fn largest_film(&self) -> u64 {
+        u64::MAX
+    }
+}

@@ -1,0 +1,62 @@
+//! Twin of `shaders/shadow.wgsl`: shadow rays, from one point to a block of samples of one light at a time.
+
+use glam::{UVec2, Vec2, Vec3};
+
+use super::ellipsoid::ellipsoid_blocks;
+use super::light::{segment, segments_to_light, segments_to_local};
+use super::plane::plane_blocks;
+use super::ray::point_to_local;
+use super::rectangle::rectangle_blocks;
+use super::sampling::sample_square;
+use super::triangle::triangle_blocks;
+use crate::pack::{ELLIPSOID, Light, Primitive, RECTANGLE, TRIANGLE};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block {
+    pub pattern: u32,
+    pub side: u32,
+    pub first: u32,
+    pub count: u32,
+    pub group: u32,
+    pub key: UVec2,
+}
+
+#[inline(always)] // compiled for each kind
+pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: Block) -> u32 {
+    let o = point_to_local(q, p);
+    let to = segments_to_local(q, segments_to_light(light, p));
+    let mut bits = 0;
+    for i in 0..block.count {
+        let d = segment(to, block_sample(block, i));
+        bits |= if blocks(kind, o, d, light.reach) {
+            1 << i
+        } else {
+            0
+        };
+    }
+    bits
+}
+
+pub fn block_sample(block: Block, i: u32) -> Vec2 {
+    sample_square(
+        block.pattern,
+        block.side,
+        block.first + i,
+        block.group,
+        block.key,
+    )
+}
+
+#[inline(always)] // compiled for each kind
+pub fn blocks(kind: u32, o: Vec3, d: Vec3, reach: f32) -> bool {
+    if kind == RECTANGLE {
+        return rectangle_blocks(o, d, reach);
+    }
+    if kind == TRIANGLE {
+        return triangle_blocks(o, d, reach);
+    }
+    if kind == ELLIPSOID {
+        return ellipsoid_blocks(o, d, reach);
+    }
+    plane_blocks(o, d, reach)
+}

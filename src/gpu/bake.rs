@@ -1,0 +1,150 @@
+//! A small scene written into its kernel as constants: the functions of `scene.wgsl` and `traverse.wgsl`, with a
+//! statement for each primitive instead of a loop. Software Vulkan reads a buffer lane by lane, constants for free.
+
+use std::fmt::Write;
+
+use glam::Vec3;
+
+use crate::pack::{ELLIPSOID, Light, Material, PLANE, Packed, Primitive, RECTANGLE, TRIANGLE};
+
+/// Larger scenes are read from buffers: compiling grows with every primitive.
+pub const MOST_PRIMITIVES: usize = 64;
+
+/// The WGSL text of a scene's `closest_hit`, `hidden_samples`, `load_primitive`, `load_material` and `load_light`.
+pub fn bake(packed: &Packed) -> String {
+    let mut out = String::new();
+    let records: Vec<String> = packed.primitives.iter().map(primitive).collect();
+    write_function(
+        &mut out,
+        "closest_hit(ray: Ray) -> Hit",
+        "var hit = Hit(FAR, NOTHING);",
+        "hit",
+        |body| {
+            for (i, (p, record)) in packed.primitives.iter().zip(&records).enumerate() {
+                let kind = kind_name(p.kind).0;
+                let _ = writeln!(
+                    body,
+                    "    hit = closer(hit, intersect_{kind}({record}, ray, hit.t), {i}u);"
+                );
+            }
+        },
+    );
+    let signature = "hidden_samples(p: vec3f, light: Light, block: Block) -> u32";
+    write_function(&mut out, signature, "var bits = 0u;", "bits", |body| {
+        for (p, record) in blocking(packed).map(|i| (&packed.primitives[i], &records[i])) {
+            let kind = kind_name(p.kind).1;
+            let _ = writeln!(
+                body,
+                "    bits |= shadow_bits({kind}, {record}, p, light, block);"
+            );
+        }
+    });
+    write_table(&mut out, "load_primitive", "Primitive", &records);
+    write_table(
+        &mut out,
+        "load_material",
+        "Material",
+        &packed.materials.iter().map(material).collect::<Vec<_>>(),
+    );
+    write_table(
+        &mut out,
+        "load_light",
+        "Light",
+        &packed.lights.iter().map(light).collect::<Vec<_>>(),
+    );
+    out
+}
+
+/// The primitives that can cast a shadow.
+fn blocking(packed: &Packed) -> impl Iterator<Item = usize> {
+    let s = &packed.specialization;
+    let (triangles, ellipsoids) = (s.rectangles, s.rectangles + s.triangles);
+    let planes = ellipsoids + s.ellipsoids;
+    (0..s.blocking_rectangles)
+        .chain(triangles..triangles + s.blocking_triangles)
+        .chain(ellipsoids..planes)
+        .chain(planes..planes + s.blocking_planes)
+        .map(|i| i as usize)
+}
+
+fn kind_name(kind: u32) -> (&'static str, &'static str) {
+    match kind {
+        RECTANGLE => ("rectangle", "RECTANGLE"),
+        TRIANGLE => ("triangle", "TRIANGLE"),
+        ELLIPSOID => ("ellipsoid", "ELLIPSOID"),
+        PLANE => ("plane", "PLANE"),
+        _ => unreachable!("pack makes no other kind"),
+    }
+}
+
+fn write_function(
+    out: &mut String,
+    signature: &str,
+    start: &str,
+    result: &str,
+    body: impl FnOnce(&mut String),
+) {
+    let _ = writeln!(out, "fn {signature} {{\n    {start}");
+    body(out);
+    let _ = writeln!(out, "    return {result};\n}}");
+}
+
+/// A function from an index to a constant record, by a chain of selections.
+fn write_table(out: &mut String, name: &str, record: &str, records: &[String]) {
+    let first = records.first().map_or(format!("{record}()"), Clone::clone);
+    write_function(
+        out,
+        &format!("{name}(i: u32) -> {record}"),
+        &format!("var r = {first};"),
+        "r",
+        |body| {
+            for (i, constant) in records.iter().enumerate().skip(1) {
+                let _ = writeln!(body, "    if i == {i}u {{ r = {constant}; }}");
+            }
+        },
+    );
+}
+
+fn vector(v: Vec3) -> String {
+    format!("vec3f({:?}f, {:?}f, {:?}f)", v.x, v.y, v.z)
+}
+
+fn primitive(p: &Primitive) -> String {
+    format!(
+        "Primitive({}, {}u, {}, {}u, {}, {}u, {}, {:?}f)",
+        vector(p.center),
+        p.material,
+        vector(p.x),
+        p.shape,
+        vector(p.y),
+        p.kind,
+        vector(p.z),
+        p.determinant
+    )
+}
+
+fn material(m: &Material) -> String {
+    format!(
+        "Material({}, {}u, {}, {:?}f, {}, {}u)",
+        vector(m.ambient),
+        m.kind,
+        vector(m.diffuse),
+        m.shininess,
+        vector(m.specular),
+        m.exponent
+    )
+}
+
+fn light(l: &Light) -> String {
+    format!(
+        "Light({}, {:?}f, {}, {:?}f, {}, {:?}f, {}, {}u)",
+        vector(l.center),
+        l.reach,
+        vector(l.u),
+        l.finite,
+        vector(l.v),
+        l.area,
+        vector(l.color),
+        l.number
+    )
+}

@@ -1,0 +1,69 @@
+//! From a kernel's text to what the device takes: parsed, checked and specialised by naga.
+
+use std::borrow::Cow;
+
+use naga::back::{pipeline_constants::process_overrides, spv};
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+use super::compose::{Kernel, Source};
+use super::spirv;
+use crate::error::ShaderError;
+use crate::pack::Specialization;
+
+/// A kernel that naga accepts.
+pub struct Checked {
+    module: naga::Module,
+    info: naga::valid::ModuleInfo,
+}
+
+/// Parses and validates a kernel.
+pub fn check(source: &Source) -> Result<Checked, ShaderError> {
+    let module = naga::front::wgsl::parse_str(&source.text)
+        .map_err(|error| ShaderError::parse(source, &error))?;
+    let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
+        .validate(&module)
+        .map_err(|error| ShaderError::invalid(source, &error))?;
+    Ok(Checked { module, info })
+}
+
+impl Checked {
+    /// The kernel as SPIR-V for one specialisation, computed on the device exactly as it is written.
+    pub fn exact_spirv(
+        &self,
+        kernel: Kernel,
+        constants: &Specialization,
+    ) -> Result<Vec<u32>, ShaderError> {
+        let constants = constants
+            .constants()
+            .into_iter()
+            .map(|(name, value)| (name.to_string(), f64::from(value)));
+        let entry = kernel.entry_point();
+        let (module, info): (Cow<'_, _>, Cow<'_, _>) = process_overrides(
+            &self.module,
+            &self.info,
+            Some((naga::ShaderStage::Compute, entry)),
+            &constants.collect(),
+        )
+        .map_err(|error| ShaderError::other("specialisation", &error))?;
+        // The kernels' loops all count to a bound, so that naga need not bound them again.
+        let options = spv::Options {
+            lang_version: (1, 3),
+            force_loop_bounding: false,
+            bounds_check_policies: naga::proc::BoundsCheckPolicies {
+                index: naga::proc::BoundsCheckPolicy::Restrict,
+                buffer: naga::proc::BoundsCheckPolicy::Restrict,
+                image_load: naga::proc::BoundsCheckPolicy::Restrict,
+                binding_array: naga::proc::BoundsCheckPolicy::Restrict,
+            },
+            flags: spv::WriterFlags::empty(),
+            ..spv::Options::default()
+        };
+        let pipeline = spv::PipelineOptions {
+            shader_stage: naga::ShaderStage::Compute,
+            entry_point: entry.to_string(),
+        };
+        let words = spv::write_vec(&module, &info, &options, Some(&pipeline))
+            .map_err(|error| ShaderError::other("SPIR-V", &error))?;
+        Ok(spirv::forbid_contraction(&words))
+    }
+}

@@ -1,0 +1,186 @@
+//! Kernels as text: each is the concatenation of a list of files, since WGSL's module scope has no order.
+
+use std::{fs, io, path::Path};
+
+macro_rules! files {
+    ($($name:literal),* $(,)?) => {
+        &[$(($name, include_str!(concat!("../../shaders/", $name)))),*]
+    };
+}
+
+/// Every file of `shaders/`, as it was when the program was built.
+pub const BUILT_IN: &[(&str, &str)] = files![
+    "bindings.wgsl",
+    "camera.wgsl",
+    "constants.wgsl",
+    "ellipsoid.wgsl",
+    "integrator.wgsl",
+    "kernels/aov.wgsl",
+    "kernels/render.wgsl",
+    "layout.wgsl",
+    "light.wgsl",
+    "math.wgsl",
+    "phong.wgsl",
+    "plane.wgsl",
+    "ray.wgsl",
+    "rectangle.wgsl",
+    "rng.wgsl",
+    "sampling.wgsl",
+    "scene.wgsl",
+    "shadow.wgsl",
+    "specialization.wgsl",
+    "surface.wgsl",
+    "traverse.wgsl",
+    "triangle.wgsl",
+];
+
+/// The files of the shared mathematics: pure functions and records, each with a twin in `src/cpu/`.
+pub const SHARED: &[&str] = &[
+    "constants.wgsl",
+    "layout.wgsl",
+    "math.wgsl",
+    "rng.wgsl",
+    "sampling.wgsl",
+    "ray.wgsl",
+    "rectangle.wgsl",
+    "triangle.wgsl",
+    "ellipsoid.wgsl",
+    "plane.wgsl",
+    "camera.wgsl",
+    "surface.wgsl",
+    "light.wgsl",
+    "shadow.wgsl",
+    "phong.wgsl",
+];
+
+/// What every kernel adds to [`SHARED`]: its constants, its buffers and the way through the scene.
+const KERNEL: &[&str] = &["specialization.wgsl", "bindings.wgsl", "integrator.wgsl"];
+/// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.
+const FROM_BUFFERS: &[&str] = &["scene.wgsl", "traverse.wgsl"];
+
+/// A compute shader's entry point and the file that it is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kernel {
+    /// Accumulates samples in the film.
+    Render,
+    /// Writes what the first hit of each pixel's centre is like.
+    Aov,
+}
+
+impl Kernel {
+    /// The entry point's name.
+    pub fn entry_point(self) -> &'static str {
+        match self {
+            Kernel::Render => "render",
+            Kernel::Aov => "aov",
+        }
+    }
+
+    fn file(self) -> &'static str {
+        match self {
+            Kernel::Render => "kernels/render.wgsl",
+            Kernel::Aov => "kernels/aov.wgsl",
+        }
+    }
+}
+
+/// The texts of all shader files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Shaders {
+    files: Vec<(String, String)>,
+}
+
+impl Shaders {
+    /// The ones in the program.
+    pub fn built_in() -> Shaders {
+        Shaders {
+            files: BUILT_IN
+                .iter()
+                .map(|(name, text)| (name.to_string(), text.to_string()))
+                .collect(),
+        }
+    }
+
+    /// The ones in a folder, which has the same files as the project's `shaders/`.
+    pub fn read(folder: &Path) -> io::Result<Shaders> {
+        let read = |name: &str| {
+            let path = folder.join(name);
+            let text = fs::read_to_string(&path).map_err(|error| {
+                io::Error::new(error.kind(), format!("{}: {error}", path.display()))
+            })?;
+            Ok((name.to_string(), text))
+        };
+        Ok(Shaders {
+            files: BUILT_IN
+                .iter()
+                .map(|(name, _)| read(name))
+                .collect::<io::Result<_>>()?,
+        })
+    }
+
+    /// A kernel that reads the scene from buffers, or, if `baked` is the text of the functions that know the scene, has
+    /// it as constants.
+    pub fn compose(&self, kernel: Kernel, baked: Option<&str>) -> Source {
+        let mut source = Source::default();
+        for name in SHARED.iter().chain(KERNEL).chain([&kernel.file()]) {
+            source.append(name, self.text(name));
+        }
+        match baked {
+            Some(text) => source.append("(the scene as constants)", text),
+            None => FROM_BUFFERS
+                .iter()
+                .for_each(|name| source.append(name, self.text(name))),
+        }
+        source
+    }
+
+    /// The text of a file.
+    pub fn text(&self, name: &str) -> &str {
+        self.files
+            .iter()
+            .find(|(file, _)| file == name)
+            .map_or("", |(_, text)| text)
+    }
+}
+
+/// A kernel's whole text, and where each part of it came from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Source {
+    /// The WGSL.
+    pub text: String,
+    parts: Vec<Part>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Part {
+    file: String,
+    start: usize,
+}
+
+impl Source {
+    /// Adds a file at the end.
+    pub fn append(&mut self, file: &str, text: &str) {
+        self.parts.push(Part {
+            file: file.to_string(),
+            start: self.text.len(),
+        });
+        self.text.push_str(text);
+        if !text.ends_with('\n') {
+            self.text.push('\n');
+        }
+    }
+
+    /// The file that a byte of the text came from, its own text, and the byte's offset in it.
+    pub fn locate(&self, offset: usize) -> Option<(&str, &str, usize)> {
+        let i = self
+            .parts
+            .partition_point(|part| part.start <= offset)
+            .checked_sub(1)?;
+        let end = self
+            .parts
+            .get(i + 1)
+            .map_or(self.text.len(), |next| next.start);
+        let part = &self.parts[i];
+        Some((&part.file, &self.text[part.start..end], offset - part.start))
+    }
+}

@@ -1,0 +1,247 @@
+//! Adapters, and the choice among them.
+
+use bytemuck::{Pod, bytes_of, cast_slice};
+use wgpu::util::DeviceExt;
+use wgpu::{Backends, BufferUsages, DeviceType};
+
+use crate::error::RenderError;
+
+/// Which device a render asks for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// A real GPU, else software Vulkan.
+    Auto,
+    /// Any adapter.
+    Gpu,
+    /// The adapter with this as part of its name, driver or type.
+    Named(String),
+}
+
+/// What an adapter says of itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Info {
+    /// Its name.
+    pub name: String,
+    /// The driver's name and version.
+    pub driver: String,
+    /// The interface that it is reached by, such as `vulkan`.
+    pub backend: String,
+    /// `discrete`, `integrated`, `virtual`, `software` or `other`.
+    pub kind: &'static str,
+    /// Whether shaders run on it exactly as they are written.
+    pub exact: bool,
+    /// The largest storage buffer that a shader can see, in bytes.
+    pub largest_binding: u64,
+    /// The largest buffer, in bytes.
+    pub largest_buffer: u64,
+}
+
+/// A device that is ready for work; a clone is another handle to it.
+#[derive(Clone)]
+pub struct Device {
+    pub(super) device: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
+    /// What it says of itself.
+    pub info: Info,
+}
+
+/// Every adapter that wgpu finds, in the order in which [`Choice::Auto`] prefers them.
+pub fn adapters() -> Vec<Info> {
+    enumerate().iter().map(info).collect()
+}
+
+/// Opens the adapter that fits a choice best.
+pub fn choose(choice: &Choice) -> Result<Device, RenderError> {
+    let adapters = enumerate();
+    let adapter = adapters.iter().find(|adapter| match choice {
+        Choice::Auto | Choice::Gpu => true,
+        Choice::Named(name) => matches(&info(adapter), name),
+    });
+    adapter.map_or_else(
+        || Err(RenderError::NoDevice(none_fits(choice, &adapters))),
+        open,
+    )
+}
+
+fn none_fits(choice: &Choice, adapters: &[wgpu::Adapter]) -> String {
+    let found: Vec<String> = adapters.iter().map(|adapter| info(adapter).name).collect();
+    match choice {
+        Choice::Named(name) if !found.is_empty() => {
+            format!("no adapter's name, driver or type contains '{name}'; there are: {}", found.join(", "))
+        }
+        _ => "no Vulkan, Metal or DX12 adapter found; on Debian, 'apt-get install mesa-vulkan-drivers' brings software \
+              Vulkan (lavapipe)"
+            .to_string(),
+    }
+}
+
+fn enumerate() -> Vec<wgpu::Adapter> {
+    let instance =
+        wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let mut adapters = pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY));
+    adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
+        DeviceType::DiscreteGpu => 0,
+        DeviceType::IntegratedGpu => 1,
+        DeviceType::VirtualGpu => 2,
+        DeviceType::Other => 3,
+        DeviceType::Cpu => 4,
+    });
+    adapters
+}
+
+fn info(adapter: &wgpu::Adapter) -> Info {
+    let (info, limits) = (adapter.get_info(), adapter.limits());
+    Info {
+        driver: [info.driver, info.driver_info].join(" ").trim().to_string(),
+        backend: info.backend.to_string(),
+        kind: match info.device_type {
+            DeviceType::DiscreteGpu => "discrete",
+            DeviceType::IntegratedGpu => "integrated",
+            DeviceType::VirtualGpu => "virtual",
+            DeviceType::Cpu => "software",
+            DeviceType::Other => "other",
+        },
+        exact: adapter
+            .features()
+            .contains(wgpu::Features::PASSTHROUGH_SHADERS)
+            && info.backend == wgpu::Backend::Vulkan,
+        largest_binding: limits.max_storage_buffer_binding_size,
+        largest_buffer: limits.max_buffer_size,
+        name: info.name,
+    }
+}
+
+/// Whether a name that a person types means this adapter. Mesa's software Vulkan calls itself llvmpipe.
+fn matches(info: &Info, name: &str) -> bool {
+    let name = name.to_lowercase();
+    let lavapipe = if info.name.starts_with("llvmpipe") {
+        "lavapipe"
+    } else {
+        ""
+    };
+    [
+        info.name.as_str(),
+        info.driver.as_str(),
+        info.kind,
+        lavapipe,
+    ]
+    .iter()
+    .any(|known| known.to_lowercase().contains(&name))
+}
+
+fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
+    let info = info(adapter);
+    let (features, experimental) = if info.exact {
+        // SAFETY: the one experimental feature is passing SPIR-V through, and all of it comes from naga.
+        (wgpu::Features::PASSTHROUGH_SHADERS, unsafe {
+            wgpu::ExperimentalFeatures::enabled()
+        })
+    } else {
+        (
+            wgpu::Features::empty(),
+            wgpu::ExperimentalFeatures::disabled(),
+        )
+    };
+    let descriptor = wgpu::DeviceDescriptor {
+        label: None,
+        required_features: features,
+        required_limits: adapter.limits(),
+        experimental_features: experimental,
+        memory_hints: wgpu::MemoryHints::MemoryUsage,
+        trace: wgpu::Trace::Off,
+    };
+    let (device, queue) =
+        pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| {
+            RenderError::Device {
+                device: info.name.clone(),
+                message: error.to_string(),
+            }
+        })?;
+    Ok(Device {
+        device,
+        queue,
+        info,
+    })
+}
+
+impl Device {
+    /// Runs calls to wgpu and returns the first error that they raise.
+    pub(super) fn checked<T>(&self, calls: impl FnOnce() -> T) -> Result<T, RenderError> {
+        let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
+        let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let value = calls();
+        let errors = [validation.pop(), internal.pop(), memory.pop()].map(pollster::block_on);
+        match errors.into_iter().flatten().next() {
+            Some(error) => Err(self.error(error)),
+            None => Ok(value),
+        }
+    }
+
+    fn error(&self, error: impl std::fmt::Display) -> RenderError {
+        RenderError::Device {
+            device: self.info.name.clone(),
+            message: error.to_string(),
+        }
+    }
+
+    pub(super) fn wait(&self) -> Result<(), RenderError> {
+        self.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|error| self.error(error))?;
+        Ok(())
+    }
+
+    pub(super) fn buffer(&self, size: u64, usage: BufferUsages) -> wgpu::Buffer {
+        let descriptor = wgpu::BufferDescriptor {
+            label: None,
+            size,
+            usage,
+            mapped_at_creation: false,
+        };
+        self.device.create_buffer(&descriptor)
+    }
+
+    /// A buffer with these records, or with one of zeros where there are none: a binding cannot be empty.
+    pub(super) fn upload<T: Pod>(&self, usage: BufferUsages, records: &[T]) -> wgpu::Buffer {
+        let none = T::zeroed();
+        let contents = if records.is_empty() {
+            bytes_of(&none)
+        } else {
+            cast_slice(records)
+        };
+        let descriptor = wgpu::util::BufferInitDescriptor {
+            label: None,
+            contents,
+            usage,
+        };
+        self.device.create_buffer_init(&descriptor)
+    }
+
+    /// What a buffer holds.
+    pub(super) fn download<T: Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
+        let staging = self.checked(|| {
+            let staging = self.buffer(
+                buffer.size(),
+                BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+            );
+            let mut encoder = self.device.create_command_encoder(&Default::default());
+            encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+            self.queue.submit([encoder.finish()]);
+            staging
+        })?;
+        let (sender, receiver) = std::sync::mpsc::channel();
+        staging.map_async(wgpu::MapMode::Read, .., move |result| {
+            let _ = sender.send(result); // nobody waits any more if the wait has failed
+        });
+        self.wait()?;
+        receiver
+            .recv()
+            .map_err(|error| self.error(error))?
+            .map_err(|error| self.error(error))?;
+        let view = staging
+            .get_mapped_range(..)
+            .map_err(|error| self.error(error))?;
+        Ok(bytemuck::pod_collect_to_vec(&view))
+    }
+}

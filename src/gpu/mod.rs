@@ -1,0 +1,13 @@
+//! The GPU path: kernels in WGSL, run by wgpu. Only this module names wgpu.
+
+mod bake;
+mod compile;
+pub mod compose;
+mod device;
+mod pipeline;
+mod renderer;
+pub mod spirv;
+
+pub use compile::{Checked, check};
+pub use device::{Choice, Device, Info, adapters, choose};
+pub use renderer::{Gpu, Options};

@@ -1,0 +1,137 @@
+//! The schedule of work, above both backends: bands that fit memory, dispatches that end in time, progress and
+//! cancelling. Sums go on from the film's own values, so that every cut gives the same picture.
+
+use std::ops::Range;
+use std::time::{Duration, Instant};
+
+use crate::error::RenderError;
+use crate::film::{Film, Region};
+use crate::pack::FirstHit;
+
+/// What renders: a scene on a device. It has one film at a time.
+pub trait Backend {
+    /// Starts an empty film of a region of the picture.
+    fn begin(&mut self, region: Region) -> Result<(), RenderError>;
+    /// Adds a range of samples to the pixels of a tile of the film, and returns when this is done.
+    fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError>;
+    /// The film as it is now.
+    fn film(&mut self) -> Result<Film, RenderError>;
+    /// What the rays through the centres of a region's pixels meet first, row by row from the top.
+    fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError>;
+    /// The largest film that it can have, in pixels.
+    fn largest_film(&self) -> u64;
+}
+
+/// How long one call of [`Backend::render`] aims to take: long enough to hide what a call costs, short enough for
+/// watchdogs, progress and cancelling.
+const CALL: Duration = Duration::from_millis(60);
+
+/// How work is cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cut {
+    /// The largest film, in pixels.
+    pub band_pixels: u64,
+    /// The samples of one call, if not as many as time allows.
+    pub samples_per_call: Option<u32>,
+    /// The rows of one call, if not as many as time allows.
+    pub rows_per_call: Option<u32>,
+}
+
+impl Default for Cut {
+    /// Bands of 64 MiB.
+    fn default() -> Cut {
+        Cut {
+            band_pixels: 4 << 20,
+            samples_per_call: None,
+            rows_per_call: None,
+        }
+    }
+}
+
+/// Renders a region band by band, from the top, and hands each finished band to `output`. `progress` is told the share
+/// of the work that is done, from 0 to 1, and returns whether to go on.
+pub fn render(
+    backend: &mut dyn Backend,
+    region: Region,
+    samples: u32,
+    cut: &Cut,
+    progress: &mut dyn FnMut(f64) -> bool,
+    output: &mut dyn FnMut(Film) -> Result<(), RenderError>,
+) -> Result<(), RenderError> {
+    let band_pixels = cut.band_pixels.min(backend.largest_film());
+    let band_rows =
+        (band_pixels / u64::from(region.width())).clamp(1, u64::from(region.height())) as u32;
+    let total = region.pixels() as f64 * f64::from(samples);
+    let mut pace = Pace::default();
+    let mut done = 0.0;
+    for y0 in (region.y0..region.y1).step_by(band_rows as usize) {
+        let band = Region {
+            y0,
+            y1: region.y1.min(y0 + band_rows),
+            ..region
+        };
+        backend.begin(band)?;
+        let mut first = 0;
+        while first < samples {
+            let count = cut
+                .samples_per_call
+                .unwrap_or_else(|| pace.samples(band))
+                .min(samples - first);
+            let mut y = band.y0;
+            while y < band.y1 {
+                let rows = cut
+                    .rows_per_call
+                    .unwrap_or_else(|| pace.rows(band, count))
+                    .min(band.y1 - y);
+                let tile = Region {
+                    y0: y,
+                    y1: y + rows,
+                    ..band
+                };
+                let start = Instant::now();
+                backend.render(tile, first..first + count)?;
+                let work = tile.pixels() as f64 * f64::from(count);
+                pace.took(work, start.elapsed());
+                done += work;
+                if !progress(done / total) {
+                    return Err(RenderError::Cancelled);
+                }
+                y += rows;
+            }
+            first += count;
+        }
+        output(backend.film()?)?;
+    }
+    Ok(())
+}
+
+/// How fast work goes, learnt from the calls so far.
+#[derive(Default)]
+struct Pace {
+    /// Samples of pixels per second.
+    speed: Option<f64>,
+}
+
+impl Pace {
+    /// A first call is small enough for the slowest device and scene.
+    const FIRST_CALL: f64 = 16384.0;
+
+    fn took(&mut self, work: f64, time: Duration) {
+        let speed = work / time.as_secs_f64().max(1e-6);
+        self.speed = Some(self.speed.map_or(speed, |known| speed.min(2.0 * known)));
+    }
+
+    /// Pixel samples that fit a call.
+    fn work(&self) -> f64 {
+        self.speed
+            .map_or(Self::FIRST_CALL, |speed| speed * CALL.as_secs_f64())
+    }
+
+    fn samples(&self, band: Region) -> u32 {
+        (self.work() / band.pixels() as f64).max(1.0) as u32
+    }
+
+    fn rows(&self, band: Region, samples: u32) -> u32 {
+        (self.work() / (f64::from(band.width()) * f64::from(samples))).max(1.0) as u32
+    }
+}

@@ -1,0 +1,9 @@
+//! A ray tracer written as WGSL compute shaders on wgpu, with a CPU twin that computes the same bits.
+
+pub mod cpu;
+pub mod error;
+pub mod film;
+pub mod gpu;
+pub mod job;
+pub mod pack;
+pub mod scene;

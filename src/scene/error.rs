@@ -1,0 +1,141 @@
+//! What can be wrong with a scene file, and where.
+
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+
+/// Why there is no scene. Every message begins with the place.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// The file cannot be read.
+    // The field is not named `source`: its text is in the message, and must not be printed twice.
+    #[error("{}: cannot be read: {error}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        error: io::Error,
+    },
+    /// The file is no TOML.
+    #[error("{origin}:{line}:{column}: {message}")]
+    Syntax {
+        /// Name of the file.
+        origin: String,
+        /// Counted from 1.
+        line: usize,
+        /// In characters, counted from 1.
+        column: usize,
+        /// What the parser says.
+        message: String,
+    },
+    /// The file describes no scene.
+    #[error("{origin}:{line}: {problem}")]
+    Invalid {
+        /// Name of the file.
+        origin: String,
+        /// Counted from 1.
+        line: usize,
+        /// What is wrong.
+        problem: Problem,
+    },
+    /// An option that stands in for a value of the file has a bad value ([`Overrides`](super::Overrides)).
+    #[error("{0}")]
+    Option(Problem),
+}
+
+/// A value that breaks a rule: `shapes[2].size: -1 must be finite and greater than 0`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Problem {
+    /// Where it stands.
+    pub key: KeyPath,
+    /// The value and the rule.
+    pub message: String,
+}
+
+impl Problem {
+    pub(super) fn new(message: impl Into<String>) -> Self {
+        Self {
+            key: KeyPath::default(),
+            message: message.into(),
+        }
+    }
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.key.0.is_empty() {
+            f.write_str(&self.message)
+        } else {
+            write!(f, "{}: {}", self.key, self.message)
+        }
+    }
+}
+
+impl std::error::Error for Problem {}
+
+/// The way from the top of a file to a value: `shapes[2].size`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct KeyPath(pub(super) Vec<Segment>);
+
+/// A step of a [`KeyPath`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Segment {
+    Key(String),
+    Index(usize),
+}
+
+impl From<&str> for Segment {
+    fn from(key: &str) -> Self {
+        Segment::Key(key.to_owned())
+    }
+}
+
+impl From<usize> for Segment {
+    fn from(index: usize) -> Self {
+        Segment::Index(index)
+    }
+}
+
+impl fmt::Display for KeyPath {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        for (i, segment) in self.0.iter().enumerate() {
+            match segment {
+                Segment::Index(index) => write!(f, "[{index}]")?,
+                Segment::Key(key) => {
+                    if i > 0 {
+                        f.write_str(".")?;
+                    }
+                    if !key.is_empty() && key.chars().all(bare) {
+                        f.write_str(key)?;
+                    } else {
+                        write!(f, "{key:?}")?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Says, on the way up, where a problem is, so that no path is built while all is well:
+/// `check(x).at("center").at(2).at("shapes")?`.
+pub(super) trait At {
+    /// Puts a step in front of the problem's path.
+    fn at(self, segment: impl Into<Segment>) -> Self;
+}
+
+impl At for Problem {
+    fn at(mut self, segment: impl Into<Segment>) -> Self {
+        self.key.0.insert(0, segment.into());
+        self
+    }
+}
+
+impl<T> At for Result<T, Problem> {
+    fn at(self, segment: impl Into<Segment>) -> Self {
+        self.map_err(|problem| problem.at(segment))
+    }
+}

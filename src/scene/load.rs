@@ -1,0 +1,208 @@
+//! From a scene file to a checked [`Scene`], with the options of a command line in place of its values.
+
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::path::Path;
+
+use super::error::{At, Problem, SceneError};
+use super::parse::{invalid, syntax_error};
+use super::validate::{sample_count, side};
+use super::{Description, SamplesDescription, Scene};
+
+/// The largest scene file in bytes: far above what anyone writes, far below what fills the memory.
+const LARGEST_FILE: u64 = 64 << 20;
+
+/// Values that stand in for those of a file. Where one is bad the error is [`SceneError::Option`], which names
+/// the option of the command line.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Overrides {
+    /// `--size`: width and height.
+    pub size: Option<(u32, u32)>,
+    /// `--pixel-samples`: the count; the pattern stays.
+    pub pixel_samples: Option<u32>,
+    /// `--light-samples`: the count; the pattern stays.
+    pub light_samples: Option<u32>,
+    /// `--seed`
+    pub seed: Option<u32>,
+}
+
+impl Overrides {
+    fn apply(&self, description: &mut Description) -> Result<(), Problem> {
+        if let Some((width, height)) = self.size {
+            description.image.width = side(width).at("--size")?;
+            description.image.height = side(height).at("--size")?;
+        }
+        let render = &mut description.render;
+        set_count(&mut render.pixel_samples, self.pixel_samples).at("--pixel-samples")?;
+        set_count(&mut render.light_samples, self.light_samples).at("--light-samples")?;
+        render.seed = self.seed.unwrap_or(render.seed);
+        Ok(())
+    }
+}
+
+fn set_count(samples: &mut SamplesDescription, count: Option<u32>) -> Result<(), Problem> {
+    if let Some(count) = count {
+        samples.count = sample_count(samples.pattern, count)?;
+    }
+    Ok(())
+}
+
+impl Scene {
+    /// Reads and checks a scene file.
+    ///
+    /// # Errors
+    ///
+    /// Files that cannot be read, hold more than 64 MiB or are not UTF-8, and the errors of [`Scene::parse`].
+    pub fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
+        let bytes = read(path).map_err(|error| SceneError::Read {
+            path: path.to_owned(),
+            error,
+        })?;
+        let origin = path.display().to_string();
+        match std::str::from_utf8(&bytes) {
+            Ok(text) => Scene::parse(text, &origin, overrides),
+            Err(error) => {
+                let text = String::from_utf8_lossy(&bytes);
+                // Up to there the lossy text is the file's.
+                Err(syntax_error(
+                    &text,
+                    &origin,
+                    error.valid_up_to(),
+                    "not valid UTF-8",
+                ))
+            }
+        }
+    }
+
+    /// Reads and checks the text of a scene file; `origin` is the file's name in messages.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`Description::parse`] and of [`Description::validate`], and bad overrides.
+    pub fn parse(text: &str, origin: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
+        let mut description = Description::parse(text, origin)?;
+        overrides
+            .apply(&mut description)
+            .map_err(SceneError::Option)?;
+        let scene = description.validate();
+        scene.map_err(|problem| invalid(text, origin, problem))
+    }
+}
+
+fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?
+        .take(LARGEST_FILE + 1)
+        .read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(io::Error::new(
+            io::ErrorKind::FileTooLarge,
+            "it is larger than 64 MiB",
+        ));
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = "\
+image = { width = 4, height = 3 }
+camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
+[render]
+light_samples = { pattern = 'random', count = 5 }
+";
+
+    #[test]
+    fn overrides_stand_in_for_the_files_values() {
+        let overrides = Overrides {
+            size: Some((50, 40)),
+            pixel_samples: Some(9),
+            light_samples: Some(8),
+            seed: Some(3),
+        };
+        let scene = Scene::parse(SCENE, "s.toml", &overrides).unwrap();
+        let render = scene.render;
+        assert_eq!((scene.width, scene.height, render.seed), (50, 40, 3));
+        assert_eq!(
+            (render.pixel_samples.count, render.light_samples.count),
+            (9, 8)
+        );
+        let scene = Scene::parse(SCENE, "s.toml", &Overrides::default()).unwrap();
+        let render = scene.render;
+        assert_eq!((scene.width, scene.height, render.seed), (4, 3, 0));
+        assert_eq!(
+            (render.pixel_samples.count, render.light_samples.count),
+            (16, 5)
+        );
+    }
+
+    #[test]
+    fn bad_overrides_are_told_by_the_options_name() {
+        let none = Overrides::default;
+        for (overrides, told) in [
+            (
+                Overrides {
+                    size: Some((0, 1)),
+                    ..none()
+                },
+                "--size: 0 must be from 1 to 65536",
+            ),
+            (
+                Overrides {
+                    size: Some((1, 65_537)),
+                    ..none()
+                },
+                "--size: 65537 must be from 1 to 65536",
+            ),
+            (
+                Overrides {
+                    pixel_samples: Some(8),
+                    ..none()
+                },
+                "--pixel-samples: 8 must be a square number, as its pattern is n x n cells",
+            ),
+            (
+                Overrides {
+                    light_samples: Some(0),
+                    ..none()
+                },
+                "--light-samples: 0 must be from 1 to 65536",
+            ),
+        ] {
+            let error = Scene::parse(SCENE, "s.toml", &overrides).unwrap_err();
+            assert!(matches!(error, SceneError::Option(_)), "{error}");
+            assert_eq!(error.to_string(), told);
+        }
+    }
+
+    #[test]
+    fn files_are_read_or_the_message_says_why_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let load = |name: &str| Scene::load(&folder.path().join(name), &Overrides::default());
+        let told = |name: &str| load(name).unwrap_err().to_string();
+        let path = |name: &str| folder.path().join(name).display().to_string();
+        let write =
+            |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+        write("good.toml", SCENE.as_bytes());
+        assert_eq!(load("good.toml").unwrap().width, 4);
+        write("latin.toml", b"# \xc3\xa9t\xc3\xa9\n# \xc3\xa9t\xe9");
+        assert_eq!(
+            told("latin.toml"),
+            format!("{}:2:5: not valid UTF-8", path("latin.toml"))
+        );
+        assert!(told("none.toml").starts_with(&format!("{}: cannot be read: ", path("none.toml"))));
+        File::create(folder.path().join("huge.toml"))
+            .unwrap()
+            .set_len(LARGEST_FILE + 1)
+            .unwrap();
+        assert_eq!(
+            told("huge.toml"),
+            format!(
+                "{}: cannot be read: it is larger than 64 MiB",
+                path("huge.toml")
+            )
+        );
+    }
+}

@@ -1,0 +1,198 @@
+//! A scene that has been checked: what the file describes, with every name resolved and every value in range.
+//!
+//! The way from the file: text → [`Description`] (what it says, field for field) → [`Scene`] (by
+//! [`Description::validate`] alone). Nothing behind a `Scene` checks again.
+
+mod description;
+mod error;
+mod load;
+mod parse;
+mod validate;
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+pub use description::*;
+pub use error::{KeyPath, Problem, SceneError};
+pub use load::Overrides;
+
+/// A checked scene. Lengths have no unit; colours are linear RGB; angles are radians.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Scene {
+    /// Width of the picture in pixels, 1 to 65,536.
+    pub width: u32,
+    /// Height of the picture in pixels, 1 to 65,536.
+    pub height: u32,
+    /// Where the picture is seen from.
+    pub camera: Camera,
+    /// How it is rendered.
+    pub render: Render,
+    /// The materials that shapes name by index, in the order of their names.
+    pub materials: Vec<Material>,
+    /// The lights, in file order.
+    pub lights: Vec<Light>,
+    /// The shapes, in file order.
+    pub shapes: Vec<Shape>,
+}
+
+/// A camera: a position, an orthonormal basis and a projection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Camera {
+    /// The centre of projection; for an orthographic camera the middle of the image plane.
+    pub position: DVec3,
+    /// Unit vector to the right in the picture.
+    pub right: DVec3,
+    /// Unit vector upwards in the picture.
+    pub up: DVec3,
+    /// Unit vector into the scene.
+    pub forward: DVec3,
+    /// How points are projected.
+    pub projection: Projection,
+}
+
+/// How a camera projects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// All rays start at the camera's position.
+    Perspective {
+        /// Vertical field of view in radians, in (0, pi).
+        fov: f64,
+    },
+    /// All rays are parallel.
+    Orthographic {
+        /// Height of the seen rectangle in scene units.
+        height: f64,
+    },
+}
+
+/// The settings of a render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Render {
+    /// What light is simulated.
+    pub integrator: Integrator,
+    /// The ambient light that every Phong material reflects by its ambient colour.
+    pub ambient: DVec3,
+    /// Radiance of rays that leave the scene.
+    pub background: DVec3,
+    /// Offset of shadow rays, relative to the largest coordinate of their start.
+    pub shadow_epsilon: f64,
+    /// Seed of all random patterns.
+    pub seed: u32,
+    /// Samples of every pixel's area.
+    pub pixel_samples: Samples,
+    /// Samples of every area light, at every hit.
+    pub light_samples: Samples,
+}
+
+/// What light is simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Integrator {
+    /// Direct light and Phong's reflection model, the formula in the scene format's page.
+    Phong,
+}
+
+/// A set of sample positions on the unit square.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Samples {
+    /// How they are laid out.
+    pub pattern: Pattern,
+    /// How many, 1 to 65,536; a square for [`Pattern::Grid`].
+    pub count: u32,
+}
+
+/// A surface's appearance.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Material {
+    /// Phong's reflection model.
+    Phong {
+        /// Factor of the ambient light.
+        ambient: DVec3,
+        /// Factor of the diffuse term.
+        diffuse: DVec3,
+        /// Factor of the specular term.
+        specular: DVec3,
+        /// Exponent of the specular term, greater than 0.
+        shininess: f64,
+    },
+}
+
+/// A source of light.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Light {
+    /// A rectangle whose both sides shine, seen by the camera as its plain colour, casting no shadow.
+    Rectangle {
+        /// Its place and size.
+        rectangle: Parallelogram,
+        /// Its colour.
+        color: DVec3,
+    },
+    /// A point, not seen by the camera.
+    Point {
+        /// Where it is.
+        position: DVec3,
+        /// Its colour, without falloff.
+        color: DVec3,
+    },
+    /// Light from infinitely far away, not seen by the camera.
+    Directional {
+        /// Unit vector in which the light travels.
+        direction: DVec3,
+        /// Its colour.
+        color: DVec3,
+    },
+}
+
+/// The points `center + x u + y v` for x, y in -1..=1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Parallelogram {
+    /// The middle.
+    pub center: DVec3,
+    /// Half the first edge: half the width along the tangent.
+    pub u: DVec3,
+    /// Half the second edge: half the height along the bitangent, normal x tangent.
+    pub v: DVec3,
+}
+
+/// A shape with its material.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Shape {
+    /// Its form and place.
+    pub geometry: Geometry,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+}
+
+/// The form and place of a shape.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Geometry {
+    /// A rectangle; its normal is u x v.
+    Rectangle(Parallelogram),
+    /// An ellipsoid (a sphere among them): the points `center + x a + y b + z c` with x² + y² + z² = 1.
+    Ellipsoid {
+        /// The middle.
+        center: DVec3,
+        /// The half axes, linearly independent.
+        axes: [DVec3; 3],
+    },
+    /// Triangles that share one shape number (a triangle, the faces of a tetrahedron), each with its vertices
+    /// counter-clockwise as seen from outside: normal (v1 - v0) x (v2 - v1).
+    Triangles(Vec<[DVec3; 3]>),
+    /// An infinite plane.
+    Plane {
+        /// A point of it, the origin of its texture coordinates.
+        point: DVec3,
+        /// Unit tangent: the direction of u.
+        tangent: DVec3,
+        /// Unit normal x tangent: the direction of v.
+        bitangent: DVec3,
+    },
+}
