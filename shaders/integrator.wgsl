@@ -32,7 +32,8 @@ fn lobes_of_light(surface: Surface, material: Material, light: Light, pattern: u
     let key = sample_key(pixel, camera.seed, 1u + light.number);
     var lobes = Lobes(0.0, 0.0);
     for (var first = 0u; first < count; first += BLOCK) {
-        let block = Block(pattern, side, first, select(BLOCK, count - first, count - first < BLOCK), sample, key);
+        let rest = select(BLOCK, count - first, count - first < BLOCK);
+        let block = sample_block(pattern, side, first, rest, sample, key);
         let hidden = hidden_samples(surface.start, light, block);
         lobes = phong_block(surface, material, to, block, hidden, EXPONENT_BITS, lobes);
     }

@@ -8,7 +8,7 @@ use super::light::segments_to_light;
 use super::phong::{Lobes, phong_block};
 use super::ray::Ray;
 use super::sampling::{sample_key, sample_square};
-use super::shadow::Block;
+use super::shadow::sample_block;
 use super::surface::{Surface, first_hit, surface_at};
 use super::traverse::{closest_hit, hidden_samples};
 use crate::pack::{BLOCK, EMITTER, FirstHit, GRID, Light, Material, NOTHING, Packed};
@@ -64,20 +64,14 @@ pub fn lobes_of_light(
     };
     let mut first = 0;
     while first < count {
-        let block = Block {
-            pattern,
-            side,
-            first,
-            count: BLOCK.min(count - first),
-            group: sample,
-            key,
-        };
-        let hidden = hidden_samples(scene, surface.start, light, block);
+        let rest = BLOCK.min(count - first);
+        let block = sample_block(pattern, side, first, rest, sample, key);
+        let hidden = hidden_samples(scene, surface.start, light, &block);
         lobes = phong_block(
             surface,
             material,
             to,
-            block,
+            &block,
             hidden,
             scene.specialization.exponent_bits,
             lobes,

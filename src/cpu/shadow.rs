@@ -7,22 +7,44 @@ use super::light::{segment, segments_to_light, segments_to_local};
 use super::plane::plane_blocks;
 use super::ray::point_to_local;
 use super::rectangle::rectangle_blocks;
-use super::sampling::sample_square;
+use super::sampling::{grid_sample, sample_square};
 use super::triangle::triangle_blocks;
-use crate::pack::{ELLIPSOID, Light, Primitive, RECTANGLE, TRIANGLE};
+use crate::pack::{BLOCK, ELLIPSOID, GRID, Light, Primitive, RECTANGLE, TRIANGLE};
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Block {
     pub pattern: u32,
     pub side: u32,
     pub first: u32,
     pub count: u32,
-    pub group: u32,
-    pub key: UVec2,
+    pub positions: [Vec2; BLOCK as usize],
+}
+
+pub fn sample_block(
+    pattern: u32,
+    side: u32,
+    first: u32,
+    count: u32,
+    group: u32,
+    key: UVec2,
+) -> Block {
+    let mut block = Block {
+        pattern,
+        side,
+        first,
+        count,
+        positions: [Vec2::ZERO; BLOCK as usize],
+    };
+    if pattern != GRID {
+        for i in 0..count {
+            block.positions[i as usize] = sample_square(pattern, side, first + i, group, key);
+        }
+    }
+    block
 }
 
 #[inline(always)] // compiled for each kind
-pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: Block) -> u32 {
+pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: &Block) -> u32 {
     let o = point_to_local(q, p);
     let to = segments_to_local(q, segments_to_light(light, p));
     let mut bits = 0;
@@ -37,14 +59,11 @@ pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: Bloc
     bits
 }
 
-pub fn block_sample(block: Block, i: u32) -> Vec2 {
-    sample_square(
-        block.pattern,
-        block.side,
-        block.first + i,
-        block.group,
-        block.key,
-    )
+pub fn block_sample(block: &Block, i: u32) -> Vec2 {
+    if block.pattern == GRID {
+        return grid_sample(block.side, block.first + i);
+    }
+    block.positions[i as usize]
 }
 
 #[inline(always)] // compiled for each kind

@@ -30,7 +30,7 @@ pub fn closest_hit(scene: &Packed, ray: Ray) -> Hit {
     hit
 }
 
-pub fn hidden_samples(scene: &Packed, p: Vec3, light: &Light, block: Block) -> u32 {
+pub fn hidden_samples(scene: &Packed, p: Vec3, light: &Light, block: &Block) -> u32 {
     let kinds = Kinds::of(scene);
     let s = &scene.specialization;
     let mut bits = 0;
