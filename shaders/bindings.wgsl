@@ -6,3 +6,4 @@
 @group(0) @binding(3) var<storage, read> primitives: array<Primitive>;
 @group(0) @binding(4) var<storage, read> materials: array<Material>;
 @group(0) @binding(5) var<storage, read> lights: array<Light>;
+@group(0) @binding(7) var<storage, read> filter_table: array<vec2f>;

@@ -45,10 +45,23 @@ fn reflected(material: Material, light: Light, lobes: Lobes, weight: f32) -> vec
     return light_color * (material.diffuse * lobes.diffuse + material.specular * lobes.specular);
 }
 
-// The radiance of one sample of a pixel.
-fn pixel_radiance(pixel: vec2u, sample: u32) -> vec3f {
-    let at = sample_square(PIXEL_PATTERN, PIXEL_SIDE, sample, 0u, sample_key(pixel, camera.seed, 0u));
-    return radiance(camera_ray(camera, vec2f(pixel) + at), pixel, sample);
+// One sample of a pixel: its radiance times its weight, and its weight.
+fn pixel_radiance(pixel: vec2u, sample: u32) -> vec4f {
+    let u = sample_square(PIXEL_PATTERN, PIXEL_SIDE, sample, 0u, sample_key(pixel, camera.seed, 0u));
+    let at = filtered(u);
+    return vec4f(radiance(camera_ray(camera, vec2f(pixel) + at.xy), pixel, sample) * at.z, at.z);
+}
+
+// A uniform position as one that is distributed like the filter, from the pixel's corner, and its weight.
+fn filtered(u: vec2f) -> vec3f {
+    if FILTER_BINS == 0u {
+        return vec3f(u, 1.0);
+    }
+    let i = filter_bin(u.x, FILTER_BINS);
+    let j = filter_bin(u.y, FILTER_BINS);
+    let x = filter_offset(u.x, i, FILTER_BINS, filter_table[i].x, filter_table[i + 1u].x);
+    let y = filter_offset(u.y, j, FILTER_BINS, filter_table[j].x, filter_table[j + 1u].x);
+    return vec3f(0.5 + x, 0.5 + y, filter_table[i].y * filter_table[j].y);
 }
 
 // What the ray through a pixel's centre meets.

@@ -3,11 +3,14 @@
 //! The structs are those of `shaders/layout.wgsl`: rows of 16 bytes, a `vec3f` followed by a scalar.
 
 mod blocking;
+pub mod filter;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3, UVec2, Vec2, Vec3};
 
-use crate::scene::{self, Geometry, Parallelogram, Pattern, Projection, Samples, Scene};
+use crate::scene::{
+    self, Filter, FilterKind, Geometry, Parallelogram, Pattern, Projection, Samples, Scene,
+};
 
 /// [`Camera::projection`] of a camera whose rays start at one point.
 pub const PERSPECTIVE: u32 = 0;
@@ -226,6 +229,8 @@ specialization! {
     light_side = "LIGHT_SIDE",
     /// How many there are.
     light_samples = "LIGHT_SAMPLES",
+    /// Bins of the filter's table; 0 if it is the box of the pixel.
+    filter_bins = "FILTER_BINS",
     /// Bits of the largest shininess if all are whole numbers, else 0.
     exponent_bits = "EXPONENT_BITS",
 }
@@ -243,6 +248,8 @@ pub struct Packed {
     pub materials: Vec<Material>,
     /// The lights, rectangles first.
     pub lights: Vec<Light>,
+    /// The filter's bins ([`filter::table`]); none if it is the box of the pixel.
+    pub filter_table: Vec<Vec2>,
     /// Samples of every pixel.
     pub pixel_samples: u32,
     /// The constants.
@@ -293,6 +300,10 @@ pub fn pack(scene: &Scene) -> Packed {
     };
     let area_lights = lights.iter().filter(|light| light.area > 0.0).count() as u32;
     let (pixels, light_samples) = (scene.render.pixel_samples, scene.render.light_samples);
+    let filter_table = match is_pixel(scene.render.filter) {
+        true => Vec::new(),
+        false => filter::table(scene.render.filter),
+    };
     let specialization = Specialization {
         rectangles: count(RECTANGLE, false),
         blocking_rectangles: count(RECTANGLE, true),
@@ -308,6 +319,7 @@ pub fn pack(scene: &Scene) -> Packed {
         light_pattern: pattern(light_samples),
         light_side: side(light_samples),
         light_samples: light_samples.count,
+        filter_bins: (filter_table.len() as u32).saturating_sub(1),
         exponent_bits,
     };
     Packed {
@@ -321,9 +333,15 @@ pub fn pack(scene: &Scene) -> Packed {
         primitives: order.into_iter().map(|(primitive, _)| primitive).collect(),
         materials,
         lights,
+        filter_table,
         pixel_samples: pixels.count,
         specialization,
     }
+}
+
+/// Whether a filter is the pixel itself: the same weight for all samples inside.
+fn is_pixel(filter: Filter) -> bool {
+    filter.kind == FilterKind::Box && filter.radius == 0.5
 }
 
 fn pattern(samples: Samples) -> u32 {

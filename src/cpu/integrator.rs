@@ -1,9 +1,10 @@
 //! Twin of `shaders/integrator.wgsl`: radiance along a ray.
 
 use bytemuck::Zeroable;
-use glam::{UVec2, Vec3};
+use glam::{UVec2, Vec2, Vec3, Vec4};
 
 use super::camera::camera_ray;
+use super::filter::{filter_bin, filter_offset};
 use super::light::segments_to_light;
 use super::phong::{Lobes, phong_block};
 use super::ray::Ray;
@@ -86,16 +87,26 @@ pub fn reflected(material: &Material, light: &Light, lobes: Lobes, weight: f32) 
     light_color * (material.diffuse * lobes.diffuse + material.specular * lobes.specular)
 }
 
-pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> Vec3 {
+pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> Vec4 {
     let s = &scene.specialization;
     let key = sample_key(pixel, scene.camera.seed, 0);
-    let at = sample_square(s.pixel_pattern, s.pixel_side, sample, 0, key);
-    radiance(
-        scene,
-        camera_ray(&scene.camera, pixel.as_vec2() + at),
-        pixel,
-        sample,
-    )
+    let u = sample_square(s.pixel_pattern, s.pixel_side, sample, 0, key);
+    let at = filtered(scene, u);
+    let ray = camera_ray(&scene.camera, pixel.as_vec2() + at.truncate());
+    (radiance(scene, ray, pixel, sample) * at.z).extend(at.z)
+}
+
+pub fn filtered(scene: &Packed, u: Vec2) -> Vec3 {
+    let (bins, table) = (scene.specialization.filter_bins, &scene.filter_table);
+    if bins == 0 {
+        return u.extend(1.0);
+    }
+    let (i, j) = (filter_bin(u.x, bins), filter_bin(u.y, bins));
+    let edges = |bin: u32| (table[bin as usize], table[bin as usize + 1]);
+    let ((x0, x1), (y0, y1)) = (edges(i), edges(j));
+    let x = filter_offset(u.x, i, bins, x0.x, x1.x);
+    let y = filter_offset(u.y, j, bins, y0.x, y1.x);
+    Vec3::new(0.5 + x, 0.5 + y, x0.y * y0.y)
 }
 
 pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {

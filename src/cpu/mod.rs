@@ -6,6 +6,7 @@
 
 pub mod camera;
 pub mod ellipsoid;
+pub mod filter;
 pub mod integrator;
 pub mod light;
 pub mod math;

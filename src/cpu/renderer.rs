@@ -58,7 +58,7 @@ impl Backend for Cpu<'_> {
         runs.into_par_iter().for_each(|(first, run)| {
             for (x, sum) in (first.x..).zip(run) {
                 for sample in samples.clone() {
-                    *sum += pixel_radiance(scene, UVec2::new(x, first.y), sample).extend(1.0);
+                    *sum += pixel_radiance(scene, UVec2::new(x, first.y), sample);
                 }
             }
         });

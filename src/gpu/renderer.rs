@@ -39,7 +39,7 @@ pub struct Gpu {
     device: Device,
     kernels: Kernels,
     render: wgpu::ComputePipeline,
-    scene: [wgpu::Buffer; 5],
+    scene: [wgpu::Buffer; 6],
     work: wgpu::Buffer,
     film: Option<Target>,
 }
@@ -85,6 +85,7 @@ impl Gpu {
                 device.upload(BufferUsages::STORAGE, &packed.primitives),
                 device.upload(BufferUsages::STORAGE, &packed.materials),
                 device.upload(BufferUsages::STORAGE, &packed.lights),
+                device.upload(BufferUsages::STORAGE, &packed.filter_table),
             ]
         })?;
         let work = device.buffer(
@@ -116,7 +117,7 @@ impl Gpu {
             let buffer = self
                 .device
                 .buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-            let [camera, environment, primitives, materials, lights] = &self.scene;
+            let [camera, environment, primitives, materials, lights, filter] = &self.scene;
             let buffers = [
                 &self.work,
                 camera,
@@ -125,6 +126,7 @@ impl Gpu {
                 materials,
                 lights,
                 &buffer,
+                filter,
             ];
             let entries: Vec<wgpu::BindGroupEntry> = (0..)
                 .zip(buffers)

@@ -54,6 +54,8 @@ pub struct RenderDescription {
     pub pixel_samples: SamplesDescription,
     /// Samples of every area light at every hit.
     pub light_samples: SamplesDescription,
+    /// What a pixel's samples are weighted by.
+    pub filter: FilterDescription,
 }
 
 impl Default for RenderDescription {
@@ -70,6 +72,10 @@ impl Default for RenderDescription {
             seed: 0,
             pixel_samples: samples.clone(),
             light_samples: samples,
+            filter: FilterDescription {
+                kind: FilterKind::Box,
+                radius: None,
+            },
         }
     }
 }
@@ -112,6 +118,48 @@ impl Pattern {
             self,
             Pattern::Grid | Pattern::RotatedGrid | Pattern::Jittered
         )
+    }
+}
+
+/// A reconstruction filter.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct FilterDescription {
+    /// Its form.
+    #[serde(rename = "type")]
+    pub kind: FilterKind,
+    /// How far it reaches, in pixels; absent, what is usual for its form.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius: Option<f64>,
+}
+
+/// The form of a reconstruction filter, a product of the same function of x and of y. In a file the names are in snake
+/// case: `"blackman_harris"`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum FilterKind {
+    /// Constant.
+    Box,
+    /// Linear from the middle to the radius.
+    Triangle,
+    /// The bell, with a standard deviation of a third of the radius.
+    Gaussian,
+    /// The cubic of Mitchell and Netravali with B = C = 1/3, with negative lobes.
+    Mitchell,
+    /// The window of Blackman and Harris, of four terms.
+    BlackmanHarris,
+}
+
+impl FilterKind {
+    /// The usual radius in pixels.
+    pub const fn radius(self) -> f64 {
+        match self {
+            FilterKind::Box => 0.5,
+            FilterKind::Triangle => 1.0,
+            FilterKind::Gaussian | FilterKind::BlackmanHarris => 1.5,
+            FilterKind::Mitchell => 2.0,
+        }
     }
 }
 

@@ -85,6 +85,8 @@ pub struct Render {
     pub pixel_samples: Samples,
     /// Samples of every area light, at every hit.
     pub light_samples: Samples,
+    /// What a pixel's samples are weighted by.
+    pub filter: Filter,
 }
 
 /// What light is simulated.
@@ -103,6 +105,16 @@ pub struct Samples {
     pub pattern: Pattern,
     /// How many, 1 to 65,536; a square for patterns of n x n cells.
     pub count: u32,
+}
+
+/// A reconstruction filter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Filter {
+    /// Its form.
+    pub kind: FilterKind,
+    /// How far it reaches along x and y, in pixels, 0.01 to 16.
+    pub radius: f64,
 }
 
 /// A surface's appearance.

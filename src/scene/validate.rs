@@ -9,10 +9,10 @@ use glam::DVec3;
 use super::error::{At, Problem};
 use super::parse::list;
 use super::{
-    Camera, CameraDescription, Description, EllipsoidDescription, Geometry, Light,
-    LightDescription, Material, MaterialDescription, Parallelogram, Pattern, PhongDescription,
-    Projection, Render, RenderDescription, Samples, SamplesDescription, Scene, Shape,
-    ShapeDescription,
+    Camera, CameraDescription, Description, EllipsoidDescription, Filter, FilterDescription,
+    Geometry, Light, LightDescription, Material, MaterialDescription, Parallelogram, Pattern,
+    PhongDescription, Projection, Render, RenderDescription, Samples, SamplesDescription, Scene,
+    Shape, ShapeDescription,
 };
 
 /// Largest absolute coordinate.
@@ -97,7 +97,14 @@ fn render(description: &RenderDescription) -> Checked<Render> {
         seed: description.seed,
         pixel_samples: samples(&description.pixel_samples).at("pixel_samples")?,
         light_samples: samples(&description.light_samples).at("light_samples")?,
+        filter: filter(&description.filter).at("filter")?,
     })
+}
+
+fn filter(description: &FilterDescription) -> Checked<Filter> {
+    let FilterDescription { kind, radius } = *description;
+    let radius = between(radius.unwrap_or(kind.radius()), 0.01, 16.0).at("radius")?;
+    Ok(Filter { kind, radius })
 }
 
 fn camera(description: &CameraDescription) -> Checked<Camera> {
