@@ -47,7 +47,9 @@ fn reflected(material: Material, light: Light, lobes: Lobes, weight: f32) -> vec
 
 // One sample of a pixel: its radiance times its weight, and its weight.
 fn pixel_radiance(pixel: vec2u, sample: u32) -> vec4f {
-    let u = sample_square(PIXEL_PATTERN, PIXEL_SIDE, sample, 0u, sample_key(pixel, camera.seed, 0u));
+    let round = sample / PIXEL_SAMPLES;
+    let index = sample % PIXEL_SAMPLES;
+    let u = sample_square(PIXEL_PATTERN, PIXEL_SIDE, index, round, sample_key(pixel, camera.seed, 0u));
     let at = filtered(u);
     return vec4f(radiance(camera_ray(camera, vec2f(pixel) + at.xy), pixel, sample) * at.z, at.z);
 }
@@ -62,6 +64,28 @@ fn filtered(u: vec2f) -> vec3f {
     let x = filter_offset(u.x, i, FILTER_BINS, filter_table[i].x, filter_table[i + 1u].x);
     let y = filter_offset(u.y, j, FILTER_BINS, filter_table[j].x, filter_table[j + 1u].x);
     return vec3f(0.5 + x, 0.5 + y, filter_table[i].y * filter_table[j].y);
+}
+
+// The moments of a pixel before its first sample: the spread of the radiances at its four corners. An edge that cuts off
+// a part of the pixel so small that no sample of the first round lies in it has a corner behind it.
+fn pixel_corners(pixel: vec2u) -> vec4f {
+    var sum = vec4f(0.0);
+    var moments = vec4f(0.0);
+    for (var i = 0u; i < 4u; i++) {
+        let corner = pixel + vec2u(i & 1u, i >> 1u);
+        let value = vec4f(radiance(camera_ray(camera, vec2f(corner)), pixel, NOTHING - i), 1.0);
+        moments = moments_with(moments, sum, value);
+        sum += value;
+    }
+    return vec4f(moments.rgb, 0.0);
+}
+
+// Whether a pixel, before its sample of this number, needs no more: it has stopped before, or it does so now, at the end
+// of a round.
+fn is_done(sum: vec4f, moments: vec4f, sample: u32) -> bool {
+    let stopped = moments.w != f32(sample);
+    let round_ends = (sample % PIXEL_SAMPLES == 0u) & (sample > 0u);
+    return stopped | (round_ends & (display_variance(sum, moments) <= bitcast<f32>(SQUARED_ERROR)));
 }
 
 // What the ray through a pixel's centre meets.

@@ -50,15 +50,35 @@ pub struct Film {
     pub region: Region,
     /// Row by row from the top: in rgb the sum of the samples' radiances, in a the sum of their weights.
     pub sums: Vec<Vec4>,
+    /// Under adaptive sampling the moments of the same pixels, else nothing: in rgb the sum of the samples' squared
+    /// deviations from their mean, in a the number of samples.
+    pub moments: Vec<Vec4>,
 }
 
 impl Film {
-    /// A film without any sample.
-    pub fn new(region: Region) -> Film {
+    /// A film without any sample, with moments if sampling is adaptive.
+    pub fn new(region: Region, adaptive: bool) -> Film {
+        let none = vec![Vec4::zeroed(); region.pixels() as usize];
         Film {
             region,
-            sums: vec![Vec4::zeroed(); region.pixels() as usize],
+            moments: if adaptive { none.clone() } else { Vec::new() },
+            sums: none,
         }
+    }
+
+    /// How many samples each pixel has, under adaptive sampling.
+    pub fn sample_counts(&self) -> impl Iterator<Item = u32> {
+        self.moments.iter().map(|moments| moments.w as u32)
+    }
+
+    /// The variance of each pixel's mean in red, green and blue, under adaptive sampling, estimated as for independent
+    /// samples: an upper bound for patterns that are more even. It is what sampling has stopped by, and so counts the
+    /// spread of the radiances at the pixel's corners among the deviations.
+    pub fn variances(&self) -> impl Iterator<Item = [f32; 3]> {
+        self.sums.iter().zip(&self.moments).map(|(sum, moments)| {
+            let scale = moments.w / ((moments.w - 1.0) * sum.w * sum.w);
+            [moments.x, moments.y, moments.z].map(|deviations| deviations * scale)
+        })
     }
 
     /// The means of all pixels: linear RGB, row by row from the top.

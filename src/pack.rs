@@ -223,6 +223,8 @@ specialization! {
     pixel_pattern = "PIXEL_PATTERN",
     /// Side of their grid of cells; how many there are in patterns without cells.
     pixel_side = "PIXEL_SIDE",
+    /// How many there are; under adaptive sampling in every round.
+    pixel_samples = "PIXEL_SAMPLES",
     /// How the samples of an area light are laid out.
     light_pattern = "LIGHT_PATTERN",
     /// Side of their grid of cells; how many there are in patterns without cells.
@@ -231,6 +233,8 @@ specialization! {
     light_samples = "LIGHT_SAMPLES",
     /// Bins of the filter's table; 0 if it is the box of the pixel.
     filter_bins = "FILTER_BINS",
+    /// The bits, as an f32, of the square of the error that adaptive sampling aims at.
+    squared_error = "SQUARED_ERROR",
     /// Bits of the largest shininess if all are whole numbers, else 0.
     exponent_bits = "EXPONENT_BITS",
 }
@@ -250,8 +254,10 @@ pub struct Packed {
     pub lights: Vec<Light>,
     /// The filter's bins ([`filter::table`]); none if it is the box of the pixel.
     pub filter_table: Vec<Vec2>,
-    /// Samples of every pixel.
+    /// Samples of every pixel; under adaptive sampling the most that one gets.
     pub pixel_samples: u32,
+    /// Whether sampling is adaptive.
+    pub adaptive: bool,
     /// The constants.
     pub specialization: Specialization,
 }
@@ -300,6 +306,7 @@ pub fn pack(scene: &Scene) -> Packed {
     };
     let area_lights = lights.iter().filter(|light| light.area > 0.0).count() as u32;
     let (pixels, light_samples) = (scene.render.pixel_samples, scene.render.light_samples);
+    let adaptive = scene.render.adaptive;
     let filter_table = match is_pixel(scene.render.filter) {
         true => Vec::new(),
         false => filter::table(scene.render.filter),
@@ -316,10 +323,14 @@ pub fn pack(scene: &Scene) -> Packed {
         delta_lights: lights.len() as u32 - area_lights,
         pixel_pattern: pattern(pixels),
         pixel_side: side(pixels),
+        pixel_samples: pixels.count,
         light_pattern: pattern(light_samples),
         light_side: side(light_samples),
         light_samples: light_samples.count,
         filter_bins: (filter_table.len() as u32).saturating_sub(1),
+        squared_error: adaptive
+            .map_or(0.0, |adaptive| (adaptive.error * adaptive.error) as f32)
+            .to_bits(),
         exponent_bits,
     };
     Packed {
@@ -334,7 +345,8 @@ pub fn pack(scene: &Scene) -> Packed {
         materials,
         lights,
         filter_table,
-        pixel_samples: pixels.count,
+        pixel_samples: adaptive.map_or(pixels.count, |adaptive| adaptive.max_samples),
+        adaptive: adaptive.is_some(),
         specialization,
     }
 }

@@ -3,6 +3,7 @@
 use bytemuck::Zeroable;
 use glam::{UVec2, Vec2, Vec3, Vec4};
 
+use super::adaptive::{display_variance, moments_with};
 use super::camera::camera_ray;
 use super::filter::{filter_bin, filter_offset};
 use super::light::segments_to_light;
@@ -90,7 +91,8 @@ pub fn reflected(material: &Material, light: &Light, lobes: Lobes, weight: f32) 
 pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> Vec4 {
     let s = &scene.specialization;
     let key = sample_key(pixel, scene.camera.seed, 0);
-    let u = sample_square(s.pixel_pattern, s.pixel_side, sample, 0, key);
+    let (round, index) = (sample / s.pixel_samples, sample % s.pixel_samples);
+    let u = sample_square(s.pixel_pattern, s.pixel_side, index, round, key);
     let at = filtered(scene, u);
     let ray = camera_ray(&scene.camera, pixel.as_vec2() + at.truncate());
     (radiance(scene, ray, pixel, sample) * at.z).extend(at.z)
@@ -107,6 +109,26 @@ pub fn filtered(scene: &Packed, u: Vec2) -> Vec3 {
     let x = filter_offset(u.x, i, bins, x0.x, x1.x);
     let y = filter_offset(u.y, j, bins, y0.x, y1.x);
     Vec3::new(0.5 + x, 0.5 + y, x0.y * y0.y)
+}
+
+pub fn pixel_corners(scene: &Packed, pixel: UVec2) -> Vec4 {
+    let mut sum = Vec4::ZERO;
+    let mut moments = Vec4::ZERO;
+    for i in 0..4 {
+        let corner = pixel + UVec2::new(i & 1, i >> 1);
+        let ray = camera_ray(&scene.camera, corner.as_vec2());
+        let value = radiance(scene, ray, pixel, NOTHING - i).extend(1.0);
+        moments = moments_with(moments, sum, value);
+        sum += value;
+    }
+    moments.truncate().extend(0.0)
+}
+
+pub fn is_done(scene: &Packed, sum: Vec4, moments: Vec4, sample: u32) -> bool {
+    let s = &scene.specialization;
+    let stopped = moments.w != sample as f32;
+    let round_ends = (sample % s.pixel_samples == 0) & (sample > 0);
+    stopped | (round_ends & (display_variance(sum, moments) <= f32::from_bits(s.squared_error)))
 }
 
 pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {

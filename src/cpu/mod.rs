@@ -4,6 +4,7 @@
 //! What a function does is said in its WGSL file.
 #![allow(missing_docs, reason = "documented in the WGSL files")]
 
+pub mod adaptive;
 pub mod camera;
 pub mod ellipsoid;
 pub mod filter;

@@ -10,12 +10,14 @@ macro_rules! files {
 
 /// Every file of `shaders/`, as it was when the program was built.
 pub const BUILT_IN: &[(&str, &str)] = files![
+    "adaptive.wgsl",
     "bindings.wgsl",
     "camera.wgsl",
     "constants.wgsl",
     "ellipsoid.wgsl",
     "filter.wgsl",
     "integrator.wgsl",
+    "kernels/adaptive.wgsl",
     "kernels/aov.wgsl",
     "kernels/render.wgsl",
     "layout.wgsl",
@@ -55,6 +57,7 @@ pub const SHARED: &[&str] = &[
     "light.wgsl",
     "shadow.wgsl",
     "phong.wgsl",
+    "adaptive.wgsl",
 ];
 
 /// What every kernel adds to [`SHARED`]: its constants, its buffers and the way through the scene.
@@ -67,6 +70,8 @@ const FROM_BUFFERS: &[&str] = &["scene.wgsl", "traverse.wgsl"];
 pub enum Kernel {
     /// Accumulates samples in the film.
     Render,
+    /// The same, as long as a pixel needs them.
+    Adaptive,
     /// Writes what the first hit of each pixel's centre is like.
     Aov,
 }
@@ -76,6 +81,7 @@ impl Kernel {
     pub fn entry_point(self) -> &'static str {
         match self {
             Kernel::Render => "render",
+            Kernel::Adaptive => "adaptive",
             Kernel::Aov => "aov",
         }
     }
@@ -83,6 +89,7 @@ impl Kernel {
     fn file(self) -> &'static str {
         match self {
             Kernel::Render => "kernels/render.wgsl",
+            Kernel::Adaptive => "kernels/adaptive.wgsl",
             Kernel::Aov => "kernels/aov.wgsl",
         }
     }

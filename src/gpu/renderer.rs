@@ -42,6 +42,7 @@ pub struct Gpu {
     scene: [wgpu::Buffer; 6],
     work: wgpu::Buffer,
     film: Option<Target>,
+    adaptive: bool,
 }
 
 /// What it takes to compile another kernel for the same scene.
@@ -77,7 +78,10 @@ impl Gpu {
             layout: bind_group_layout(device),
             exact: options.exact,
         };
-        let render = kernels.compile(device, Kernel::Render)?;
+        let render = match packed.adaptive {
+            true => kernels.compile(device, Kernel::Adaptive)?,
+            false => kernels.compile(device, Kernel::Render)?,
+        };
         let scene = device.checked(|| {
             [
                 device.upload(BufferUsages::UNIFORM, &[packed.camera]),
@@ -99,6 +103,7 @@ impl Gpu {
             scene,
             work,
             film: None,
+            adaptive: packed.adaptive,
         };
         let nothing = Region {
             x0: 0,
@@ -188,7 +193,10 @@ impl Gpu {
 impl Backend for Gpu {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
         self.film = None; // before the next one: the two together may not fit
-        self.film = Some(self.target::<Vec4>(region)?);
+        self.film = Some(match self.adaptive {
+            true => self.target::<[Vec4; 2]>(region)?,
+            false => self.target::<Vec4>(region)?,
+        });
         Ok(())
     }
 
@@ -201,11 +209,14 @@ impl Backend for Gpu {
 
     fn film(&mut self) -> Result<Film, RenderError> {
         let Some(film) = &self.film else {
-            return Ok(Film::new(Region::whole(0, 0)));
+            return Ok(Film::new(Region::whole(0, 0), self.adaptive));
         };
+        let mut sums: Vec<Vec4> = self.device.download(&film.buffer)?;
+        let moments = sums.split_off(film.region.pixels() as usize);
         Ok(Film {
             region: film.region,
-            sums: self.device.download(&film.buffer)?,
+            sums,
+            moments,
         })
     }
 
@@ -214,6 +225,10 @@ impl Backend for Gpu {
         let target = self.target::<FirstHit>(region)?;
         self.dispatch(&pipeline, &target, region, 0..0)?;
         self.device.download(&target.buffer)
+    }
+
+    fn samples_of_all(&self) -> u32 {
+        self.kernels.constants.pixel_samples
     }
 
     fn largest_film(&self) -> u64 {

@@ -56,6 +56,9 @@ pub struct RenderDescription {
     pub light_samples: SamplesDescription,
     /// What a pixel's samples are weighted by.
     pub filter: FilterDescription,
+    /// Further samples where they are needed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adaptive: Option<AdaptiveDescription>,
 }
 
 impl Default for RenderDescription {
@@ -76,6 +79,7 @@ impl Default for RenderDescription {
                 kind: FilterKind::Box,
                 radius: None,
             },
+            adaptive: None,
         }
     }
 }
@@ -119,6 +123,22 @@ impl Pattern {
             Pattern::Grid | Pattern::RotatedGrid | Pattern::Jittered
         )
     }
+
+    /// Whether the pattern has further positions when all of a set are used, so that sampling can be adaptive.
+    pub const fn goes_on(self) -> bool {
+        !matches!(self, Pattern::Grid | Pattern::RotatedGrid)
+    }
+}
+
+/// Adaptive sampling.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct AdaptiveDescription {
+    /// The standard error of a pixel's displayed value that is aimed at.
+    pub error: f64,
+    /// The most samples of a pixel; absent, 16 times their count.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_samples: Option<u32>,
 }
 
 /// A reconstruction filter.

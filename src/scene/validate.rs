@@ -9,10 +9,10 @@ use glam::DVec3;
 use super::error::{At, Problem};
 use super::parse::list;
 use super::{
-    Camera, CameraDescription, Description, EllipsoidDescription, Filter, FilterDescription,
-    Geometry, Light, LightDescription, Material, MaterialDescription, Parallelogram, Pattern,
-    PhongDescription, Projection, Render, RenderDescription, Samples, SamplesDescription, Scene,
-    Shape, ShapeDescription,
+    Adaptive, AdaptiveDescription, Camera, CameraDescription, Description, EllipsoidDescription,
+    Filter, FilterDescription, Geometry, Light, LightDescription, Material, MaterialDescription,
+    Parallelogram, Pattern, PhongDescription, Projection, Render, RenderDescription, Samples,
+    SamplesDescription, Scene, Shape, ShapeDescription,
 };
 
 /// Largest absolute coordinate.
@@ -98,6 +98,32 @@ fn render(description: &RenderDescription) -> Checked<Render> {
         pixel_samples: samples(&description.pixel_samples).at("pixel_samples")?,
         light_samples: samples(&description.light_samples).at("light_samples")?,
         filter: filter(&description.filter).at("filter")?,
+        adaptive: (description.adaptive.as_ref())
+            .map(|adaptive| self::adaptive(adaptive, &description.pixel_samples).at("adaptive"))
+            .transpose()?,
+    })
+}
+
+/// Adaptive sampling, of pixels with these samples.
+pub(super) fn adaptive(
+    description: &AdaptiveDescription,
+    pixel_samples: &SamplesDescription,
+) -> Checked<Adaptive> {
+    let SamplesDescription { pattern, count } = *pixel_samples;
+    check(pattern.goes_on(), || {
+        "the pattern of pixel_samples must not be a grid, which has no further samples".to_owned()
+    })?;
+    let error = between(description.error, 0.0, 1.0).at("error")?;
+    let most = description
+        .max_samples
+        .unwrap_or(count.saturating_mul(16).min(MOST));
+    check((count..=MOST).contains(&most), || {
+        format!("{most} must be from {count}, the count of pixel_samples, to {MOST}")
+    })
+    .at("max_samples")?;
+    Ok(Adaptive {
+        error,
+        max_samples: most,
     })
 }
 
