@@ -31,9 +31,7 @@ pub fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
     let (area_lights, delta_lights) = scene.lights.split_at(s.area_lights as usize);
     for light in area_lights {
         let (pattern, side, count) = (s.light_pattern, s.light_side, s.light_samples);
-        let lobes = lobes_of_light(
-            scene, surface, material, light, pattern, side, count, pixel, sample,
-        );
+        let lobes = lobes_of_light(scene, surface, material, light, pattern, side, count, pixel, sample);
         sum += reflected(material, light, lobes, scene.environment.light_weight);
     }
     for light in delta_lights {
@@ -43,10 +41,7 @@ pub fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
     sum
 }
 
-#[expect(
-    clippy::too_many_arguments,
-    reason = "the twin of a WGSL function has its arguments"
-)]
+#[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
 pub fn lobes_of_light(
     scene: &Packed,
     surface: Surface,

@@ -39,11 +39,7 @@ impl Backend for Cpu<'_> {
 
     fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
         let scene = self.scene;
-        let Film {
-            region,
-            sums,
-            moments,
-        } = &mut self.film;
+        let Film { region, sums, moments } = &mut self.film;
         let sums = runs(*region, sums, tile);
         if scene.adaptive {
             let both = sums.into_par_iter().zip(runs(*region, moments, tile));
@@ -74,9 +70,7 @@ impl Backend for Cpu<'_> {
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
         let rows = (region.y0..region.y1).into_par_iter();
         let pixels = rows.flat_map_iter(|y| (region.x0..region.x1).map(move |x| UVec2::new(x, y)));
-        Ok(pixels
-            .map(|pixel| pixel_first_hit(self.scene, pixel))
-            .collect())
+        Ok(pixels.map(|pixel| pixel_first_hit(self.scene, pixel)).collect())
     }
 
     fn samples_of_all(&self) -> u32 {
@@ -91,9 +85,7 @@ impl Backend for Cpu<'_> {
 /// The records of a tile's pixels, of a film's region, in pieces of a row, each with its first pixel.
 fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut [Vec4])> {
     let rows = records.chunks_mut(region.width() as usize).enumerate();
-    let rows = rows
-        .skip((tile.y0 - region.y0) as usize)
-        .take(tile.height() as usize);
+    let rows = rows.skip((tile.y0 - region.y0) as usize).take(tile.height() as usize);
     let columns = (tile.x0 - region.x0) as usize..(tile.x1 - region.x0) as usize;
     rows.flat_map(|(y, row)| {
         let runs = row[columns.clone()].chunks_mut(RUN).enumerate();

@@ -20,14 +20,7 @@ pub struct Block {
     pub positions: [Vec2; BLOCK as usize],
 }
 
-pub fn sample_block(
-    pattern: u32,
-    side: u32,
-    first: u32,
-    count: u32,
-    group: u32,
-    key: UVec2,
-) -> Block {
+pub fn sample_block(pattern: u32, side: u32, first: u32, count: u32, group: u32, key: UVec2) -> Block {
     let mut block = Block {
         pattern,
         side,
@@ -50,11 +43,7 @@ pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: &Blo
     let mut bits = 0;
     for i in 0..block.count {
         let d = segment(to, block_sample(block, i));
-        bits |= if blocks(kind, o, d, light.reach) {
-            1 << i
-        } else {
-            0
-        };
+        bits |= if blocks(kind, o, d, light.reach) { 1 << i } else { 0 };
     }
     bits
 }

@@ -117,8 +117,5 @@ fn lobes(filter: Filter) -> Vec<Lobe> {
         }
     }
     let zero = 0.5 * (positive + negative);
-    vec![
-        Lobe::new(filter, 0.0, zero),
-        Lobe::new(filter, zero, filter.radius),
-    ]
+    vec![Lobe::new(filter, 0.0, zero), Lobe::new(filter, zero, filter.radius)]
 }
