@@ -52,20 +52,15 @@ impl Default for Cut {
 pub fn bands(region: Region, cut: &Cut, largest_film: u64) -> impl Iterator<Item = Region> + use<> {
     let pixels = cut.band_pixels.min(largest_film);
     let rows = (pixels / u64::from(region.width())).clamp(1, u64::from(region.height())) as u32;
-    (region.y0..region.y1)
-        .step_by(rows as usize)
-        .map(move |y0| Region {
-            y0,
-            y1: region.y1.min(y0 + rows),
-            ..region
-        })
+    (region.y0..region.y1).step_by(rows as usize).map(move |y0| Region {
+        y0,
+        y1: region.y1.min(y0 + rows),
+        ..region
+    })
 }
 
 /// What the rays through the centres of a region's pixels meet first, row by row from the top; in calls of bounded size.
-pub fn first_hits(
-    backend: &mut dyn Backend,
-    region: Region,
-) -> Result<Vec<FirstHit>, RenderError> {
+pub fn first_hits(backend: &mut dyn Backend, region: Region) -> Result<Vec<FirstHit>, RenderError> {
     const CALL_PIXELS: u64 = 1 << 18;
     let cut = Cut {
         band_pixels: CALL_PIXELS,
@@ -145,8 +140,7 @@ impl Pace {
 
     /// Pixel samples that fit a call.
     fn work(&self) -> f64 {
-        self.speed
-            .map_or(Self::FIRST_CALL, |speed| speed * CALL.as_secs_f64())
+        self.speed.map_or(Self::FIRST_CALL, |speed| speed * CALL.as_secs_f64())
     }
 
     fn samples(&self, band: Region) -> u32 {
