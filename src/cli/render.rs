@@ -195,7 +195,7 @@ impl Plan {
             return Ok(self.cpu());
         };
         let device = match gpu::choose(choice) {
-            Err(RenderError::NoDevice(why)) if *choice == gpu::Choice::Auto => {
+            Err(why) if *choice == gpu::Choice::Auto => {
                 if !self.quiet {
                     eprintln!("warning: rendering on the CPU: {why}");
                 }
