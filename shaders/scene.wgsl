@@ -4,6 +4,11 @@ fn load_primitive(i: u32) -> Primitive {
     return primitives[i];
 }
 
+// A primitive of a kind that is known when compiled, one of those that can cast a shadow.
+fn load_blocker(kind: u32, i: u32) -> Primitive {
+    return primitives[i];
+}
+
 fn load_material(i: u32) -> Material {
     return materials[i];
 }

@@ -18,7 +18,7 @@ fn hidden_by(kind: u32, start: u32, end: u32, cone: Cone, light: Light, block: B
     for (var first = start; first < end; first += 32u) {
         var candidates = shadow_candidates(first, end, cone);
         while candidates != 0u {
-            let q = load_primitive(first + firstTrailingBit(candidates));
+            let q = load_blocker(kind, first + firstTrailingBit(candidates));
             candidates &= candidates - 1u;
             bits |= shadow_bits(kind, q, cone.apex, light, block);
         }

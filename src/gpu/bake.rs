@@ -47,6 +47,25 @@ pub fn bake(packed: &Packed) -> String {
         }
     });
     write_table(&mut out, "load_primitive", "Primitive", &records);
+    write_function(
+        &mut out,
+        "load_blocker(kind: u32, i: u32) -> Primitive",
+        "var r = Primitive();",
+        "r",
+        |body| {
+            for range in blocking(&packed.specialization) {
+                for (k, i) in range.clone().enumerate() {
+                    let kind = packed.primitives[i].kind;
+                    let test = if k == 0 {
+                        String::new()
+                    } else {
+                        format!(" & (i == {i}u)")
+                    };
+                    let _ = writeln!(body, "    if (kind == {kind}u){test} {{ r = {}; }}", records[i]);
+                }
+            }
+        },
+    );
     write_table(
         &mut out,
         "load_material",
