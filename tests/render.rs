@@ -196,10 +196,11 @@ fn first_hits_are_the_same_bits() {
         let hits = |backend: &mut dyn Backend| {
             job::first_hits(backend, whole(&scene)).unwrap_or_else(|error| panic!("{name}: {error}"))
         };
+        let bytes = |hits: &[FirstHit]| bytemuck::cast_slice::<FirstHit, u8>(hits).to_vec();
         let expected = hits(&mut Cpu::new(&scene));
         for options in [BAKED, BUFFERS] {
             let found = hits(&mut gpu(&scene, options));
-            let same = bytemuck::cast_slice::<FirstHit, u8>(&found) == bytemuck::cast_slice(&expected);
+            let same = bytes(&found) == bytes(&expected);
             assert!(same, "{name}, {options:?}");
         }
         assert!(expected.iter().any(|hit| hit.depth > 0.0), "{name}: nothing is seen");

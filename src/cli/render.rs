@@ -25,6 +25,7 @@ use super::stats::Stats;
 
 /// The arguments as they are written.
 #[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)] // so that a number out of range is told as such
 pub struct Args {
     /// Scene file; docs/scene-format.md says what is in it
     scene: PathBuf,
