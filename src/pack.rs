@@ -463,7 +463,7 @@ fn parallelogram(kind: u32, p: &Parallelogram, material: u32, shape: u32) -> Pri
 }
 
 /// The primitive whose local space is mapped to the world by `columns` and then `center`.
-fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
+pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
     let rows = columns.inverse().transpose();
     Primitive {
         center: center.as_vec3(),
