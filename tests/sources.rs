@@ -175,7 +175,7 @@ fn rust_type(ty: &Type) -> String {
             };
             if vector { format!("vec{}<{scalar}>", &name[name.len() - 1..]) } else { name }
         }
-        other => panic!("no twin has an argument of type {other:?}"),
+        other => format!("{other:?}"), // like nothing in WGSL
     }
 }
 

@@ -33,11 +33,18 @@ impl Checked {
         kernel: Kernel,
         constants: &Specialization,
     ) -> Result<Vec<u32>, ShaderError> {
+        self.exact_entry(kernel.entry_point(), &constants.constants())
+    }
+
+    /// The same for any compute entry point, with the values of its overrides.
+    pub fn exact_entry(
+        &self,
+        entry: &str,
+        constants: &[(&str, u32)],
+    ) -> Result<Vec<u32>, ShaderError> {
         let constants = constants
-            .constants()
-            .into_iter()
-            .map(|(name, value)| (name.to_string(), f64::from(value)));
-        let entry = kernel.entry_point();
+            .iter()
+            .map(|(name, value)| (name.to_string(), f64::from(*value)));
         let (module, info): (Cow<'_, _>, Cow<'_, _>) = process_overrides(
             &self.module,
             &self.info,

@@ -8,6 +8,7 @@ mod pipeline;
 mod renderer;
 pub mod spirv;
 
+pub use bake::bake;
 pub use compile::{Checked, check};
 pub use device::{Choice, Device, Info, adapters, choose};
 pub use renderer::{Gpu, Options};
