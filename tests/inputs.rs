@@ -7,9 +7,9 @@ use naga::{Handle, Module, ScalarKind, Type};
 use wgray::cpu::light::Segments;
 use wgray::cpu::phong::Lobes;
 use wgray::cpu::ray::{Hit, Ray};
-use wgray::cpu::shadow::Block;
+use wgray::cpu::shadow::{Block, cone_to_light};
 use wgray::cpu::surface::Surface;
-use wgray::pack::{Camera, FAR, Light, Material, NOTHING, Primitive};
+use wgray::pack::{Camera, FAR, Light, Material, NOTHING, Primitive, Sphere};
 
 use crate::kernel::{Function, scalars};
 use crate::random::Random;
@@ -153,6 +153,8 @@ impl Situation {
                 Segments { towards, u: self.light.u, v: self.light.v }.write(words);
             }
             "Block" => block(random).write(words),
+            "Sphere" => self.sphere(random).write(words),
+            "Cone" => cone_to_light(&self.light, self.start.as_vec3()).write(words),
             "Material" => material(random).write(words),
             "Camera" => self.camera(random).write(words),
             "Lobes" => Lobes { diffuse: random.unit() as f32, specular: random.unit() as f32 }.write(words),
@@ -187,6 +189,13 @@ impl Situation {
         let position = self.start.as_vec3();
         let wo = if random.once_in(4) { normal } else { vector(random).normalize().as_vec3() };
         Surface { position, normal, wo, start: position + normal * 1e-5 }
+    }
+
+    /// About the way to the light, or off it.
+    fn sphere(&self, random: &Random) -> Sphere {
+        let away = self.direction.length() * random.pick(&[0.0, 0.1, 0.5, 2.0]);
+        let center = self.start + self.direction * random.between(-0.5, 1.5) + vector(random) * away;
+        Sphere { center: center.as_vec3(), radius: (away * random.pick(&[0.5, 1.0, 0.1, 1e18])) as f32 }
     }
 
     fn camera(&self, random: &Random) -> Camera {

@@ -12,11 +12,11 @@ use wgray::cpu::ray::{Hit, Ray, closer, crosses_plane, plane_distance, point_to_
 use wgray::cpu::rectangle::{intersect_rectangle, rectangle_blocks};
 use wgray::cpu::rng::{hash4, unit_float};
 use wgray::cpu::sampling::{grid_sample, random_sample, sample_key, sample_square};
-use wgray::cpu::shadow::{Block, block_sample, blocks, shadow_bits};
+use wgray::cpu::shadow::{Block, Cone, block_sample, blocks, cone_to_light, may_block, shadow_bits};
 use wgray::cpu::surface::{Surface, first_hit, primitive_normal, primitive_uv, surface_at};
 use wgray::cpu::triangle::{intersect_triangle, triangle_blocks};
 use wgray::gpu::Device;
-use wgray::pack::{Camera, FirstHit, Light, Material, Primitive};
+use wgray::pack::{Camera, FirstHit, Light, Material, Primitive, Sphere};
 
 use crate::adapter::{self, allowed, judge};
 use crate::inputs::inputs;
@@ -93,6 +93,8 @@ probes! {
     shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: Block) -> u32;
     block_sample(block: Block, i: u32) -> Vec2;
     blocks(kind: u32, o: Vec3, d: Vec3, reach: f32) -> bool;
+    cone_to_light(light: &Light, p: Vec3) -> Cone;
+    may_block(sphere: &Sphere, cone: &Cone) -> bool;
     phong_lobes(surface: Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes;
     phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32;
     phong_block(surface: Surface, material: &Material, to: Segments, block: Block, hidden: u32, exponent_bits: u32,

@@ -4,9 +4,9 @@ use glam::{IVec2, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 use wgray::cpu::light::Segments;
 use wgray::cpu::phong::Lobes;
 use wgray::cpu::ray::{Hit, Ray};
-use wgray::cpu::shadow::Block;
+use wgray::cpu::shadow::{Block, Cone};
 use wgray::cpu::surface::Surface;
-use wgray::pack::{Camera, Environment, FirstHit, Light, Material, Primitive};
+use wgray::pack::{Camera, Environment, FirstHit, Light, Material, Primitive, Sphere};
 
 pub trait Words: Sized {
     /// Takes its words from the front.
@@ -54,7 +54,7 @@ macro_rules! pod {
     )*};
 }
 pod![Vec2, Vec3, Vec4, UVec2, UVec3, UVec4, IVec2];
-pod![Camera, Environment, Primitive, Material, Light, FirstHit];
+pod![Camera, Environment, Primitive, Material, Light, FirstHit, Sphere];
 
 /// Records of `src/cpu/`; a field that is missing here does not compile.
 macro_rules! records {
@@ -78,6 +78,7 @@ records! {
     Segments { towards, u, v }
     Lobes { diffuse, specular }
     Block { pattern, side, first, count, group, key }
+    Cone { apex, to, length2, inverse_depth }
 }
 
 /// Something that a twin takes as an argument, by value or by reference.
@@ -103,4 +104,4 @@ macro_rules! by_reference {
         }
     )*};
 }
-by_reference![Camera, Environment, Primitive, Material, Light];
+by_reference![Camera, Environment, Primitive, Material, Light, Sphere, Cone];

@@ -39,7 +39,7 @@ pub struct Gpu {
     device: Device,
     kernels: Kernels,
     render: wgpu::ComputePipeline,
-    scene: [wgpu::Buffer; 5],
+    scene: [wgpu::Buffer; 6],
     work: wgpu::Buffer,
     film: Option<Target>,
 }
@@ -63,16 +63,10 @@ struct Target {
 impl Gpu {
     /// Compiles the kernel for a scene and uploads it. The device has run the kernel once, on nothing, when this
     /// returns: drivers compile at the first dispatch.
-    pub fn new(
-        device: &Device,
-        packed: &Packed,
-        shaders: &Shaders,
-        options: Options,
-    ) -> Result<Gpu, RenderError> {
+    pub fn new(device: &Device, packed: &Packed, shaders: &Shaders, options: Options) -> Result<Gpu, RenderError> {
         let kernels = Kernels {
             shaders: shaders.clone(),
-            baked: (options.baked && packed.primitives.len() <= MOST_PRIMITIVES)
-                .then(|| bake(packed)),
+            baked: (options.baked && packed.primitives.len() <= MOST_PRIMITIVES).then(|| bake(packed)),
             constants: packed.specialization,
             layout: bind_group_layout(device),
             exact: options.exact,
@@ -83,14 +77,12 @@ impl Gpu {
                 device.upload(BufferUsages::UNIFORM, &[packed.camera]),
                 device.upload(BufferUsages::UNIFORM, &[packed.environment]),
                 device.upload(BufferUsages::STORAGE, &packed.primitives),
+                device.upload(BufferUsages::STORAGE, &packed.bounds),
                 device.upload(BufferUsages::STORAGE, &packed.materials),
                 device.upload(BufferUsages::STORAGE, &packed.lights),
             ]
         })?;
-        let work = device.buffer(
-            size_of::<Work>() as u64,
-            BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-        );
+        let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         let mut gpu = Gpu {
             device: device.clone(),
             kernels,
@@ -113,15 +105,14 @@ impl Gpu {
     fn target<T: Pod>(&self, region: Region) -> Result<Target, RenderError> {
         let size = region.pixels() * size_of::<T>() as u64;
         self.device.checked(|| {
-            let buffer = self
-                .device
-                .buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-            let [camera, environment, primitives, materials, lights] = &self.scene;
+            let buffer = self.device.buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+            let [camera, environment, primitives, bounds, materials, lights] = &self.scene;
             let buffers = [
                 &self.work,
                 camera,
                 environment,
                 primitives,
+                bounds,
                 materials,
                 lights,
                 &buffer,
@@ -133,19 +124,12 @@ impl Gpu {
                     resource: buffer.as_entire_binding(),
                 })
                 .collect();
-            let group = self
-                .device
-                .device
-                .create_bind_group(&wgpu::BindGroupDescriptor {
-                    label: None,
-                    layout: &self.kernels.layout,
-                    entries: &entries,
-                });
-            Target {
-                region,
-                buffer,
-                group,
-            }
+            let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &self.kernels.layout,
+                entries: &entries,
+            });
+            Target { region, buffer, group }
         })
     }
 
@@ -171,11 +155,7 @@ impl Gpu {
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &target.group, &[]);
-            pass.dispatch_workgroups(
-                tile.width().div_ceil(WORKGROUP),
-                tile.height().div_ceil(WORKGROUP),
-                1,
-            );
+            pass.dispatch_workgroups(tile.width().div_ceil(WORKGROUP), tile.height().div_ceil(WORKGROUP), 1);
             drop(pass);
             queue.submit([encoder.finish()]);
         })?;
@@ -221,19 +201,8 @@ impl Backend for Gpu {
 }
 
 impl Kernels {
-    fn compile(
-        &self,
-        device: &Device,
-        kernel: Kernel,
-    ) -> Result<wgpu::ComputePipeline, RenderError> {
+    fn compile(&self, device: &Device, kernel: Kernel) -> Result<wgpu::ComputePipeline, RenderError> {
         let source = self.shaders.compose(kernel, self.baked.as_deref());
-        pipeline(
-            device,
-            &self.layout,
-            kernel,
-            &source,
-            &self.constants,
-            self.exact,
-        )
+        pipeline(device, &self.layout, kernel, &source, &self.constants, self.exact)
     }
 }
