@@ -127,8 +127,9 @@ mod opcode {
     pub const EXTENDED: u16 = 12;
     pub const DECORATE: u16 = 71;
     pub const NO_CONTRACTION: u32 = 42;
-    /// Of GLSL.std.450: absolute value of a float and of an integer, square root, integer minimum, maximum and clamp.
-    pub const EXTENDED_ALLOWED: &[u32] = &[4, 5, 31, 38, 39, 41, 42, 44, 45];
+    /// Of GLSL.std.450: absolute value of a float and of an integer, square root, integer minimum,
+    /// maximum and clamp, the place of the first bit.
+    pub const EXTENDED_ALLOWED: &[u32] = &[4, 5, 31, 38, 39, 41, 42, 44, 45, 73, 74, 75];
     /// Of GLSL.std.450: naga clamps a float with it before it makes an integer of it, which is exact but for NaN.
     pub const FLOAT_CLAMP: u32 = 43;
     pub const FLOAT_TO_INTEGER: &[u16] = &[109, 110];
