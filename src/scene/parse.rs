@@ -60,9 +60,7 @@ fn locate(text: &str, path: &KeyPath) -> usize {
                 let entry = table.iter().find(|(key, _)| key.get_ref() == name);
                 entry.map(|(key, value)| (key.span(), value))
             }
-            (Segment::Index(index), DeValue::Array(array)) => {
-                array.get(*index).map(|value| (value.span(), value))
-            }
+            (Segment::Index(index), DeValue::Array(array)) => array.get(*index).map(|value| (value.span(), value)),
             _ => None,
         };
         let Some((span, inner)) = step else { break };
@@ -113,9 +111,7 @@ fn read_file(file: Table) -> Result<Description, Problem> {
 
 fn read_list<T: Tagged>(tables: Vec<Table>) -> Result<Vec<T>, Problem> {
     let tables = tables.into_iter().enumerate();
-    tables
-        .map(|(i, table)| read_tagged(table, None).at(i))
-        .collect()
+    tables.map(|(i, table)| read_tagged(table, None).at(i)).collect()
 }
 
 fn read<T: DeserializeOwned>(table: Table) -> Result<T, Problem> {
@@ -195,10 +191,7 @@ fn explain(error: ReadError, table: Table, tagged: bool) -> Problem {
         // The first name is the key's, which is on the path already.
         let names = quoted(message).into_iter().skip(1);
         let tag = (tagged && path.len() == 1).then(|| "type".to_owned());
-        format!(
-            "unknown key; the keys here are {}",
-            list(tag.into_iter().chain(names))
-        )
+        format!("unknown key; the keys here are {}", list(tag.into_iter().chain(names)))
     } else if message.starts_with("missing field") {
         path.extend(quoted(message).into_iter().map(Segment::Key));
         "is missing".to_owned()

@@ -9,10 +9,9 @@ use glam::DVec3;
 use super::error::{At, Problem};
 use super::parse::list;
 use super::{
-    Camera, CameraDescription, Description, EllipsoidDescription, Geometry, Light,
-    LightDescription, Material, MaterialDescription, Parallelogram, Pattern, PhongDescription,
-    Projection, Render, RenderDescription, Samples, SamplesDescription, Scene, Shape,
-    ShapeDescription,
+    Camera, CameraDescription, Description, EllipsoidDescription, Geometry, Light, LightDescription, Material,
+    MaterialDescription, Parallelogram, Pattern, PhongDescription, Projection, Render, RenderDescription, Samples,
+    SamplesDescription, Scene, Shape, ShapeDescription,
 };
 
 /// Largest absolute coordinate.
@@ -56,9 +55,7 @@ impl Description {
 
 fn each<D, T>(descriptions: &[D], check: impl Fn(&D) -> Checked<T>) -> Checked<Vec<T>> {
     let descriptions = descriptions.iter().enumerate();
-    descriptions
-        .map(|(i, description)| check(description).at(i))
-        .collect()
+    descriptions.map(|(i, description)| check(description).at(i)).collect()
 }
 
 /// The number of pixels along a side.
@@ -165,10 +162,7 @@ fn material(description: &MaterialDescription) -> Checked<Material> {
 
 fn factor(phong: &PhongDescription, own: Option<DVec3>, key: &str) -> Checked<DVec3> {
     let missing = || Problem::new("is missing, and there is no color to stand in for it");
-    own.or(phong.color)
-        .ok_or_else(missing)
-        .and_then(color)
-        .at(key)
+    own.or(phong.color).ok_or_else(missing).and_then(color).at(key)
 }
 
 fn light(description: &LightDescription) -> Checked<Light> {
@@ -201,12 +195,8 @@ fn shape(description: &ShapeDescription, materials: &BTreeMap<&str, usize>) -> C
             let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * radius);
             (Geometry::Ellipsoid { center, axes }, &shape.material)
         }
-        ShapeDescription::Triangle(shape) => {
-            (triangle(shape.vertices).at("vertices")?, &shape.material)
-        }
-        ShapeDescription::Tetrahedron(shape) => {
-            (tetrahedron(shape.vertices).at("vertices")?, &shape.material)
-        }
+        ShapeDescription::Triangle(shape) => (triangle(shape.vertices).at("vertices")?, &shape.material),
+        ShapeDescription::Tetrahedron(shape) => (tetrahedron(shape.vertices).at("vertices")?, &shape.material),
         ShapeDescription::Plane(shape) => {
             let point = point(shape.point).at("point")?;
             let (tangent, bitangent) = frame(shape.normal, shape.tangent)?;
@@ -221,10 +211,7 @@ fn shape(description: &ShapeDescription, materials: &BTreeMap<&str, usize>) -> C
     let unknown = || {
         let message = match materials.is_empty() {
             true => format!("{material:?} is no material; the file has none"),
-            false => format!(
-                "{material:?} is no material; there are {}",
-                list(materials.keys())
-            ),
+            false => format!("{material:?} is no material; there are {}", list(materials.keys())),
         };
         Problem::new(message).at("material")
     };
@@ -232,12 +219,7 @@ fn shape(description: &ShapeDescription, materials: &BTreeMap<&str, usize>) -> C
     Ok(Shape { geometry, material })
 }
 
-fn rectangle(
-    center: DVec3,
-    size: [f64; 2],
-    normal: DVec3,
-    tangent: DVec3,
-) -> Checked<Parallelogram> {
+fn rectangle(center: DVec3, size: [f64; 2], normal: DVec3, tangent: DVec3) -> Checked<Parallelogram> {
     let center = point(center).at("center")?;
     let width = length(size[0]).at("size")?;
     let height = length(size[1]).at("size")?;
@@ -255,11 +237,7 @@ fn ellipsoid(shape: &EllipsoidDescription) -> Checked<Geometry> {
     let y = unit(shape.b).at("b")?;
     let z = unit(shape.c).at("c")?;
     check(x.cross(y).length() > FLATTEST, || {
-        format!(
-            "{} must not be parallel to a, {}",
-            show(shape.b),
-            show(shape.a)
-        )
+        format!("{} must not be parallel to a, {}", show(shape.b), show(shape.a))
     })
     .at("b")?;
     check(x.cross(y).dot(z).abs() > FLATTEST, || {
@@ -306,11 +284,7 @@ fn longest_edge(vertices: &[DVec3]) -> Checked<f64> {
     let from = |a: &DVec3| vertices.iter().map(|b| a.distance(*b)).fold(0.0, f64::max);
     let longest = vertices.iter().map(from).fold(0.0, f64::max);
     check(longest >= LENGTHS.0, || {
-        format!(
-            "{} must be at least {} apart",
-            show_all(vertices),
-            number(LENGTHS.0)
-        )
+        format!("{} must be at least {} apart", show_all(vertices), number(LENGTHS.0))
     })?;
     Ok(longest)
 }
@@ -321,11 +295,7 @@ fn frame(normal: DVec3, tangent: DVec3) -> Checked<(DVec3, DVec3)> {
     let t = unit(tangent).at("tangent")?;
     let t = t - n * n.dot(t);
     check(t.length() > FLATTEST, || {
-        format!(
-            "{} must not be parallel to the normal, {}",
-            show(tangent),
-            show(normal)
-        )
+        format!("{} must not be parallel to the normal, {}", show(tangent), show(normal))
     })
     .at("tangent")?;
     let t = t.normalize();
@@ -373,12 +343,7 @@ fn length(x: f64) -> Checked<f64> {
 
 fn between(x: f64, low: f64, high: f64) -> Checked<f64> {
     check((low..=high).contains(&x), || {
-        format!(
-            "{} must be from {} to {}",
-            number(x),
-            number(low),
-            number(high)
-        )
+        format!("{} must be from {} to {}", number(x), number(low), number(high))
     })?;
     Ok(x)
 }

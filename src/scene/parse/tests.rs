@@ -1,8 +1,7 @@
 //! What is told of bad text, and the page that describes the format.
 
 use super::super::{
-    CameraDescription, LightDescription, MaterialDescription, Overrides, RenderDescription, Scene,
-    ShapeDescription,
+    CameraDescription, LightDescription, MaterialDescription, Overrides, RenderDescription, Scene, ShapeDescription,
 };
 use super::*;
 
@@ -50,36 +49,16 @@ fn bad_text_is_told_with_its_line() {
             1,
             "camera.type: 3 must be one of \"perspective\", \"orthographic\"",
         ),
-        (
-            "focal_length = '1'",
-            1,
-            "camera.focal_length: \"1\" must be a number",
-        ),
+        ("focal_length = '1'", 1, "camera.focal_length: \"1\" must be a number"),
         (
             "focal_length = 'a, expected b'",
             1,
             "camera.focal_length: \"a, expected b\" must be a number",
         ),
-        (
-            "up = [0, 1]",
-            1,
-            "camera.up: [0, 1] must be a list of 3 numbers",
-        ),
-        (
-            "up = [0, 0, 1, 0]",
-            1,
-            "camera.up: [0, 0, 1, 0] must be a shorter list",
-        ),
-        (
-            "up = [0, 0, true]",
-            1,
-            "camera.up[2]: true must be a number",
-        ),
-        (
-            "up = { z = 1 }",
-            1,
-            "camera.up: { z = 1 } must be a list of 3 numbers",
-        ),
+        ("up = [0, 1]", 1, "camera.up: [0, 1] must be a list of 3 numbers"),
+        ("up = [0, 0, 1, 0]", 1, "camera.up: [0, 0, 1, 0] must be a shorter list"),
+        ("up = [0, 0, true]", 1, "camera.up[2]: true must be a number"),
+        ("up = { z = 1 }", 1, "camera.up: { z = 1 } must be a list of 3 numbers"),
         (
             "[render]\nseed = -1",
             2,
@@ -110,11 +89,7 @@ fn bad_text_is_told_with_its_line() {
             3,
             "render.light_samples.n: unknown key; the keys here are \"pattern\", \"count\"",
         ),
-        (
-            "[materials]\nred = 3",
-            2,
-            "materials.red: 3 must be a table",
-        ),
+        ("[materials]\nred = 3", 2, "materials.red: 3 must be a table"),
         (
             "[materials.red]\ncolor = [1, 0, 0]",
             1,
@@ -157,10 +132,7 @@ fn bad_text_is_told_with_its_line() {
         ),
     ] {
         let line = START.lines().count() + line;
-        assert_eq!(
-            message(&format!("{START}{added}")),
-            format!("s.toml:{line}: {told}")
-        );
+        assert_eq!(message(&format!("{START}{added}")), format!("s.toml:{line}: {told}"));
     }
 }
 
@@ -218,11 +190,7 @@ fn a_scene_written_and_read_back_is_the_same() {
             path.display()
         );
         description.validate().unwrap();
-        assert!(
-            text.starts_with("# "),
-            "{} does not say what it shows",
-            path.display()
-        );
+        assert!(text.starts_with("# "), "{} does not say what it shows", path.display());
         count += 1;
     }
     assert!(count >= 4);
@@ -230,13 +198,7 @@ fn a_scene_written_and_read_back_is_the_same() {
 
 #[test]
 fn the_example_of_the_page_is_a_scene() {
-    let example = PAGE
-        .split("```toml\n")
-        .nth(1)
-        .unwrap()
-        .split("```")
-        .next()
-        .unwrap();
+    let example = PAGE.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
     let scene = Scene::parse(example, "scene-format.md", &Overrides::default()).unwrap();
     assert_eq!(scene.shapes.len(), 1);
 }
@@ -313,10 +275,7 @@ fn the_page_has_every_pattern() {
     let names: Vec<_> = names.split('"').skip(1).step_by(2).collect();
     let mut rows = rows("### Samples");
     rows.retain(|name| name.starts_with('"'));
-    let rows: Vec<_> = rows
-        .into_iter()
-        .map(|name| name.trim_matches('"'))
-        .collect();
+    let rows: Vec<_> = rows.into_iter().map(|name| name.trim_matches('"')).collect();
     assert_eq!(rows, names);
 }
 

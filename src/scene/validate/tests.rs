@@ -113,10 +113,7 @@ fn a_good_scene_is_what_its_file_says() {
     };
     let (white, red) = (DVec3::splat(0.7), DVec3::X);
     let dark_red = phong(red * 0.3, red * 0.4, red * 0.5, 16.0);
-    assert_eq!(
-        scene.materials,
-        [dark_red, phong(white, white, DVec3::ONE, 20.0)]
-    );
+    assert_eq!(scene.materials, [dark_red, phong(white, white, DVec3::ONE, 20.0)]);
     let square = |z, u, v| Parallelogram {
         center: DVec3::new(0.0, 0.0, z),
         u,
@@ -169,11 +166,7 @@ fn faces_of_a_tetrahedron_look_outwards_however_it_is_given() {
 
 /// A line of the good scene, a bad one in its place, and what is told of it.
 const BAD: &[(&str, &str, &str)] = &[
-    (
-        "width = 8",
-        "width = 0",
-        "image.width: 0 must be from 1 to 65536",
-    ),
+    ("width = 8", "width = 0", "image.width: 0 must be from 1 to 65536"),
     (
         "height = 4",
         "height = 65537",
@@ -204,21 +197,9 @@ const BAD: &[(&str, &str, &str)] = &[
         "up = [0, 0, 0]\nfov = 90",
         "camera.up: [0, 0, 0] must not be zero: its length must be at least 1e-9",
     ),
-    (
-        "fov = 90",
-        "fov = 0",
-        "camera.fov: 0 must be from 0.001 to 179.999",
-    ),
-    (
-        "fov = 90",
-        "fov = 180",
-        "camera.fov: 180 must be from 0.001 to 179.999",
-    ),
-    (
-        "fov = 90",
-        "fov = nan",
-        "camera.fov: nan must be from 0.001 to 179.999",
-    ),
+    ("fov = 90", "fov = 0", "camera.fov: 0 must be from 0.001 to 179.999"),
+    ("fov = 90", "fov = 180", "camera.fov: 180 must be from 0.001 to 179.999"),
+    ("fov = 90", "fov = nan", "camera.fov: nan must be from 0.001 to 179.999"),
     (
         "focal_length = 2",
         "focal_length = 0",
@@ -414,9 +395,7 @@ fn values_at_the_limits_are_good() {
 
 #[test]
 fn a_factor_without_color_is_missing() {
-    let message = parse(&with("diffuse = [0.4, 0, 0]", ""))
-        .unwrap_err()
-        .to_string();
+    let message = parse(&with("diffuse = [0.4, 0, 0]", "")).unwrap_err().to_string();
     let line = GOOD
         .lines()
         .position(|line| line.starts_with("[materials.\"dark"))
@@ -433,9 +412,7 @@ fn a_factor_without_color_is_missing() {
 fn a_scene_may_be_empty_but_not_name_a_material_that_is_not_there() {
     let empty = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n";
     assert_eq!(parse(empty).unwrap().shapes, []);
-    let text = format!(
-        "{empty}[[shapes]]\ntype = 'sphere'\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'a'\n"
-    );
+    let text = format!("{empty}[[shapes]]\ntype = 'sphere'\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'a'\n");
     let told = "s.toml:7: shapes[0].material: \"a\" is no material; the file has none";
     assert_eq!(parse(&text).unwrap_err().to_string(), told);
 }
@@ -447,21 +424,14 @@ fn the_page_has_the_limits() {
     for limit in [
         format!("each finite and from -{0} to {0}", number(FARTHEST)),
         format!("any length from {} on", number(shortest)),
-        format!(
-            "greater than 0, and from {} to {}",
-            number(shortest),
-            number(longest)
-        ),
+        format!("greater than 0, and from {} to {}", number(shortest), number(longest)),
         format!("each from 0 to {}", number(BRIGHTEST)),
         format!("| `width` | required | 1 to {MOST} |"),
         format!("| `count` | required | 1 to {MOST} |"),
         format!("sine of their angle must be above {}", number(FLATTEST)),
         format!("unit vectors span must be above {}", number(FLATTEST)),
         format!("twice the area must be above {} times", number(FLATTEST)),
-        format!(
-            "six times the volume must be above {} times",
-            number(FLATTEST)
-        ),
+        format!("six times the volume must be above {} times", number(FLATTEST)),
     ] {
         assert!(page.contains(&limit), "{limit}");
     }
