@@ -10,6 +10,12 @@ const PLANE: u32 = 3u;
 
 const PHONG: u32 = 0u;
 const EMITTER: u32 = 1u;
+const MIRROR: u32 = 2u;
+const GLASS: u32 = 3u;
+
+// Glass splits a path at the first so many bounces, and a path so has at most so many ends.
+const SPLITS: u32 = 2u;
+const LEAVES: u32 = 4u;
 
 const GRID: u32 = 0u;
 const RANDOM: u32 = 1u;

@@ -36,10 +36,10 @@ struct Primitive {
 
 struct Material {
     ambient: vec3f,        // EMITTER: its colour
-    kind: u32,             // PHONG or EMITTER
+    kind: u32,             // PHONG, EMITTER, MIRROR or GLASS
     diffuse: vec3f,
-    shininess: f32,
-    specular: vec3f,
+    shininess: f32,        // GLASS: the index of refraction
+    specular: vec3f,       // MIRROR: factor of reflected light; GLASS: of light that passes the surface
     exponent: u32,         // the shininess, where it is a whole number
 }
 

@@ -7,6 +7,7 @@ override BLOCKING_RECTANGLES: u32;
 override TRIANGLES: u32;
 override BLOCKING_TRIANGLES: u32;
 override ELLIPSOIDS: u32;
+override BLOCKING_ELLIPSOIDS: u32;
 override PLANES: u32;
 override BLOCKING_PLANES: u32;
 
@@ -16,9 +17,15 @@ override DELTA_LIGHTS: u32;
 
 override PIXEL_PATTERN: u32;
 override PIXEL_SIDE: u32;
+override PIXEL_SAMPLES: u32;
 override LIGHT_PATTERN: u32;
 override LIGHT_SIDE: u32;
 override LIGHT_SAMPLES: u32;
 
 // Bits of the largest shininess if all are whole numbers, else 0.
 override EXPONENT_BITS: u32;
+
+// Most bounces of a path, 0 where nothing mirrors or refracts.
+override BOUNCES: u32;
+// 1 where rays carry differentials, else 0.
+override DIFFERENTIALS: u32;

@@ -27,7 +27,7 @@ fn hidden_samples(p: vec3f, light: Light, block: Block) -> u32 {
     for (var i = 0u; i < BLOCKING_TRIANGLES; i++) {
         bits |= shadow_bits(TRIANGLE, load_primitive(RECTANGLES + i), p, light, block);
     }
-    for (var i = 0u; i < ELLIPSOIDS; i++) {
+    for (var i = 0u; i < BLOCKING_ELLIPSOIDS; i++) {
         bits |= shadow_bits(ELLIPSOID, load_primitive(RECTANGLES + TRIANGLES + i), p, light, block);
     }
     for (var i = 0u; i < BLOCKING_PLANES; i++) {

@@ -27,6 +27,15 @@ pub const PLANE: u32 = 3;
 pub const PHONG: u32 = 0;
 /// [`Material::kind`]: a light's surface, of one colour.
 pub const EMITTER: u32 = 1;
+/// [`Material::kind`]: a mirror.
+pub const MIRROR: u32 = 2;
+/// [`Material::kind`]: clear glass.
+pub const GLASS: u32 = 3;
+
+/// Glass splits a path at the first so many bounces.
+pub const SPLITS: u32 = 2;
+/// A path so has at most so many ends.
+pub const LEAVES: u32 = 4;
 
 /// [`Pattern::Grid`].
 pub const GRID: u32 = 0;
@@ -107,13 +116,13 @@ pub struct Primitive {
 pub struct Material {
     /// Factor of the ambient light; the colour of an emitter.
     pub ambient: Vec3,
-    /// [`PHONG`] or [`EMITTER`].
+    /// [`PHONG`], [`EMITTER`], [`MIRROR`] or [`GLASS`].
     pub kind: u32,
     /// Factor of the diffuse term.
     pub diffuse: Vec3,
-    /// Exponent of the specular term.
+    /// Exponent of the specular term; the index of refraction of glass.
     pub shininess: f32,
-    /// Factor of the specular term.
+    /// Factor of the specular term; of what a mirror reflects; of what passes the surface of glass.
     pub specular: Vec3,
     /// The exponent, where it is a whole number.
     pub exponent: u32,
@@ -198,8 +207,10 @@ specialization! {
     triangles = "TRIANGLES",
     /// The first of them, which can cast a shadow.
     blocking_triangles = "BLOCKING_TRIANGLES",
-    /// Ellipsoids, which all can cast a shadow.
+    /// Ellipsoids.
     ellipsoids = "ELLIPSOIDS",
+    /// The first of them, which can cast a shadow.
+    blocking_ellipsoids = "BLOCKING_ELLIPSOIDS",
     /// Infinite planes.
     planes = "PLANES",
     /// The first of them, which can cast a shadow.
@@ -212,6 +223,8 @@ specialization! {
     pixel_pattern = "PIXEL_PATTERN",
     /// Side of their grid.
     pixel_side = "PIXEL_SIDE",
+    /// How many samples a pixel has.
+    pixel_samples = "PIXEL_SAMPLES",
     /// How the samples of an area light are laid out.
     light_pattern = "LIGHT_PATTERN",
     /// Side of their grid.
@@ -220,6 +233,10 @@ specialization! {
     light_samples = "LIGHT_SAMPLES",
     /// Bits of the largest shininess if all are whole numbers, else 0.
     exponent_bits = "EXPONENT_BITS",
+    /// Most bounces of a path, 0 where nothing mirrors or refracts.
+    bounces = "BOUNCES",
+    /// 1 where rays carry differentials, else 0.
+    differentials = "DIFFERENTIALS",
 }
 
 /// A scene as both backends read it.
@@ -286,16 +303,24 @@ pub fn pack(scene: &Scene) -> Packed {
         triangles: count(TRIANGLE, false),
         blocking_triangles: count(TRIANGLE, true),
         ellipsoids: count(ELLIPSOID, false),
+        blocking_ellipsoids: count(ELLIPSOID, true),
         planes: count(PLANE, false),
         blocking_planes: count(PLANE, true),
         area_lights,
         delta_lights: lights.len() as u32 - area_lights,
         pixel_pattern: pattern(pixels),
         pixel_side: pixels.count.isqrt(),
+        pixel_samples: pixels.count,
         light_pattern: pattern(light_samples),
         light_side: light_samples.count.isqrt(),
         light_samples: light_samples.count,
         exponent_bits,
+        bounces: if scene.materials.iter().any(is_specular) {
+            scene.render.max_depth
+        } else {
+            0
+        },
+        differentials: 0,
     };
     Packed {
         camera: pack_camera(scene),
@@ -354,14 +379,31 @@ fn pack_material(material: &scene::Material) -> Material {
             specular: specular.as_vec3(),
             exponent: shininess as u32,
         },
+        scene::Material::Mirror { tint } => Material {
+            kind: MIRROR,
+            specular: tint.as_vec3(),
+            ..Material::zeroed()
+        },
+        scene::Material::Glass { ior, tint } => Material {
+            kind: GLASS,
+            shininess: ior as f32,
+            specular: tint.as_vec3(),
+            ..Material::zeroed()
+        },
     }
+}
+
+fn is_specular(material: &scene::Material) -> bool {
+    matches!(material, scene::Material::Mirror { .. } | scene::Material::Glass { .. })
 }
 
 /// Bits of the largest shininess, if all are whole numbers so small that squaring beats the general power.
 fn exponent_bits(described: &[scene::Material], packed: &[Material]) -> u32 {
     let whole = described.iter().all(|material| {
-        let scene::Material::Phong { shininess, .. } = material;
-        shininess.fract() == 0.0 && *shininess <= 4096.0
+        if let scene::Material::Phong { shininess, .. } = material {
+            return shininess.fract() == 0.0 && *shininess <= 4096.0;
+        }
+        true
     });
     let largest = packed.iter().map(|material| material.exponent).max().unwrap_or(1);
     if whole { u32::BITS - largest.leading_zeros() } else { 0 }

@@ -5,10 +5,12 @@
 #![allow(missing_docs, reason = "documented in the WGSL files")]
 
 pub mod camera;
+pub mod differential;
 pub mod ellipsoid;
 pub mod integrator;
 pub mod light;
 pub mod math;
+pub mod path;
 pub mod phong;
 pub mod plane;
 pub mod ray;
@@ -17,6 +19,7 @@ mod renderer;
 pub mod rng;
 pub mod sampling;
 pub mod shadow;
+pub mod specular;
 pub mod surface;
 pub mod traverse;
 pub mod triangle;

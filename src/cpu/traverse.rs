@@ -39,7 +39,7 @@ pub fn hidden_samples(scene: &Packed, p: Vec3, light: &Light, block: Block) -> u
     for q in &kinds.triangles[..s.blocking_triangles as usize] {
         bits |= shadow_bits(TRIANGLE, q, p, light, block);
     }
-    for q in kinds.ellipsoids {
+    for q in &kinds.ellipsoids[..s.blocking_ellipsoids as usize] {
         bits |= shadow_bits(ELLIPSOID, q, p, light, block);
     }
     for q in &kinds.planes[..s.blocking_planes as usize] {

@@ -59,7 +59,7 @@ fn blocking(packed: &Packed) -> impl Iterator<Item = usize> {
     let planes = ellipsoids + s.ellipsoids;
     (0..s.blocking_rectangles)
         .chain(triangles..triangles + s.blocking_triangles)
-        .chain(ellipsoids..planes)
+        .chain(ellipsoids..ellipsoids + s.blocking_ellipsoids)
         .chain(planes..planes + s.blocking_planes)
         .map(|i| i as usize)
 }

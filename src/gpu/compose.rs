@@ -13,6 +13,7 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "bindings.wgsl",
     "camera.wgsl",
     "constants.wgsl",
+    "differential.wgsl",
     "ellipsoid.wgsl",
     "integrator.wgsl",
     "kernels/aov.wgsl",
@@ -20,6 +21,7 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "layout.wgsl",
     "light.wgsl",
     "math.wgsl",
+    "path.wgsl",
     "phong.wgsl",
     "plane.wgsl",
     "ray.wgsl",
@@ -29,6 +31,7 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "scene.wgsl",
     "shadow.wgsl",
     "specialization.wgsl",
+    "specular.wgsl",
     "surface.wgsl",
     "traverse.wgsl",
     "triangle.wgsl",
@@ -51,6 +54,9 @@ pub const SHARED: &[&str] = &[
     "light.wgsl",
     "shadow.wgsl",
     "phong.wgsl",
+    "differential.wgsl",
+    "specular.wgsl",
+    "path.wgsl",
 ];
 
 /// What every kernel adds to [`SHARED`]: its constants, its buffers and the way through the scene.

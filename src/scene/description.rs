@@ -48,6 +48,10 @@ pub struct RenderDescription {
     pub background: DVec3,
     /// Relative offset of shadow rays.
     pub shadow_epsilon: f64,
+    /// Whether glass casts shadows.
+    pub shadows: super::Shadows,
+    /// Most bounces of a path by mirrors and glass.
+    pub max_depth: u32,
     /// Seed of all random patterns.
     pub seed: u32,
     /// Samples of every pixel.
@@ -67,6 +71,8 @@ impl Default for RenderDescription {
             ambient: DVec3::ZERO,
             background: DVec3::ZERO,
             shadow_epsilon: 1e-5,
+            shadows: super::Shadows::Opaque,
+            max_depth: 8,
             seed: 0,
             pixel_samples: samples.clone(),
             light_samples: samples,
@@ -191,6 +197,10 @@ tagged! {
     MaterialDescription {
         /// Phong's reflection model.
         "phong" => Phong(PhongDescription),
+        /// A mirror.
+        "mirror" => Mirror(MirrorDescription),
+        /// Clear glass.
+        "glass" => Glass(GlassDescription),
     }
 }
 
@@ -209,6 +219,26 @@ pub struct PhongDescription {
     /// Exponent of the specular term.
     #[serde(default = "sixteen")]
     pub shininess: f64,
+}
+
+/// A mirror.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct MirrorDescription {
+    /// Factor of the reflected light.
+    #[serde(default = "white")]
+    pub tint: DVec3,
+}
+
+/// Clear glass.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct GlassDescription {
+    /// Index of refraction.
+    pub ior: f64,
+    /// Factor of the light that passes the surface.
+    #[serde(default = "white")]
+    pub tint: DVec3,
 }
 
 tagged! {
@@ -357,6 +387,10 @@ pub struct PlaneDescription {
 
 fn z_up() -> DVec3 {
     DVec3::Z
+}
+
+fn white() -> DVec3 {
+    DVec3::ONE
 }
 
 fn one() -> f64 {

@@ -79,6 +79,10 @@ pub struct Render {
     pub background: DVec3,
     /// Offset of shadow rays, relative to the largest coordinate of their start.
     pub shadow_epsilon: f64,
+    /// Whether glass casts shadows.
+    pub shadows: Shadows,
+    /// Most bounces of a path by mirrors and glass.
+    pub max_depth: u32,
     /// Seed of all random patterns.
     pub seed: u32,
     /// Samples of every pixel's area.
@@ -93,6 +97,17 @@ pub struct Render {
 pub enum Integrator {
     /// Direct light and Phong's reflection model, the formula in the scene format's page.
     Phong,
+}
+
+/// Whether glass casts shadows. In a file the names are in snake case: `"opaque"`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shadows {
+    /// Like everything else.
+    #[default]
+    Opaque,
+    /// Not at all: light passes it straight on, with its full strength.
+    Transparent,
 }
 
 /// A set of sample positions on the unit square.
@@ -119,6 +134,18 @@ pub enum Material {
         specular: DVec3,
         /// Exponent of the specular term, greater than 0.
         shininess: f64,
+    },
+    /// A mirror.
+    Mirror {
+        /// Factor of the reflected light.
+        tint: DVec3,
+    },
+    /// Clear glass, by Fresnel's equations.
+    Glass {
+        /// Index of refraction of what is on the side away from the outward normal, relative to the other side.
+        ior: f64,
+        /// Factor of the light that passes the surface, on the way in and on the way out.
+        tint: DVec3,
     },
 }
 

@@ -18,6 +18,10 @@ use super::{
 const FARTHEST: f64 = 1e9;
 /// Smallest and largest length.
 const LENGTHS: (f64, f64) = (1e-9, 1e9);
+/// Most bounces of a path.
+const DEEPEST: u32 = 64;
+/// Largest index of refraction.
+const DENSEST: f64 = 100.0;
 /// Largest component of a colour.
 const BRIGHTEST: f64 = 1e6;
 /// Most pixels along a side of the picture, and most samples.
@@ -91,10 +95,19 @@ fn render(description: &RenderDescription) -> Checked<Render> {
         ambient: color(description.ambient).at("ambient")?,
         background: color(description.background).at("background")?,
         shadow_epsilon: between(description.shadow_epsilon, 0.0, 0.1).at("shadow_epsilon")?,
+        shadows: description.shadows,
+        max_depth: max_depth(description.max_depth).at("max_depth")?,
         seed: description.seed,
         pixel_samples: samples(&description.pixel_samples).at("pixel_samples")?,
         light_samples: samples(&description.light_samples).at("light_samples")?,
     })
+}
+
+fn max_depth(depth: u32) -> Checked<u32> {
+    check((1..=DEEPEST).contains(&depth), || {
+        format!("{depth} must be from 1 to {DEEPEST}")
+    })?;
+    Ok(depth)
 }
 
 fn camera(description: &CameraDescription) -> Checked<Camera> {
@@ -157,7 +170,30 @@ fn material(description: &MaterialDescription) -> Checked<Material> {
                 shininess: between(phong.shininess, 1e-6, 1e6).at("shininess")?,
             })
         }
+        MaterialDescription::Mirror(mirror) => Ok(Material::Mirror {
+            tint: tint(mirror.tint).at("tint")?,
+        }),
+        MaterialDescription::Glass(glass) => Ok(Material::Glass {
+            ior: ior(glass.ior).at("ior")?,
+            tint: tint(glass.tint).at("tint")?,
+        }),
     }
+}
+
+/// The factor of a mirror or of glass, which cannot give more light than it gets.
+fn tint(tint: DVec3) -> Checked<DVec3> {
+    for x in tint.to_array() {
+        between(x, 0.0, 1.0)?;
+    }
+    Ok(tint)
+}
+
+fn ior(ior: f64) -> Checked<f64> {
+    check(ior > 0.0 && (1.0 / DENSEST..=DENSEST).contains(&ior), || {
+        let (ior, low, high) = (number(ior), number(1.0 / DENSEST), number(DENSEST));
+        format!("{ior} must be greater than 0, from {low} to {high}")
+    })?;
+    Ok(ior)
 }
 
 fn factor(phong: &PhongDescription, own: Option<DVec3>, key: &str) -> Checked<DVec3> {
