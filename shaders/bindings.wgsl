@@ -6,3 +6,5 @@
 @group(0) @binding(3) var<storage, read> primitives: array<Primitive>;
 @group(0) @binding(4) var<storage, read> materials: array<Material>;
 @group(0) @binding(5) var<storage, read> lights: array<Light>;
+@group(0) @binding(7) var<storage, read> textures: array<Texture>;
+@group(0) @binding(8) var<storage, read> texels: array<u32>;

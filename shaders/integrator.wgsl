@@ -50,9 +50,11 @@ fn is_specular(hit: Hit) -> bool {
 
 fn scatter(hit: Hit, path: Path, pixel: vec2u, sample: u32) -> Scattered {
     let q = load_primitive(hit.primitive);
-    let material = load_material(q.material);
-    let surface = surface_at(q, path.ray, hit.t, environment.shadow_epsilon);
+    var surface = surface_at(q, path.ray, hit.t, environment.shadow_epsilon);
     let at = arrival_of(q, path, hit.t, surface);
+    let look = appearance(q, load_material(q.material), surface, at, SPECULAR_LOOKUPS);
+    let material = look.material;
+    surface.normal = usable_normal(surface, look.normal);
     if material.kind == MIRROR {
         return mirrored_path(path, surface, at, material);
     }
@@ -74,11 +76,14 @@ fn radiance_from(hit: Hit, path: Path, pixel: vec2u, sample: u32) -> vec3f {
         return environment.background;
     }
     let q = load_primitive(hit.primitive);
-    let material = load_material(q.material);
-    if material.kind == EMITTER {
-        return material.ambient;
+    let plain = load_material(q.material);
+    if plain.kind == EMITTER {
+        return plain.ambient;
     }
-    let surface = surface_at(q, path.ray, hit.t, environment.shadow_epsilon);
+    var surface = surface_at(q, path.ray, hit.t, environment.shadow_epsilon);
+    let look = appearance(q, plain, surface, arrival_of(q, path, hit.t, surface), LOOKUPS);
+    let material = look.material;
+    surface.normal = look.normal;
     var sum = environment.ambient * material.ambient;
     for (var i = 0u; i < AREA_LIGHTS; i++) {
         let light = load_light(i);

@@ -21,6 +21,13 @@ fn min(a: f32, b: f32) -> f32 {
     return select(b, a, a < b);
 }
 
+// The largest whole number that is not above x.
+fn floor(x: f32) -> f32 {
+    let small = abs(x) < 8388608.0; // larger ones are whole
+    let whole = f32(i32(select(0.0, x, small)));
+    return select(x, select(whole, whole - 1.0, whole > x), small);
+}
+
 // x to the power n by squaring, for n below 2^bits.
 fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     var result = 1.0;

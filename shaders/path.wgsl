@@ -20,6 +20,12 @@ fn mirrored_path(path: Path, surface: Surface, at: Arrival, material: Material) 
     return Scattered(onward, onward, false);
 }
 
+// A normal map's normal, if it faces the viewer and reflects to the surface's outer side; else the surface's own.
+fn usable_normal(surface: Surface, normal: vec3f) -> vec3f {
+    let outward = dot(reflected_direction(-surface.wo, normal), surface.normal) > 0.0;
+    return select(surface.normal, normal, outward & (dot(surface.wo, normal) > 0.0));
+}
+
 // Both branches at the first bounces; then the one that `random`, in [0, 1), chooses.
 fn glass_path(path: Path, surface: Surface, at: Arrival, material: Material, random: f32) -> Scattered {
     let eta = select(material.shininess, 1.0 / material.shininess, surface.side > 0.0);

@@ -11,3 +11,7 @@ fn load_material(i: u32) -> Material {
 fn load_light(i: u32) -> Light {
     return lights[i];
 }
+
+fn load_texture(i: u32) -> Texture {
+    return textures[i];
+}

@@ -29,3 +29,10 @@ override EXPONENT_BITS: u32;
 override BOUNCES: u32;
 // 1 where rays carry differentials, else 0.
 override DIFFERENTIALS: u32;
+// Most lookups in textures of a material, and of one of mirrors or glass; 1 if any texture gives a normal, else 0.
+override LOOKUPS: u32;
+override SPECULAR_LOOKUPS: u32;
+override NORMAL_MAPS: u32;
+// Bit i is set if a texture is of kind or format i.
+override TEXTURE_KINDS: u32;
+override TEXEL_FORMATS: u32;

@@ -2,11 +2,14 @@
 //!
 //! The structs are those of `shaders/layout.wgsl`: rows of 16 bytes, a `vec3f` followed by a scalar.
 
+mod appearance;
 mod blocking;
+mod pyramid;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat3, DVec3, UVec2, Vec2, Vec3};
+use glam::{DMat3, DVec3, UVec2, UVec4, Vec2, Vec3};
 
+use self::appearance::Appearances;
 use crate::scene::{self, Geometry, Parallelogram, Pattern, Projection, Samples, Scene};
 
 /// [`Camera::projection`] of a camera whose rays start at one point.
@@ -36,6 +39,44 @@ pub const GLASS: u32 = 3;
 pub const SPLITS: u32 = 2;
 /// A path so has at most so many ends.
 pub const LEAVES: u32 = 4;
+
+/// [`Texture::kind`]: two colours that alternate.
+pub const CHECKER: u32 = 0;
+/// [`Texture::kind`]: lines.
+pub const LINES: u32 = 1;
+/// [`Texture::kind`]: an image, by its nearest texel.
+pub const NEAREST: u32 = 2;
+/// [`Texture::kind`]: an image, between its texels.
+pub const BILINEAR: u32 = 3;
+/// [`Texture::kind`]: an image, between its texels and levels.
+pub const TRILINEAR: u32 = 4;
+/// [`Texture::kind`]: an image, by the elliptical weighted average.
+pub const EWA: u32 = 5;
+
+/// [`Texture::format`]: 8 bits by the sRGB curve.
+pub const SRGB8: u32 = 0;
+/// [`Texture::format`]: 8 bits.
+pub const LINEAR8: u32 = 1;
+/// [`Texture::format`]: 32-bit floats.
+pub const FLOAT: u32 = 2;
+
+/// [`Texture::wrap`]: the image again and again.
+pub const REPEAT: u32 = 0;
+/// [`Texture::wrap`]: the colour of the nearest edge.
+pub const CLAMP: u32 = 1;
+/// [`Texture::wrap`]: the image again and again, every other one mirrored.
+pub const MIRRORED: u32 = 2;
+
+/// The bits of [`Material::lookups`] that are the texture's number.
+pub const TEXTURE_NUMBER: u32 = 0xff_ffff;
+/// In [`Material::lookups`]: gives [`Material::ambient`].
+pub const FOR_AMBIENT: u32 = 0x100_0000;
+/// In [`Material::lookups`]: gives [`Material::diffuse`].
+pub const FOR_DIFFUSE: u32 = 0x200_0000;
+/// In [`Material::lookups`]: gives [`Material::specular`].
+pub const FOR_SPECULAR: u32 = 0x400_0000;
+/// In [`Material::lookups`]: gives the normal.
+pub const FOR_NORMAL: u32 = 0x800_0000;
 
 /// [`Pattern::Grid`].
 pub const GRID: u32 = 0;
@@ -126,6 +167,38 @@ pub struct Material {
     pub specular: Vec3,
     /// The exponent, where it is a whole number.
     pub exponent: u32,
+    /// Lookups in textures: a texture's number and the bits of what it is for, 0 for none.
+    pub lookups: UVec4,
+}
+
+/// A texture: first + (second - first) x, where x is what the pattern or the image gives.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Texture {
+    /// The colour where x is 0.
+    pub first: Vec3,
+    /// [`CHECKER`], [`LINES`], [`NEAREST`], [`BILINEAR`], [`TRILINEAR`] or [`EWA`].
+    pub kind: u32,
+    /// The colour where x is 1.
+    pub second: Vec3,
+    /// The width of [`LINES`]; for [`EWA`] the largest ratio of an ellipse's axes.
+    pub parameter: f32,
+    /// First row of the map from a surface's (u, v, 1) to the texture's (u, v).
+    pub u: Vec3,
+    /// [`SRGB8`], [`LINEAR8`] or [`FLOAT`].
+    pub format: u32,
+    /// Second row of the map.
+    pub v: Vec3,
+    /// [`REPEAT`], [`CLAMP`] or [`MIRRORED`].
+    pub wrap: u32,
+    /// Where, in the scene's texels, the table of its levels' places starts.
+    pub texels: u32,
+    /// Width of its finest level in texels.
+    pub width: u32,
+    /// Height of its finest level in texels.
+    pub height: u32,
+    /// How many levels it has.
+    pub levels: u32,
 }
 
 /// A light: the points center + a u + b v for a, b in -1..=1.
@@ -237,6 +310,16 @@ specialization! {
     bounces = "BOUNCES",
     /// 1 where rays carry differentials, else 0.
     differentials = "DIFFERENTIALS",
+    /// Most lookups in textures of a material that neither mirrors nor refracts.
+    lookups = "LOOKUPS",
+    /// Most lookups of one that does.
+    specular_lookups = "SPECULAR_LOOKUPS",
+    /// 1 if any texture gives a normal, else 0.
+    normal_maps = "NORMAL_MAPS",
+    /// Bit i is set if a texture is of kind i.
+    texture_kinds = "TEXTURE_KINDS",
+    /// Bit i is set if texels are of format i.
+    texel_formats = "TEXEL_FORMATS",
 }
 
 /// A scene as both backends read it.
@@ -252,6 +335,10 @@ pub struct Packed {
     pub materials: Vec<Material>,
     /// The lights, rectangles first.
     pub lights: Vec<Light>,
+    /// The textures that materials look up.
+    pub textures: Vec<Texture>,
+    /// Their images: tables of places, and texels.
+    pub texels: Vec<u32>,
     /// Samples of every pixel.
     pub pixel_samples: u32,
     /// The constants.
@@ -268,7 +355,8 @@ impl Packed {
 
 /// Packs a scene.
 pub fn pack(scene: &Scene) -> Packed {
-    let mut materials: Vec<Material> = scene.materials.iter().map(pack_material).collect();
+    let appearances = Appearances::of(scene);
+    let mut materials = appearances.materials.clone();
     let exponent_bits = exponent_bits(&scene.materials, &materials);
     let mut primitives = pack_shapes(scene);
     let mut lights = Vec::new();
@@ -320,7 +408,12 @@ pub fn pack(scene: &Scene) -> Packed {
         } else {
             0
         },
-        differentials: 0,
+        differentials: (scene.render.ray_differentials && appearances.needs_footprints()).into(),
+        lookups: appearances.lookups().0,
+        specular_lookups: appearances.lookups().1,
+        normal_maps: appearances.has_normal_maps().into(),
+        texture_kinds: appearances.kinds(),
+        texel_formats: appearances.formats(),
     };
     Packed {
         camera: pack_camera(scene),
@@ -333,6 +426,8 @@ pub fn pack(scene: &Scene) -> Packed {
         primitives: order.into_iter().map(|(primitive, _)| primitive).collect(),
         materials,
         lights,
+        textures: appearances.textures,
+        texels: appearances.texels,
         pixel_samples: pixels.count,
         specialization,
     }
@@ -361,35 +456,6 @@ fn pack_camera(scene: &Scene) -> Camera {
         height: scene.height,
         forward: camera.forward.as_vec3(),
         seed: scene.render.seed,
-    }
-}
-
-fn pack_material(material: &scene::Material) -> Material {
-    match *material {
-        scene::Material::Phong {
-            ambient,
-            diffuse,
-            specular,
-            shininess,
-        } => Material {
-            ambient: ambient.as_vec3(),
-            kind: PHONG,
-            diffuse: diffuse.as_vec3(),
-            shininess: shininess as f32,
-            specular: specular.as_vec3(),
-            exponent: shininess as u32,
-        },
-        scene::Material::Mirror { tint } => Material {
-            kind: MIRROR,
-            specular: tint.as_vec3(),
-            ..Material::zeroed()
-        },
-        scene::Material::Glass { ior, tint } => Material {
-            kind: GLASS,
-            shininess: ior as f32,
-            specular: tint.as_vec3(),
-            ..Material::zeroed()
-        },
     }
 }
 

@@ -6,13 +6,14 @@ use glam::{UVec2, UVec4, Vec3};
 use super::camera::{camera_differential, camera_ray};
 use super::differential::{Arrival, Differential, arrival};
 use super::light::segments_to_light;
-use super::path::{Path, Scattered, glass_path, mirrored_path};
+use super::path::{Path, Scattered, glass_path, mirrored_path, usable_normal};
 use super::phong::{Lobes, phong_block};
 use super::ray::Hit;
 use super::rng::{hash4, unit_float};
 use super::sampling::{sample_key, sample_square};
 use super::shadow::Block;
 use super::surface::{Surface, first_hit, surface_at};
+use super::texture::appearance;
 use super::traverse::{closest_hit, hidden_samples};
 use crate::pack::{
     BLOCK, EMITTER, FAR, FirstHit, GLASS, GRID, LEAVES, Light, MIRROR, Material, NOTHING, Packed, Primitive, SPLITS,
@@ -68,9 +69,12 @@ pub fn is_specular(scene: &Packed, hit: Hit) -> bool {
 
 pub fn scatter(scene: &Packed, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Scattered {
     let q = &scene.primitives[hit.primitive as usize];
-    let material = &scene.materials[q.material as usize];
-    let surface = surface_at(q, path.ray, hit.t, scene.environment.shadow_epsilon);
+    let mut surface = surface_at(q, path.ray, hit.t, scene.environment.shadow_epsilon);
     let at = arrival_of(scene, q, path, hit.t, surface);
+    let lookups = scene.specialization.specular_lookups;
+    let look = appearance(scene, q, &scene.materials[q.material as usize], surface, at, lookups);
+    let material = &look.material;
+    surface.normal = usable_normal(surface, look.normal);
     if material.kind == MIRROR {
         return mirrored_path(path, surface, at, material);
     }
@@ -92,11 +96,15 @@ pub fn radiance_from(scene: &Packed, hit: Hit, path: Path, pixel: UVec2, sample:
         return scene.environment.background;
     }
     let q = &scene.primitives[hit.primitive as usize];
-    let material = &scene.materials[q.material as usize];
-    if material.kind == EMITTER {
-        return material.ambient;
+    let plain = &scene.materials[q.material as usize];
+    if plain.kind == EMITTER {
+        return plain.ambient;
     }
-    let surface = surface_at(q, path.ray, hit.t, scene.environment.shadow_epsilon);
+    let mut surface = surface_at(q, path.ray, hit.t, scene.environment.shadow_epsilon);
+    let at = arrival_of(scene, q, path, hit.t, surface);
+    let look = appearance(scene, q, plain, surface, at, s.lookups);
+    let material = &look.material;
+    surface.normal = look.normal;
     let mut sum = scene.environment.ambient * material.ambient;
     let (area_lights, delta_lights) = scene.lights.split_at(s.area_lights as usize);
     for light in area_lights {

@@ -7,10 +7,12 @@
 pub mod camera;
 pub mod differential;
 pub mod ellipsoid;
+pub mod footprint;
 pub mod integrator;
 pub mod light;
 pub mod math;
 pub mod path;
+pub mod pattern;
 pub mod phong;
 pub mod plane;
 pub mod ray;
@@ -21,6 +23,9 @@ pub mod sampling;
 pub mod shadow;
 pub mod specular;
 pub mod surface;
+pub mod tangent;
+pub mod texel;
+pub mod texture;
 pub mod traverse;
 pub mod triangle;
 

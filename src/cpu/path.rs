@@ -34,6 +34,15 @@ pub fn mirrored_path(path: Path, surface: Surface, at: Arrival, material: &Mater
     }
 }
 
+pub fn usable_normal(surface: Surface, normal: Vec3) -> Vec3 {
+    let outward = dot(reflected_direction(-surface.wo, normal), surface.normal) > 0.0;
+    if outward & (dot(surface.wo, normal) > 0.0) {
+        normal
+    } else {
+        surface.normal
+    }
+}
+
 pub fn glass_path(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Scattered {
     let eta = if surface.side > 0.0 {
         1.0 / material.shininess

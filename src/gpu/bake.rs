@@ -5,12 +5,13 @@ use std::fmt::Write;
 
 use glam::Vec3;
 
-use crate::pack::{ELLIPSOID, Light, Material, PLANE, Packed, Primitive, RECTANGLE, TRIANGLE};
+use crate::pack::{ELLIPSOID, Light, Material, PLANE, Packed, Primitive, RECTANGLE, TRIANGLE, Texture};
 
 /// Larger scenes are read from buffers: compiling grows with every primitive.
 pub const MOST_PRIMITIVES: usize = 64;
 
-/// The WGSL text of a scene's `closest_hit`, `hidden_samples`, `load_primitive`, `load_material` and `load_light`.
+/// The WGSL text of a scene's `closest_hit`, `hidden_samples`, `load_primitive`, `load_material`, `load_light` and
+/// `load_texture`.
 pub fn bake(packed: &Packed) -> String {
     let mut out = String::new();
     let records: Vec<String> = packed.primitives.iter().map(primitive).collect();
@@ -48,6 +49,12 @@ pub fn bake(packed: &Packed) -> String {
         "load_light",
         "Light",
         &packed.lights.iter().map(light).collect::<Vec<_>>(),
+    );
+    write_table(
+        &mut out,
+        "load_texture",
+        "Texture",
+        &packed.textures.iter().map(texture).collect::<Vec<_>>(),
     );
     out
 }
@@ -116,13 +123,35 @@ fn primitive(p: &Primitive) -> String {
 
 fn material(m: &Material) -> String {
     format!(
-        "Material({}, {}u, {}, {:?}f, {}, {}u)",
+        "Material({}, {}u, {}, {:?}f, {}, {}u, vec4u({}u, {}u, {}u, {}u))",
         vector(m.ambient),
         m.kind,
         vector(m.diffuse),
         m.shininess,
         vector(m.specular),
-        m.exponent
+        m.exponent,
+        m.lookups.x,
+        m.lookups.y,
+        m.lookups.z,
+        m.lookups.w
+    )
+}
+
+fn texture(t: &Texture) -> String {
+    format!(
+        "Texture({}, {}u, {}, {:?}f, {}, {}u, {}, {}u, {}u, {}u, {}u, {}u)",
+        vector(t.first),
+        t.kind,
+        vector(t.second),
+        t.parameter,
+        vector(t.u),
+        t.format,
+        vector(t.v),
+        t.wrap,
+        t.texels,
+        t.width,
+        t.height,
+        t.levels
     )
 }
 

@@ -15,6 +15,7 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "constants.wgsl",
     "differential.wgsl",
     "ellipsoid.wgsl",
+    "footprint.wgsl",
     "integrator.wgsl",
     "kernels/aov.wgsl",
     "kernels/render.wgsl",
@@ -22,6 +23,7 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "light.wgsl",
     "math.wgsl",
     "path.wgsl",
+    "pattern.wgsl",
     "phong.wgsl",
     "plane.wgsl",
     "ray.wgsl",
@@ -33,6 +35,9 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "specialization.wgsl",
     "specular.wgsl",
     "surface.wgsl",
+    "tangent.wgsl",
+    "texel.wgsl",
+    "texture.wgsl",
     "traverse.wgsl",
     "triangle.wgsl",
 ];
@@ -57,10 +62,19 @@ pub const SHARED: &[&str] = &[
     "differential.wgsl",
     "specular.wgsl",
     "path.wgsl",
+    "footprint.wgsl",
+    "pattern.wgsl",
+    "texel.wgsl",
+    "tangent.wgsl",
 ];
 
 /// What every kernel adds to [`SHARED`]: its constants, its buffers and the way through the scene.
-const KERNEL: &[&str] = &["specialization.wgsl", "bindings.wgsl", "integrator.wgsl"];
+const KERNEL: &[&str] = &[
+    "specialization.wgsl",
+    "bindings.wgsl",
+    "texture.wgsl",
+    "integrator.wgsl",
+];
 /// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.
 const FROM_BUFFERS: &[&str] = &["scene.wgsl", "traverse.wgsl"];
 

@@ -39,7 +39,7 @@ pub struct Gpu {
     device: Device,
     kernels: Kernels,
     render: wgpu::ComputePipeline,
-    scene: [wgpu::Buffer; 5],
+    scene: [wgpu::Buffer; 7],
     work: wgpu::Buffer,
     film: Option<Target>,
 }
@@ -79,6 +79,8 @@ impl Gpu {
                 device.upload(BufferUsages::STORAGE, &packed.primitives),
                 device.upload(BufferUsages::STORAGE, &packed.materials),
                 device.upload(BufferUsages::STORAGE, &packed.lights),
+                device.upload(BufferUsages::STORAGE, &packed.textures),
+                device.upload(BufferUsages::STORAGE, &packed.texels),
             ]
         })?;
         let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
@@ -105,8 +107,18 @@ impl Gpu {
         let size = region.pixels() * size_of::<T>() as u64;
         self.device.checked(|| {
             let buffer = self.device.buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-            let [camera, environment, primitives, materials, lights] = &self.scene;
-            let buffers = [&self.work, camera, environment, primitives, materials, lights, &buffer];
+            let [camera, environment, primitives, materials, lights, textures, texels] = &self.scene;
+            let buffers = [
+                &self.work,
+                camera,
+                environment,
+                primitives,
+                materials,
+                lights,
+                &buffer,
+                textures,
+                texels,
+            ];
             let entries: Vec<wgpu::BindGroupEntry> = (0..)
                 .zip(buffers)
                 .map(|(binding, buffer)| wgpu::BindGroupEntry {

@@ -9,6 +9,8 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
+pub use super::describe_texture::*;
+
 /// A whole scene file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Description {
@@ -18,6 +20,8 @@ pub struct Description {
     pub camera: CameraDescription,
     /// `[render]`
     pub render: RenderDescription,
+    /// `[textures.NAME]`
+    pub textures: BTreeMap<String, TextureDescription>,
     /// `[materials.NAME]`
     pub materials: BTreeMap<String, MaterialDescription>,
     /// `[[lights]]`
@@ -52,6 +56,8 @@ pub struct RenderDescription {
     pub shadows: super::Shadows,
     /// Most bounces of a path by mirrors and glass.
     pub max_depth: u32,
+    /// Whether textures are filtered over the footprint of each ray.
+    pub ray_differentials: bool,
     /// Seed of all random patterns.
     pub seed: u32,
     /// Samples of every pixel.
@@ -73,6 +79,7 @@ impl Default for RenderDescription {
             shadow_epsilon: 1e-5,
             shadows: super::Shadows::Opaque,
             max_depth: 8,
+            ray_differentials: true,
             seed: 0,
             pixel_samples: samples.clone(),
             light_samples: samples,
@@ -149,6 +156,8 @@ macro_rules! tagged {
     };
 }
 
+pub(super) use tagged;
+
 tagged! {
     /// `[camera]`
     CameraDescription {
@@ -209,16 +218,18 @@ tagged! {
 #[serde(deny_unknown_fields)]
 pub struct PhongDescription {
     /// Short for the three factors.
-    pub color: Option<DVec3>,
+    pub color: Option<ColorDescription>,
     /// Factor of the ambient light.
-    pub ambient: Option<DVec3>,
+    pub ambient: Option<ColorDescription>,
     /// Factor of the diffuse term.
-    pub diffuse: Option<DVec3>,
+    pub diffuse: Option<ColorDescription>,
     /// Factor of the specular term.
-    pub specular: Option<DVec3>,
+    pub specular: Option<ColorDescription>,
     /// Exponent of the specular term.
     #[serde(default = "sixteen")]
     pub shininess: f64,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
 }
 
 /// A mirror.
@@ -226,8 +237,10 @@ pub struct PhongDescription {
 #[serde(deny_unknown_fields)]
 pub struct MirrorDescription {
     /// Factor of the reflected light.
-    #[serde(default = "white")]
-    pub tint: DVec3,
+    #[serde(default)]
+    pub tint: ColorDescription,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
 }
 
 /// Clear glass.
@@ -237,8 +250,10 @@ pub struct GlassDescription {
     /// Index of refraction.
     pub ior: f64,
     /// Factor of the light that passes the surface.
-    #[serde(default = "white")]
-    pub tint: DVec3,
+    #[serde(default)]
+    pub tint: ColorDescription,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
 }
 
 tagged! {
@@ -387,10 +402,6 @@ pub struct PlaneDescription {
 
 fn z_up() -> DVec3 {
     DVec3::Z
-}
-
-fn white() -> DVec3 {
-    DVec3::ONE
 }
 
 fn one() -> f64 {
