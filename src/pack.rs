@@ -4,6 +4,7 @@
 
 mod appearance;
 mod blocking;
+mod bounds;
 mod pyramid;
 
 use bytemuck::{Pod, Zeroable};
@@ -149,6 +150,16 @@ pub struct Primitive {
     pub z: Vec3,
     /// Determinant of the three rows.
     pub determinant: f32,
+}
+
+/// A sphere around a primitive that can cast a shadow.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Sphere {
+    /// The middle.
+    pub center: Vec3,
+    /// Infinite for a plane.
+    pub radius: f32,
 }
 
 /// A surface's appearance.
@@ -331,6 +342,8 @@ pub struct Packed {
     pub environment: Environment,
     /// The primitives, sorted by kind and in each kind by whether they can cast a shadow; lights' rectangles among them.
     pub primitives: Vec<Primitive>,
+    /// A sphere around each primitive.
+    pub bounds: Vec<Sphere>,
     /// The materials of the scene, then one for each area light.
     pub materials: Vec<Material>,
     /// The lights, rectangles first.
@@ -415,6 +428,7 @@ pub fn pack(scene: &Scene) -> Packed {
         texture_kinds: appearances.kinds(),
         texel_formats: appearances.formats(),
     };
+    let primitives: Vec<Primitive> = order.into_iter().map(|(primitive, _)| primitive).collect();
     Packed {
         camera: pack_camera(scene),
         environment: Environment {
@@ -423,7 +437,8 @@ pub fn pack(scene: &Scene) -> Packed {
             background: scene.render.background.as_vec3(),
             light_weight: 1.0 / light_samples.count as f32,
         },
-        primitives: order.into_iter().map(|(primitive, _)| primitive).collect(),
+        bounds: primitives.iter().map(bounds::sphere).collect(),
+        primitives,
         materials,
         lights,
         textures: appearances.textures,

@@ -3,13 +3,14 @@
 use glam::{UVec2, Vec2, Vec3};
 
 use super::ellipsoid::ellipsoid_blocks;
-use super::light::{segment, segments_to_light, segments_to_local};
+use super::light::{Segments, segment, segments_to_light, segments_to_local};
+use super::math::dot;
 use super::plane::plane_blocks;
 use super::ray::point_to_local;
 use super::rectangle::rectangle_blocks;
 use super::sampling::sample_square;
 use super::triangle::triangle_blocks;
-use crate::pack::{ELLIPSOID, Light, Primitive, RECTANGLE, TRIANGLE};
+use crate::pack::{ELLIPSOID, Light, Primitive, RECTANGLE, Sphere, TRIANGLE};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {
@@ -49,4 +50,35 @@ pub fn blocks(kind: u32, o: Vec3, d: Vec3, reach: f32) -> bool {
         return ellipsoid_blocks(o, d, reach);
     }
     plane_blocks(o, d, reach)
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cone {
+    pub apex: Vec3,
+    pub to: Segments,
+    pub length2: f32,
+    pub inverse_depth: f32,
+}
+
+pub fn cone_to_light(light: &Light, p: Vec3) -> Cone {
+    let to = segments_to_light(light, p);
+    let length2 = dot(to.towards, to.towards);
+    let depth = length2 - dot(to.towards, to.u).abs() - dot(to.towards, to.v).abs();
+    Cone {
+        apex: p,
+        to,
+        length2,
+        inverse_depth: if depth > 0.0 { 1.0 / depth } else { -1.0 },
+    }
+}
+
+pub fn may_block(sphere: &Sphere, cone: &Cone) -> bool {
+    let w = sphere.center - cone.apex;
+    let along = dot(w, cone.to.towards);
+    let m = w - cone.to.towards * (along / cone.length2);
+    let m2 = dot(m, m);
+    let slope = (dot(m, cone.to.u).abs() + dot(m, cone.to.v).abs()) * cone.inverse_depth;
+    let height = m2 - slope * along;
+    let radius2 = sphere.radius * sphere.radius;
+    (slope < 0.0) | (height <= 0.0) | (height * height <= radius2 * (m2 + slope * slope * cone.length2))
 }

@@ -73,10 +73,11 @@ const KERNEL: &[&str] = &[
     "specialization.wgsl",
     "bindings.wgsl",
     "texture.wgsl",
+    "traverse.wgsl",
     "integrator.wgsl",
 ];
 /// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.
-const FROM_BUFFERS: &[&str] = &["scene.wgsl", "traverse.wgsl"];
+const FROM_BUFFERS: &str = "scene.wgsl";
 
 /// A compute shader's entry point and the file that it is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -143,9 +144,7 @@ impl Shaders {
         }
         match baked {
             Some(text) => source.append("(the scene as constants)", text),
-            None => FROM_BUFFERS
-                .iter()
-                .for_each(|name| source.append(name, self.text(name))),
+            None => source.append(FROM_BUFFERS, self.text(FROM_BUFFERS)),
         }
         source
     }

@@ -39,7 +39,7 @@ pub struct Gpu {
     device: Device,
     kernels: Kernels,
     render: wgpu::ComputePipeline,
-    scene: [wgpu::Buffer; 7],
+    scene: [wgpu::Buffer; 8],
     work: wgpu::Buffer,
     film: Option<Target>,
 }
@@ -77,6 +77,7 @@ impl Gpu {
                 device.upload(BufferUsages::UNIFORM, &[packed.camera]),
                 device.upload(BufferUsages::UNIFORM, &[packed.environment]),
                 device.upload(BufferUsages::STORAGE, &packed.primitives),
+                device.upload(BufferUsages::STORAGE, &packed.bounds),
                 device.upload(BufferUsages::STORAGE, &packed.materials),
                 device.upload(BufferUsages::STORAGE, &packed.lights),
                 device.upload(BufferUsages::STORAGE, &packed.textures),
@@ -107,17 +108,27 @@ impl Gpu {
         let size = region.pixels() * size_of::<T>() as u64;
         self.device.checked(|| {
             let buffer = self.device.buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-            let [camera, environment, primitives, materials, lights, textures, texels] = &self.scene;
+            let [
+                camera,
+                environment,
+                primitives,
+                bounds,
+                materials,
+                lights,
+                textures,
+                texels,
+            ] = &self.scene;
             let buffers = [
                 &self.work,
                 camera,
                 environment,
                 primitives,
+                bounds,
                 materials,
                 lights,
-                &buffer,
                 textures,
                 texels,
+                &buffer,
             ];
             let entries: Vec<wgpu::BindGroupEntry> = (0..)
                 .zip(buffers)
