@@ -5,7 +5,9 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::pack::{ELLIPSOID, Light, Material, PLANE, Packed, Primitive, RECTANGLE, Specialization, Sphere, TRIANGLE, Texture};
+use crate::pack::{
+    ELLIPSOID, Light, Material, PLANE, Packed, Primitive, RECTANGLE, Specialization, Sphere, TRIANGLE, Texture,
+};
 
 /// Larger scenes are read from buffers: compiling grows with every primitive.
 pub const MOST_PRIMITIVES: usize = 64;

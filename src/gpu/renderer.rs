@@ -111,7 +111,16 @@ impl Gpu {
         let size = region.pixels() * size_of::<T>() as u64;
         self.device.checked(|| {
             let buffer = self.device.buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-            let [camera, environment, primitives, bounds, materials, lights, textures, texels] = &self.scene;
+            let [
+                camera,
+                environment,
+                primitives,
+                bounds,
+                materials,
+                lights,
+                textures,
+                texels,
+            ] = &self.scene;
             let buffers = [
                 &self.work,
                 camera,
