@@ -6,20 +6,8 @@ struct Block {
     side: u32,
     first: u32,            // of the light's samples
     count: u32,            // 1 to BLOCK
-}
-
-// Where the samples of the block at hand are on the light, but for the grid, whose positions are constants of the kernel.
-// A variable of the module: as a part of Block, or passed by pointer, it makes kernels 1.4 to 60 times slower.
-var<private> block_positions: array<vec2f, BLOCK>;
-
-// What takes hashing is computed once for all primitives.
-fn sample_block(pattern: u32, side: u32, first: u32, count: u32, group: u32, key: vec2u) -> Block {
-    if pattern != GRID {
-        for (var i = 0u; i < count; i++) {
-            block_positions[i] = sample_square(pattern, side, first + i, group, key);
-        }
-    }
-    return Block(pattern, side, first, count);
+    group: u32,
+    key: vec2u,
 }
 
 // Bit i is set where the primitive hides sample i of the block from p. `kind` is the primitive's, known when compiled.
@@ -35,10 +23,7 @@ fn shadow_bits(kind: u32, q: Primitive, p: vec3f, light: Light, block: Block) ->
 }
 
 fn block_sample(block: Block, i: u32) -> vec2f {
-    if block.pattern == GRID {
-        return grid_sample(block.side, block.first + i);
-    }
-    return block_positions[i];
+    return sample_square(block.pattern, block.side, block.first + i, block.group, block.key);
 }
 
 fn blocks(kind: u32, o: vec3f, d: vec3f, reach: f32) -> bool {
@@ -52,4 +37,34 @@ fn blocks(kind: u32, o: vec3f, d: vec3f, reach: f32) -> bool {
         return ellipsoid_blocks(o, d, reach);
     }
     return plane_blocks(o, d, reach);
+}
+
+// The cone of all shadow rays from p to a light: s (towards + u a + v b) for s >= 0 and a, b in -1..=1.
+struct Cone {
+    apex: vec3f,
+    to: Segments,
+    length2: f32,          // |towards|^2
+    inverse_depth: f32,    // 1 / (the least dot product of towards with a ray), or negative if that is not positive
+}
+
+fn cone_to_light(light: Light, p: vec3f) -> Cone {
+    let to = segments_to_light(light, p);
+    let length2 = dot(to.towards, to.towards);
+    let depth = length2 - abs(dot(to.towards, to.u)) - abs(dot(to.towards, to.v));
+    return Cone(p, to, length2, select(-1.0, 1.0 / depth, depth > 0.0));
+}
+
+// Whether the sphere may reach into the cone. It does not if a plane through the apex has the cone on one side and the
+// sphere on the other: the plane with normal n = m - towards slope, where m is the part of the way to the sphere's
+// centre that is perpendicular to `towards`, and `slope` the least that keeps all rays of the cone below it.
+fn may_block(sphere: Sphere, cone: Cone) -> bool {
+    let w = sphere.center - cone.apex;
+    let along = dot(w, cone.to.towards);
+    let m = w - cone.to.towards * (along / cone.length2);
+    let m2 = dot(m, m);
+    let slope = (abs(dot(m, cone.to.u)) + abs(dot(m, cone.to.v))) * cone.inverse_depth;
+    let height = m2 - slope * along;
+    let radius2 = sphere.radius * sphere.radius;
+    return (slope < 0.0) | (height <= 0.0)
+        | (height * height <= radius2 * (m2 + slope * slope * cone.length2));
 }

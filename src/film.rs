@@ -56,39 +56,53 @@ pub struct Film {
 }
 
 impl Film {
-    /// A film without any sample, with moments if sampling is adaptive.
-    pub fn new(region: Region, adaptive: bool) -> Film {
-        let none = vec![Vec4::zeroed(); region.pixels() as usize];
+    /// A film without any sample, and without moments.
+    pub fn new(region: Region) -> Film {
         Film {
             region,
-            moments: if adaptive { none.clone() } else { Vec::new() },
-            sums: none,
+            sums: vec![Vec4::zeroed(); region.pixels() as usize],
+            moments: Vec::new(),
         }
     }
 
-    /// How many samples each pixel has, under adaptive sampling.
-    pub fn sample_counts(&self) -> impl Iterator<Item = u32> {
-        self.moments.iter().map(|moments| moments.w as u32)
+    /// A film without any sample, with moments.
+    pub fn adaptive(region: Region) -> Film {
+        Film {
+            moments: vec![Vec4::zeroed(); region.pixels() as usize],
+            ..Film::new(region)
+        }
     }
 
-    /// The variance of each pixel's mean in red, green and blue, under adaptive sampling, estimated as for independent
-    /// samples: an upper bound for patterns that are more even. It is what sampling has stopped by, and so counts the
-    /// spread of the radiances at the pixel's corners among the deviations.
-    pub fn variances(&self) -> impl Iterator<Item = [f32; 3]> {
-        self.sums.iter().zip(&self.moments).map(|(sum, moments)| {
-            let scale = moments.w / ((moments.w - 1.0) * sum.w * sum.w);
-            [moments.x, moments.y, moments.z].map(|deviations| deviations * scale)
-        })
+    /// How many samples a pixel has, under adaptive sampling.
+    pub fn sample_count(&self, pixel: usize) -> u32 {
+        self.moments[pixel].w as u32
+    }
+
+    /// How many samples the pixels have, row by row from the top, under adaptive sampling.
+    pub fn sample_counts(&self) -> impl Iterator<Item = u32> {
+        (0..self.moments.len()).map(|pixel| self.sample_count(pixel))
+    }
+
+    /// The variance of a pixel's mean in red, green and blue, under adaptive sampling, estimated as for independent samples:
+    /// an upper bound for patterns that are more even. It is what sampling has stopped by, and so the spread of the
+    /// radiances at the pixel's corners is part of it.
+    pub fn variance(&self, pixel: usize) -> [f32; 3] {
+        let (sum, moments) = (self.sums[pixel], self.moments[pixel]);
+        let scale = moments.w / ((moments.w - 1.0) * sum.w * sum.w);
+        [moments.x, moments.y, moments.z].map(|deviations| deviations * scale)
     }
 
     /// The means of all pixels: linear RGB, row by row from the top.
     pub fn means(&self) -> impl Iterator<Item = [f32; 3]> {
-        self.sums.iter().map(|s| {
-            if s.w == 0.0 {
-                [0.0; 3]
-            } else {
-                [s.x / s.w, s.y / s.w, s.z / s.w]
-            }
-        })
+        self.sums.iter().copied().map(mean)
+    }
+}
+
+/// The mean of a pixel's samples: linear RGB, black if there are none.
+pub fn mean(sum: Vec4) -> [f32; 3] {
+    if sum.w == 0.0 {
+        [0.0; 3]
+    } else {
+        [sum.x / sum.w, sum.y / sum.w, sum.z / sum.w]
     }
 }

@@ -4,6 +4,7 @@ pub mod cpu;
 pub mod error;
 pub mod film;
 pub mod gpu;
+pub mod image;
 pub mod job;
 pub mod pack;
 pub mod scene;

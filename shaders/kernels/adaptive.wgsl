@@ -2,7 +2,7 @@
 // has a second half: each pixel's moments. All decisions are the pixel's own, at the ends of its rounds, so that every
 // cut of the work gives the same.
 
-@group(0) @binding(6) var<storage, read_write> film: array<vec4f>;
+@group(0) @binding(10) var<storage, read_write> film: array<vec4f>;
 
 @compute @workgroup_size(8, 8)
 fn adaptive(@builtin(global_invocation_id) id: vec3u) {

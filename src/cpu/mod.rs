@@ -6,11 +6,15 @@
 
 pub mod adaptive;
 pub mod camera;
+pub mod differential;
 pub mod ellipsoid;
 pub mod filter;
+pub mod footprint;
 pub mod integrator;
 pub mod light;
 pub mod math;
+pub mod path;
+pub mod pattern;
 pub mod phong;
 pub mod plane;
 pub mod ray;
@@ -20,7 +24,11 @@ pub mod rng;
 pub mod sampling;
 pub mod sequence;
 pub mod shadow;
+pub mod specular;
 pub mod surface;
+pub mod tangent;
+pub mod texel;
+pub mod texture;
 pub mod traverse;
 pub mod triangle;
 

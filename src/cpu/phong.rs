@@ -38,7 +38,7 @@ pub fn phong_block(
     surface: Surface,
     material: &Material,
     to: Segments,
-    block: &Block,
+    block: Block,
     hidden: u32,
     exponent_bits: u32,
     sum: Lobes,

@@ -23,7 +23,7 @@ impl<'a> Cpu<'a> {
     pub fn new(scene: &'a Packed) -> Cpu<'a> {
         Cpu {
             scene,
-            film: Film::new(Region::whole(0, 0), scene.adaptive),
+            film: Film::new(Region::whole(0, 0)),
         }
     }
 }
@@ -33,7 +33,10 @@ const RUN: usize = 32;
 
 impl Backend for Cpu<'_> {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
-        self.film = Film::new(region, self.scene.adaptive);
+        self.film = match self.scene.adaptive {
+            true => Film::adaptive(region),
+            false => Film::new(region),
+        };
         Ok(())
     }
 
@@ -61,10 +64,7 @@ impl Backend for Cpu<'_> {
     }
 
     fn film(&mut self) -> Result<Film, RenderError> {
-        Ok(std::mem::replace(
-            &mut self.film,
-            Film::new(Region::whole(0, 0), self.scene.adaptive),
-        ))
+        Ok(std::mem::replace(&mut self.film, Film::new(Region::whole(0, 0))))
     }
 
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
@@ -89,10 +89,7 @@ fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut 
     let columns = (tile.x0 - region.x0) as usize..(tile.x1 - region.x0) as usize;
     rows.flat_map(|(y, row)| {
         let runs = row[columns.clone()].chunks_mut(RUN).enumerate();
-        runs.map(move |(i, run)| {
-            let first = UVec2::new(tile.x0 + (i * RUN) as u32, region.y0 + y as u32);
-            (first, run)
-        })
+        runs.map(move |(i, run)| (UVec2::new(tile.x0 + (i * RUN) as u32, region.y0 + y as u32), run))
     })
     .collect()
 }

@@ -3,41 +3,27 @@
 use glam::{UVec2, Vec2, Vec3};
 
 use super::ellipsoid::ellipsoid_blocks;
-use super::light::{segment, segments_to_light, segments_to_local};
+use super::light::{Segments, segment, segments_to_light, segments_to_local};
+use super::math::dot;
 use super::plane::plane_blocks;
 use super::ray::point_to_local;
 use super::rectangle::rectangle_blocks;
-use super::sampling::{grid_sample, sample_square};
+use super::sampling::sample_square;
 use super::triangle::triangle_blocks;
-use crate::pack::{BLOCK, ELLIPSOID, GRID, Light, Primitive, RECTANGLE, TRIANGLE};
+use crate::pack::{ELLIPSOID, Light, Primitive, RECTANGLE, Sphere, TRIANGLE};
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {
     pub pattern: u32,
     pub side: u32,
     pub first: u32,
     pub count: u32,
-    pub positions: [Vec2; BLOCK as usize],
-}
-
-pub fn sample_block(pattern: u32, side: u32, first: u32, count: u32, group: u32, key: UVec2) -> Block {
-    let mut block = Block {
-        pattern,
-        side,
-        first,
-        count,
-        positions: [Vec2::ZERO; BLOCK as usize],
-    };
-    if pattern != GRID {
-        for i in 0..count {
-            block.positions[i as usize] = sample_square(pattern, side, first + i, group, key);
-        }
-    }
-    block
+    pub group: u32,
+    pub key: UVec2,
 }
 
 #[inline(always)] // compiled for each kind
-pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: &Block) -> u32 {
+pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: Block) -> u32 {
     let o = point_to_local(q, p);
     let to = segments_to_local(q, segments_to_light(light, p));
     let mut bits = 0;
@@ -48,11 +34,8 @@ pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: &Blo
     bits
 }
 
-pub fn block_sample(block: &Block, i: u32) -> Vec2 {
-    if block.pattern == GRID {
-        return grid_sample(block.side, block.first + i);
-    }
-    block.positions[i as usize]
+pub fn block_sample(block: Block, i: u32) -> Vec2 {
+    sample_square(block.pattern, block.side, block.first + i, block.group, block.key)
 }
 
 #[inline(always)] // compiled for each kind
@@ -67,4 +50,35 @@ pub fn blocks(kind: u32, o: Vec3, d: Vec3, reach: f32) -> bool {
         return ellipsoid_blocks(o, d, reach);
     }
     plane_blocks(o, d, reach)
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cone {
+    pub apex: Vec3,
+    pub to: Segments,
+    pub length2: f32,
+    pub inverse_depth: f32,
+}
+
+pub fn cone_to_light(light: &Light, p: Vec3) -> Cone {
+    let to = segments_to_light(light, p);
+    let length2 = dot(to.towards, to.towards);
+    let depth = length2 - dot(to.towards, to.u).abs() - dot(to.towards, to.v).abs();
+    Cone {
+        apex: p,
+        to,
+        length2,
+        inverse_depth: if depth > 0.0 { 1.0 / depth } else { -1.0 },
+    }
+}
+
+pub fn may_block(sphere: &Sphere, cone: &Cone) -> bool {
+    let w = sphere.center - cone.apex;
+    let along = dot(w, cone.to.towards);
+    let m = w - cone.to.towards * (along / cone.length2);
+    let m2 = dot(m, m);
+    let slope = (dot(m, cone.to.u).abs() + dot(m, cone.to.v).abs()) * cone.inverse_depth;
+    let height = m2 - slope * along;
+    let radius2 = sphere.radius * sphere.radius;
+    (slope < 0.0) | (height <= 0.0) | (height * height <= radius2 * (m2 + slope * slope * cone.length2))
 }

@@ -14,8 +14,10 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "bindings.wgsl",
     "camera.wgsl",
     "constants.wgsl",
+    "differential.wgsl",
     "ellipsoid.wgsl",
     "filter.wgsl",
+    "footprint.wgsl",
     "integrator.wgsl",
     "kernels/adaptive.wgsl",
     "kernels/aov.wgsl",
@@ -23,6 +25,8 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "layout.wgsl",
     "light.wgsl",
     "math.wgsl",
+    "path.wgsl",
+    "pattern.wgsl",
     "phong.wgsl",
     "plane.wgsl",
     "ray.wgsl",
@@ -33,7 +37,11 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "sequence.wgsl",
     "shadow.wgsl",
     "specialization.wgsl",
+    "specular.wgsl",
     "surface.wgsl",
+    "tangent.wgsl",
+    "texel.wgsl",
+    "texture.wgsl",
     "traverse.wgsl",
     "triangle.wgsl",
 ];
@@ -46,7 +54,6 @@ pub const SHARED: &[&str] = &[
     "rng.wgsl",
     "sampling.wgsl",
     "sequence.wgsl",
-    "filter.wgsl",
     "ray.wgsl",
     "rectangle.wgsl",
     "triangle.wgsl",
@@ -57,13 +64,27 @@ pub const SHARED: &[&str] = &[
     "light.wgsl",
     "shadow.wgsl",
     "phong.wgsl",
+    "differential.wgsl",
+    "specular.wgsl",
+    "path.wgsl",
+    "footprint.wgsl",
+    "pattern.wgsl",
+    "texel.wgsl",
+    "tangent.wgsl",
+    "filter.wgsl",
     "adaptive.wgsl",
 ];
 
 /// What every kernel adds to [`SHARED`]: its constants, its buffers and the way through the scene.
-const KERNEL: &[&str] = &["specialization.wgsl", "bindings.wgsl", "integrator.wgsl"];
+const KERNEL: &[&str] = &[
+    "specialization.wgsl",
+    "bindings.wgsl",
+    "traverse.wgsl",
+    "texture.wgsl",
+    "integrator.wgsl",
+];
 /// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.
-const FROM_BUFFERS: &[&str] = &["scene.wgsl", "traverse.wgsl"];
+const FROM_BUFFERS: &str = "scene.wgsl";
 
 /// A compute shader's entry point and the file that it is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,9 +155,7 @@ impl Shaders {
         }
         match baked {
             Some(text) => source.append("(the scene as constants)", text),
-            None => FROM_BUFFERS
-                .iter()
-                .for_each(|name| source.append(name, self.text(name))),
+            None => source.append(FROM_BUFFERS, self.text(FROM_BUFFERS)),
         }
         source
     }

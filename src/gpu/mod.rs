@@ -5,9 +5,13 @@ mod compile;
 pub mod compose;
 mod device;
 mod pipeline;
+mod prune;
 mod renderer;
 pub mod spirv;
+mod validate;
 
+pub use bake::bake;
 pub use compile::{Checked, check};
-pub use device::{Choice, Device, Info, adapters, choose};
+pub use device::{Choice, Device, HOW_TO_GET_VULKAN, Info, adapters, choose};
 pub use renderer::{Gpu, Options};
+pub use validate::check_kernels;

@@ -39,7 +39,9 @@ pub struct Gpu {
     device: Device,
     kernels: Kernels,
     render: wgpu::ComputePipeline,
-    scene: [wgpu::Buffer; 6],
+    /// The kernel of first hits, once it was asked for.
+    aov: Option<wgpu::ComputePipeline>,
+    scene: [wgpu::Buffer; 9],
     work: wgpu::Buffer,
     film: Option<Target>,
     adaptive: bool,
@@ -81,8 +83,11 @@ impl Gpu {
                 device.upload(BufferUsages::UNIFORM, &[packed.camera]),
                 device.upload(BufferUsages::UNIFORM, &[packed.environment]),
                 device.upload(BufferUsages::STORAGE, &packed.primitives),
+                device.upload(BufferUsages::STORAGE, &packed.bounds),
                 device.upload(BufferUsages::STORAGE, &packed.materials),
                 device.upload(BufferUsages::STORAGE, &packed.lights),
+                device.upload(BufferUsages::STORAGE, &packed.textures),
+                device.upload(BufferUsages::STORAGE, &packed.texels),
                 device.upload(BufferUsages::STORAGE, &packed.filter_table),
             ]
         })?;
@@ -91,6 +96,7 @@ impl Gpu {
             device: device.clone(),
             kernels,
             render,
+            aov: None,
             scene,
             work,
             film: None,
@@ -111,16 +117,29 @@ impl Gpu {
         let size = region.pixels() * size_of::<T>() as u64;
         self.device.checked(|| {
             let buffer = self.device.buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-            let [camera, environment, primitives, materials, lights, filter] = &self.scene;
+            let [
+                camera,
+                environment,
+                primitives,
+                bounds,
+                materials,
+                lights,
+                textures,
+                texels,
+                filter_table,
+            ] = &self.scene;
             let buffers = [
                 &self.work,
                 camera,
                 environment,
                 primitives,
+                bounds,
                 materials,
                 lights,
+                textures,
+                texels,
+                filter_table,
                 &buffer,
-                filter,
             ];
             let entries: Vec<wgpu::BindGroupEntry> = (0..)
                 .zip(buffers)
@@ -187,7 +206,7 @@ impl Backend for Gpu {
 
     fn film(&mut self) -> Result<Film, RenderError> {
         let Some(film) = &self.film else {
-            return Ok(Film::new(Region::whole(0, 0), self.adaptive));
+            return Ok(Film::new(Region::whole(0, 0)));
         };
         let mut sums: Vec<Vec4> = self.device.download(&film.buffer)?;
         let moments = sums.split_off(film.region.pixels() as usize);
@@ -199,9 +218,13 @@ impl Backend for Gpu {
     }
 
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
-        let pipeline = self.kernels.compile(&self.device, Kernel::Aov)?;
+        let pipeline = match self.aov.take() {
+            Some(pipeline) => pipeline,
+            None => self.kernels.compile(&self.device, Kernel::Aov)?,
+        };
         let target = self.target::<FirstHit>(region)?;
         self.dispatch(&pipeline, &target, region, 0..0)?;
+        self.aov = Some(pipeline);
         self.device.download(&target.buffer)
     }
 

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, Vec2};
 
-use crate::scene::{Filter, FilterKind};
+use crate::scene::{PixelFilter, PixelFilterKind};
 
 /// Bins between the centre and the radius of a filter.
 pub const BINS: u32 = 128;
@@ -16,17 +16,17 @@ const STEPS: usize = 1 << 14;
 /// Mitchell: B = C = 1/3, stretched to the radius ("Reconstruction Filters in Computer Graphics", SIGGRAPH 1988, eq. 8).
 /// Gaussian: standard deviation of a third of the radius, lowered to reach 0 there. Blackman-Harris: the window of four
 /// terms with side lobes at -92 dB (Harris, "On the Use of Windows for Harmonic Analysis", Proc. IEEE 66(1), 1978).
-pub fn height(filter: Filter, distance: f64) -> f64 {
+pub fn height(filter: PixelFilter, distance: f64) -> f64 {
     let x = distance.abs() / filter.radius;
     if x > 1.0 {
         return 0.0;
     }
     match filter.kind {
-        FilterKind::Box => 1.0,
-        FilterKind::Triangle => 1.0 - x,
-        FilterKind::Gaussian => (-4.5 * x * x).exp() - f64::exp(-4.5),
-        FilterKind::Mitchell => mitchell(2.0 * x),
-        FilterKind::BlackmanHarris => {
+        PixelFilterKind::Box => 1.0,
+        PixelFilterKind::Triangle => 1.0 - x,
+        PixelFilterKind::Gaussian => (-4.5 * x * x).exp() - f64::exp(-4.5),
+        PixelFilterKind::Mitchell => mitchell(2.0 * x),
+        PixelFilterKind::BlackmanHarris => {
             let cosine = |k: f64| (k * PI * x).cos();
             0.35875 + 0.48829 * cosine(1.0) + 0.14128 * cosine(2.0) + 0.01168 * cosine(3.0)
         }
@@ -45,7 +45,7 @@ fn mitchell(x: f64) -> f64 {
 /// The edges and weights of a filter's bins: [`BINS`] + 1 pairs of a bin's inner edge and its weight, the last one with
 /// the outermost edge. All bins are met equally often. Those of a lobe have the same integral, and a weight that makes
 /// up for the lobe's share of bins, which is a whole number: close to 1, below 0 in negative lobes.
-pub fn table(filter: Filter) -> Vec<Vec2> {
+pub fn table(filter: PixelFilter) -> Vec<Vec2> {
     let lobes = lobes(filter);
     let total: f64 = lobes.iter().map(|lobe| lobe.integral().abs()).sum();
     let mut table = Vec::new();
@@ -76,7 +76,7 @@ struct Lobe {
 }
 
 impl Lobe {
-    fn new(filter: Filter, start: f64, end: f64) -> Lobe {
+    fn new(filter: PixelFilter, start: f64, end: f64) -> Lobe {
         let step = (end - start) / STEPS as f64;
         let at = |i: f64| height(filter, start + step * i);
         let mut sum = 0.0;
@@ -104,8 +104,8 @@ impl Lobe {
 }
 
 /// The lobes of a filter: one, but for Mitchell's, which has a negative one.
-fn lobes(filter: Filter) -> Vec<Lobe> {
-    if filter.kind != FilterKind::Mitchell {
+fn lobes(filter: PixelFilter) -> Vec<Lobe> {
+    if filter.kind != PixelFilterKind::Mitchell {
         return vec![Lobe::new(filter, 0.0, filter.radius)];
     }
     let (mut positive, mut negative) = (0.5 * filter.radius, 0.75 * filter.radius);

@@ -9,6 +9,8 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
+pub use super::describe_texture::*;
+
 /// A whole scene file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Description {
@@ -18,6 +20,8 @@ pub struct Description {
     pub camera: CameraDescription,
     /// `[render]`
     pub render: RenderDescription,
+    /// `[textures.NAME]`
+    pub textures: BTreeMap<String, TextureDescription>,
     /// `[materials.NAME]`
     pub materials: BTreeMap<String, MaterialDescription>,
     /// `[[lights]]`
@@ -48,6 +52,12 @@ pub struct RenderDescription {
     pub background: DVec3,
     /// Relative offset of shadow rays.
     pub shadow_epsilon: f64,
+    /// Whether glass casts shadows.
+    pub shadows: super::Shadows,
+    /// Most bounces of a path by mirrors and glass.
+    pub max_depth: u32,
+    /// Whether textures are filtered over the footprint of each ray.
+    pub ray_differentials: bool,
     /// Seed of all random patterns.
     pub seed: u32,
     /// Samples of every pixel.
@@ -55,7 +65,7 @@ pub struct RenderDescription {
     /// Samples of every area light at every hit.
     pub light_samples: SamplesDescription,
     /// What a pixel's samples are weighted by.
-    pub filter: FilterDescription,
+    pub filter: PixelFilterDescription,
     /// Further samples where they are needed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub adaptive: Option<AdaptiveDescription>,
@@ -72,11 +82,14 @@ impl Default for RenderDescription {
             ambient: DVec3::ZERO,
             background: DVec3::ZERO,
             shadow_epsilon: 1e-5,
+            shadows: super::Shadows::Opaque,
+            max_depth: 8,
+            ray_differentials: true,
             seed: 0,
             pixel_samples: samples.clone(),
             light_samples: samples,
-            filter: FilterDescription {
-                kind: FilterKind::Box,
+            filter: PixelFilterDescription {
+                kind: PixelFilterKind::Box,
                 radius: None,
             },
             adaptive: None,
@@ -116,6 +129,28 @@ pub enum Pattern {
 }
 
 impl Pattern {
+    /// All of them.
+    pub const ALL: [Pattern; 6] = [
+        Pattern::Grid,
+        Pattern::RotatedGrid,
+        Pattern::Jittered,
+        Pattern::Random,
+        Pattern::Halton,
+        Pattern::Sobol,
+    ];
+
+    /// The name in files and options.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Pattern::Grid => "grid",
+            Pattern::RotatedGrid => "rotated_grid",
+            Pattern::Jittered => "jittered",
+            Pattern::Random => "random",
+            Pattern::Halton => "halton",
+            Pattern::Sobol => "sobol",
+        }
+    }
+
     /// Whether the pattern is made of n x n cells, so that its count must be a square number.
     pub const fn needs_square(self) -> bool {
         matches!(self, Pattern::Grid | Pattern::RotatedGrid | Pattern::Jittered)
@@ -141,10 +176,10 @@ pub struct AdaptiveDescription {
 /// A reconstruction filter.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub struct FilterDescription {
+pub struct PixelFilterDescription {
     /// Its form.
     #[serde(rename = "type")]
-    pub kind: FilterKind,
+    pub kind: PixelFilterKind,
     /// How far it reaches, in pixels; absent, what is usual for its form.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius: Option<f64>,
@@ -155,7 +190,7 @@ pub struct FilterDescription {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
-pub enum FilterKind {
+pub enum PixelFilterKind {
     /// Constant.
     Box,
     /// Linear from the middle to the radius.
@@ -168,14 +203,14 @@ pub enum FilterKind {
     BlackmanHarris,
 }
 
-impl FilterKind {
+impl PixelFilterKind {
     /// The usual radius in pixels.
     pub const fn radius(self) -> f64 {
         match self {
-            FilterKind::Box => 0.5,
-            FilterKind::Triangle => 1.0,
-            FilterKind::Gaussian | FilterKind::BlackmanHarris => 1.5,
-            FilterKind::Mitchell => 2.0,
+            PixelFilterKind::Box => 0.5,
+            PixelFilterKind::Triangle => 1.0,
+            PixelFilterKind::Gaussian | PixelFilterKind::BlackmanHarris => 1.5,
+            PixelFilterKind::Mitchell => 2.0,
         }
     }
 }
@@ -218,6 +253,8 @@ macro_rules! tagged {
         }
     };
 }
+
+pub(super) use tagged;
 
 tagged! {
     /// `[camera]`
@@ -267,6 +304,10 @@ tagged! {
     MaterialDescription {
         /// Phong's reflection model.
         "phong" => Phong(PhongDescription),
+        /// A mirror.
+        "mirror" => Mirror(MirrorDescription),
+        /// Clear glass.
+        "glass" => Glass(GlassDescription),
     }
 }
 
@@ -275,16 +316,42 @@ tagged! {
 #[serde(deny_unknown_fields)]
 pub struct PhongDescription {
     /// Short for the three factors.
-    pub color: Option<DVec3>,
+    pub color: Option<ColorDescription>,
     /// Factor of the ambient light.
-    pub ambient: Option<DVec3>,
+    pub ambient: Option<ColorDescription>,
     /// Factor of the diffuse term.
-    pub diffuse: Option<DVec3>,
+    pub diffuse: Option<ColorDescription>,
     /// Factor of the specular term.
-    pub specular: Option<DVec3>,
+    pub specular: Option<ColorDescription>,
     /// Exponent of the specular term.
     #[serde(default = "sixteen")]
     pub shininess: f64,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
+}
+
+/// A mirror.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct MirrorDescription {
+    /// Factor of the reflected light.
+    #[serde(default)]
+    pub tint: ColorDescription,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
+}
+
+/// Clear glass.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct GlassDescription {
+    /// Index of refraction.
+    pub ior: f64,
+    /// Factor of the light that passes the surface.
+    #[serde(default)]
+    pub tint: ColorDescription,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
 }
 
 tagged! {
