@@ -161,6 +161,11 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
 }
 
 impl Device {
+    /// What wgpu calls it, for kernels other than the renderer's.
+    pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
+        (&self.device, &self.queue)
+    }
+
     /// Runs calls to wgpu and returns the first error that they raise.
     pub(super) fn checked<T>(&self, calls: impl FnOnce() -> T) -> Result<T, RenderError> {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
