@@ -24,21 +24,33 @@ fn small(description: &Description) -> Description {
     let scale = f64::from(d.image.width) / 96.0;
     d.image.width = 96;
     d.image.height = (f64::from(d.image.height) / scale) as u32;
-    d.render.pixel_samples = SamplesDescription { pattern: Pattern::Grid, count: 4 };
-    d.render.light_samples = SamplesDescription { pattern: Pattern::Grid, count: 16 };
+    d.render.pixel_samples = SamplesDescription {
+        pattern: Pattern::Grid,
+        count: 4,
+    };
+    d.render.light_samples = SamplesDescription {
+        pattern: Pattern::Grid,
+        count: 16,
+    };
     d
 }
 
 fn known() -> impl Iterator<Item = (String, Description)> {
     let scenes = scenes::descriptions().into_iter();
-    scenes.filter(|(name, _)| !BEYOND.iter().any(|(beyond, _)| beyond == name)).map(|(name, d)| (name, small(&d)))
+    scenes
+        .filter(|(name, _)| !BEYOND.iter().any(|(beyond, _)| beyond == name))
+        .map(|(name, d)| (name, small(&d)))
 }
 
 /// The share of pixels that differ by more than the tolerance.
 fn differing(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     assert_eq!(a.len(), b.len());
     let agree = |a: &f64, b: &f64| (a - b).abs() <= TOLERANCE * (1.0 + b.abs());
-    let differ = a.iter().zip(b).filter(|(a, b)| !a.iter().zip(*b).all(|(a, b)| agree(a, b))).count();
+    let differ = a
+        .iter()
+        .zip(b)
+        .filter(|(a, b)| !a.iter().zip(*b).all(|(a, b)| agree(a, b)))
+        .count();
     differ as f64 / a.len() as f64
 }
 
@@ -49,7 +61,11 @@ fn pictures_are_the_oracles() {
         for way in both() {
             let picture = means(&render(&scenes::packed(&description), way));
             let share = differing(&picture, &truth);
-            let worst = picture.iter().flatten().zip(truth.iter().flatten()).map(|(a, b)| (a - b).abs());
+            let worst = picture
+                .iter()
+                .flatten()
+                .zip(truth.iter().flatten())
+                .map(|(a, b)| (a - b).abs());
             let mean = |p: &[[f64; 3]]| p.iter().flatten().sum::<f64>() / p.len() as f64;
             println!(
                 "{name} {way:?}: {} of {} pixels differ by more than {TOLERANCE}, worst {:.1e}, mean by {:.1e}",
@@ -59,7 +75,10 @@ fn pictures_are_the_oracles() {
                 mean(&picture) / mean(&truth) - 1.0
             );
             assert!(share <= EDGES, "{name}, {way:?}: {share} of the pixels differ");
-            assert!((mean(&picture) / mean(&truth) - 1.0).abs() < 1e-4, "{name}, {way:?}: the mean differs");
+            assert!(
+                (mean(&picture) / mean(&truth) - 1.0).abs() < 1e-4,
+                "{name}, {way:?}: the mean differs"
+            );
         }
     }
 }
@@ -84,7 +103,10 @@ fn a_flawed_oracle_is_found() {
                 found.push(flaw);
             }
             let everywhere = matches!(flaw, Flaw::MissingCosine | Flaw::ShiftedPixel | Flaw::CornerSamples);
-            assert!(!everywhere || share > 10.0 * EDGES, "{name}: {flaw:?} differs in {share} of the pixels only");
+            assert!(
+                !everywhere || share > 10.0 * EDGES,
+                "{name}: {flaw:?} differs in {share} of the pixels only"
+            );
         }
     }
     for flaw in [Flaw::SwappedAxes, Flaw::NoShadows, Flaw::Exponent] {
@@ -94,7 +116,9 @@ fn a_flawed_oracle_is_found() {
 
 /// Whether a first hit is what the oracle met.
 fn same_first_hit(hit: &FirstHit, meeting: &Option<Meeting>) -> bool {
-    let Some(meeting) = meeting else { return hit.shape == NOTHING && hit.depth == 0.0 };
+    let Some(meeting) = meeting else {
+        return hit.shape == NOTHING && hit.depth == 0.0;
+    };
     let close = |a: f64, b: f64| (a - b).abs() <= 2e-5 * (1.0 + b.abs());
     let (normal, uv): (DVec3, DVec2) = (hit.normal.as_dvec3(), hit.uv.as_dvec2());
     // An angle may be told from either side of where it starts, and has no digits near its pole.
@@ -116,12 +140,19 @@ fn first_hits_are_the_oracles() {
             let hits = first_hits(&scenes::packed(&description), way);
             let differing = |truth: &[Option<Meeting>]| {
                 assert_eq!(hits.len(), truth.len());
-                let differ = hits.iter().zip(truth).filter(|(hit, meeting)| !same_first_hit(hit, meeting)).count();
+                let differ = hits
+                    .iter()
+                    .zip(truth)
+                    .filter(|(hit, meeting)| !same_first_hit(hit, meeting))
+                    .count();
                 differ as f64 / hits.len() as f64
             };
             let share = differing(&truth);
             println!("{name} {way:?}: the first hits of {share} of the pixels differ");
-            assert!(share <= EDGES, "{name}, {way:?}: the first hits of {share} of the pixels differ");
+            assert!(
+                share <= EDGES,
+                "{name}, {way:?}: the first hits of {share} of the pixels differ"
+            );
             assert!(differing(&shifted) > 0.1, "{name}: a shifted pixel is not found");
         }
     }

@@ -109,7 +109,11 @@ impl Situation {
         let rows = columns.inverse().transpose();
         let local = local_point(random);
         let away = vector(random) * random.pick(&[0.3, 1.0, 3.0, 300.0]);
-        let local_start = if random.once_in(8) { local + DVec3::new(away.x, away.y, 0.0) } else { local + away };
+        let local_start = if random.once_in(8) {
+            local + DVec3::new(away.x, away.y, 0.0)
+        } else {
+            local + away
+        };
         let target = center + columns * local;
         let start = center + columns * local_start;
         let primitive = Primitive {
@@ -125,7 +129,12 @@ impl Situation {
         let directional = random.once_in(4);
         let size = scale * random.pick(&[0.0, 0.3, 3.0]);
         let light = Light {
-            center: if directional { (target - start).normalize_or(DVec3::Z) } else { target + (target - start) }.as_vec3(),
+            center: if directional {
+                (target - start).normalize_or(DVec3::Z)
+            } else {
+                target + (target - start)
+            }
+            .as_vec3(),
             reach: if directional { 1e10 } else { 1.0 - 1e-5 },
             u: (vector(random) * size).as_vec3(),
             finite: if directional { 0.0 } else { 1.0 },
@@ -135,29 +144,57 @@ impl Situation {
             number: random.below(4),
         };
         let direction = target - start;
-        Situation { primitive, local, target, start, local_start, direction, light }
+        Situation {
+            primitive,
+            local,
+            target,
+            start,
+            local_start,
+            direction,
+            light,
+        }
     }
 
     /// An argument's words, by its type, and where a type says too little by its name.
-    fn argument(&self, (function, name): (&str, &str), module: &Module, ty: Handle<Type>, random: &Random, words: &mut Vec<u32>) {
+    fn argument(
+        &self,
+        (function, name): (&str, &str),
+        module: &Module,
+        ty: Handle<Type>,
+        random: &Random,
+        words: &mut Vec<u32>,
+    ) {
         match type_name(module, ty).as_str() {
             "Primitive" => self.primitive.write(words),
             "Light" => self.light.write(words),
             "Ray" => self.ray(random).write(words),
             "Hit" => {
-                Hit { t: random.pick(&[FAR, self.t() as f32]), primitive: random.pick(&[NOTHING, 0, 7]) }.write(words);
+                Hit {
+                    t: random.pick(&[FAR, self.t() as f32]),
+                    primitive: random.pick(&[NOTHING, 0, 7]),
+                }
+                .write(words);
             }
             "Surface" => self.surface(random).write(words),
             "Segments" => {
                 let towards = (self.target - self.start).as_vec3();
-                Segments { towards, u: self.light.u, v: self.light.v }.write(words);
+                Segments {
+                    towards,
+                    u: self.light.u,
+                    v: self.light.v,
+                }
+                .write(words);
             }
             "Block" => block(random).write(words),
             "Sphere" => self.sphere(random).write(words),
             "Cone" => cone_to_light(&self.light, self.start.as_vec3()).write(words),
             "Material" => material(random).write(words),
             "Camera" => self.camera(random).write(words),
-            "Lobes" => Lobes { diffuse: random.unit() as f32, specular: random.unit() as f32 }.write(words),
+            "Lobes" => Lobes {
+                diffuse: random.unit() as f32,
+                specular: random.unit() as f32,
+            }
+            .write(words),
             "vec3<f32>" => self.vector(name, random).write(words),
             "f32" => self.number(name, random).write(words),
             "u32" => whole(function, name, random).write(words),
@@ -180,22 +217,41 @@ impl Situation {
             1 => -self.direction,
             _ => self.direction,
         };
-        let origin = if random.once_in(8) { self.primitive.center.as_dvec3() } else { self.start };
-        Ray { origin: origin.as_vec3(), direction: along.normalize_or(DVec3::X).as_vec3() }
+        let origin = if random.once_in(8) {
+            self.primitive.center.as_dvec3()
+        } else {
+            self.start
+        };
+        Ray {
+            origin: origin.as_vec3(),
+            direction: along.normalize_or(DVec3::X).as_vec3(),
+        }
     }
 
     fn surface(&self, random: &Random) -> Surface {
         let normal = vector(random).normalize().as_vec3();
         let position = self.start.as_vec3();
-        let wo = if random.once_in(4) { normal } else { vector(random).normalize().as_vec3() };
-        Surface { position, normal, wo, start: position + normal * 1e-5 }
+        let wo = if random.once_in(4) {
+            normal
+        } else {
+            vector(random).normalize().as_vec3()
+        };
+        Surface {
+            position,
+            normal,
+            wo,
+            start: position + normal * 1e-5,
+        }
     }
 
     /// About the way to the light, or off it.
     fn sphere(&self, random: &Random) -> Sphere {
         let away = self.direction.length() * random.pick(&[0.0, 0.1, 0.5, 2.0]);
         let center = self.start + self.direction * random.between(-0.5, 1.5) + vector(random) * away;
-        Sphere { center: center.as_vec3(), radius: (away * random.pick(&[0.5, 1.0, 0.1, 1e18])) as f32 }
+        Sphere {
+            center: center.as_vec3(),
+            radius: (away * random.pick(&[0.5, 1.0, 0.1, 1e18])) as f32,
+        }
     }
 
     fn camera(&self, random: &Random) -> Camera {
@@ -231,7 +287,12 @@ impl Situation {
             "epsilon" => random.pick(&[1e-5, 1e-4, 0.0]),
             _ => {
                 let (unit, sign) = (random.unit(), random.pick(&[1.0, -1.0]));
-                random.pick(&[unit, unit * sign, sign * random.magnitude(-5.0, 3.0), 1000.0 * unit.floor()]) as f32
+                random.pick(&[
+                    unit,
+                    unit * sign,
+                    sign * random.magnitude(-5.0, 3.0),
+                    1000.0 * unit.floor(),
+                ]) as f32
             }
         }
     }
@@ -285,7 +346,11 @@ fn material(random: &Random) -> Material {
     material.diffuse = color(random);
     material.specular = color(random);
     material.exponent = exponent;
-    material.shininess = if random.once_in(2) { exponent as f32 } else { random.magnitude(-6.0, 6.0) as f32 };
+    material.shininess = if random.once_in(2) {
+        exponent as f32
+    } else {
+        random.magnitude(-6.0, 6.0) as f32
+    };
     material
 }
 
@@ -298,7 +363,14 @@ fn whole(function: &str, name: &str, random: &Random) -> u32 {
         "count" => 1 + random.below(256),
         "i" => random.below(32),
         "bits" | "exponent_bits" => random.below(14),
-        _ => random.pick(&[0, 1, random.below(300), random.below(1 << 16), random.bits() as u32, u32::MAX]),
+        _ => random.pick(&[
+            0,
+            1,
+            random.below(300),
+            random.below(1 << 16),
+            random.bits() as u32,
+            u32::MAX,
+        ]),
     }
 }
 

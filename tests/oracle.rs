@@ -42,10 +42,18 @@ struct Solid {
 
 enum Form {
     /// The points p with (p, 1)^T Q (p, 1) = 0, and the map from its local space.
-    Quadric { q: DMat4, from_local: DMat4 },
+    Quadric {
+        q: DMat4,
+        from_local: DMat4,
+    },
     Triangle([DVec3; 3]),
     /// Centre, unit tangent and bitangent, and half the sizes along them; endless if there are no sizes.
-    Flat { center: DVec3, tangent: DVec3, bitangent: DVec3, half: Option<DVec2> },
+    Flat {
+        center: DVec3,
+        tangent: DVec3,
+        bitangent: DVec3,
+        half: Option<DVec2>,
+    },
 }
 
 /// What a ray meets.
@@ -63,13 +71,21 @@ impl<'a> Oracle<'a> {
         let mut solids = Vec::new();
         for (shape, description) in scene.shapes.iter().enumerate() {
             let (material, forms) = forms(description, flaw);
-            let solid = |form| Solid { form, shape, material: Some(material.clone()) };
+            let solid = |form| Solid {
+                form,
+                shape,
+                material: Some(material.clone()),
+            };
             solids.extend(forms.into_iter().map(solid));
         }
         for (number, light) in scene.lights.iter().enumerate() {
             if let LightDescription::Rectangle(light) = light {
                 let form = flat(light.center, light.normal, light.tangent, Some(light.size), flaw);
-                solids.push(Solid { form, shape: scene.shapes.len() + number, material: None });
+                solids.push(Solid {
+                    form,
+                    shape: scene.shapes.len() + number,
+                    material: None,
+                });
             }
         }
         Oracle { scene, solids, flaw }
@@ -81,7 +97,10 @@ impl<'a> Oracle<'a> {
         let places = self.grid(self.scene.render.pixel_samples.count);
         let pixel = |i: u32| {
             let corner = DVec2::new(f64::from(i % width), f64::from(i / width));
-            let sum: DVec3 = places.iter().map(|place| self.radiance(self.camera_ray(corner + *place))).sum();
+            let sum: DVec3 = places
+                .iter()
+                .map(|place| self.radiance(self.camera_ray(corner + *place)))
+                .sum();
             (sum / places.len() as f64).to_array()
         };
         (0..width * height).map(pixel).collect()
@@ -116,13 +135,20 @@ impl<'a> Oracle<'a> {
             let right = forward.cross(up).normalize();
             (forward, right, right.cross(forward))
         };
-        let column = if self.flaw == Flaw::ShiftedPixel { at.x - 1.0 } else { at.x };
+        let column = if self.flaw == Flaw::ShiftedPixel {
+            at.x - 1.0
+        } else {
+            at.x
+        };
         let (to_right, to_top) = (column - width / 2.0, height / 2.0 - at.y);
         match &self.scene.camera {
             CameraDescription::Perspective(c) => {
                 let (forward, right, up) = basis(c.position, c.look_at, c.up);
                 let pixel = 2.0 * (c.fov.to_radians() / 2.0).tan() / height;
-                (c.position, (forward + right * (to_right * pixel) + up * (to_top * pixel)).normalize())
+                (
+                    c.position,
+                    (forward + right * (to_right * pixel) + up * (to_top * pixel)).normalize(),
+                )
             }
             CameraDescription::Orthographic(c) => {
                 let (forward, right, up) = basis(c.position, c.look_at, c.up);
@@ -144,12 +170,20 @@ impl<'a> Oracle<'a> {
         }
         let (t, i) = nearest?;
         let (normal, uv) = facing(&self.solids[i].form, origin + direction * t);
-        Some(Meeting { t, shape: self.solids[i].shape, normal, uv, solid: i })
+        Some(Meeting {
+            t,
+            shape: self.solids[i].shape,
+            normal,
+            uv,
+            solid: i,
+        })
     }
 
     fn radiance(&self, (origin, direction): (DVec3, DVec3)) -> DVec3 {
         let render = &self.scene.render;
-        let Some(meeting) = self.nearest(origin, direction) else { return render.background };
+        let Some(meeting) = self.nearest(origin, direction) else {
+            return render.background;
+        };
         let Some(material) = &self.solids[meeting.solid].material else {
             return light_color(&self.scene.lights[meeting.shape - self.scene.shapes.len()]);
         };
@@ -160,7 +194,11 @@ impl<'a> Oracle<'a> {
         let factor = |own: Option<DVec3>| own.or(phong.color).expect("a checked material");
         let point = origin + direction * meeting.t;
         let viewer = -direction;
-        let normal = if meeting.normal.dot(viewer) < 0.0 { -meeting.normal } else { meeting.normal };
+        let normal = if meeting.normal.dot(viewer) < 0.0 {
+            -meeting.normal
+        } else {
+            meeting.normal
+        };
         // "how far above the surface a shadow ray starts, relative to the largest coordinate there"
         let coordinate = point.abs().max_element().max(meeting.t);
         let above = point + normal * (render.shadow_epsilon * coordinate);
@@ -191,7 +229,11 @@ impl<'a> Oracle<'a> {
             return DVec3::ZERO;
         }
         let mirrored = (-light).reflect(normal);
-        let exponent = if self.flaw == Flaw::Exponent { phong.shininess - 1.0 } else { phong.shininess };
+        let exponent = if self.flaw == Flaw::Exponent {
+            phong.shininess - 1.0
+        } else {
+            phong.shininess
+        };
         let highlight = mirrored.dot(viewer).max(0.0).powf(exponent);
         let diffuse = if self.flaw == Flaw::MissingCosine { 1.0 } else { cosine };
         factor(phong.diffuse) * diffuse + factor(phong.specular) * highlight
@@ -204,10 +246,12 @@ impl<'a> Oracle<'a> {
             LightDescription::Rectangle(light) => {
                 let (tangent, bitangent) = frame(light.normal, light.tangent);
                 let [width, height] = sizes(light.size, self.flaw);
-                let place = |at: DVec2| {
-                    light.center + tangent * (width * (at.x - 0.5)) + bitangent * (height * (at.y - 0.5))
-                };
-                self.grid(self.scene.render.light_samples.count).into_iter().map(|at| way(place(at))).collect()
+                let place =
+                    |at: DVec2| light.center + tangent * (width * (at.x - 0.5)) + bitangent * (height * (at.y - 0.5));
+                self.grid(self.scene.render.light_samples.count)
+                    .into_iter()
+                    .map(|at| way(place(at)))
+                    .collect()
             }
             LightDescription::Point(light) => vec![way(light.position)],
             LightDescription::Directional(light) => vec![(-light.direction.normalize(), f64::INFINITY)],
@@ -219,7 +263,9 @@ impl<'a> Oracle<'a> {
     fn hidden(&self, from: DVec3, direction: DVec3, distance: f64) -> bool {
         let end = distance * (1.0 - self.scene.render.shadow_epsilon);
         let shapes = self.solids.iter().filter(|solid| solid.material.is_some());
-        shapes.flat_map(|solid| crossings(&solid.form, from, direction)).any(|t| t > 0.0 && t < end)
+        shapes
+            .flat_map(|solid| crossings(&solid.form, from, direction))
+            .any(|t| t > 0.0 && t < end)
     }
 }
 
@@ -240,13 +286,22 @@ fn frame(normal: DVec3, tangent: DVec3) -> (DVec3, DVec3) {
 
 fn sizes(size: [f64; 2], flaw: Flaw) -> [f64; 2] {
     let [width, height] = size;
-    if flaw == Flaw::SwappedAxes { [height, width] } else { size }
+    if flaw == Flaw::SwappedAxes {
+        [height, width]
+    } else {
+        size
+    }
 }
 
 fn flat(center: DVec3, normal: DVec3, tangent: DVec3, size: Option<[f64; 2]>, flaw: Flaw) -> Form {
     let (tangent, bitangent) = frame(normal, tangent);
     let half = size.map(|size| DVec2::from_array(sizes(size, flaw)) / 2.0);
-    Form::Flat { center, tangent, bitangent, half }
+    Form::Flat {
+        center,
+        tangent,
+        bitangent,
+        half,
+    }
 }
 
 fn quadric(center: DVec3, axes: [DVec3; 3]) -> Form {
@@ -254,15 +309,19 @@ fn quadric(center: DVec3, axes: [DVec3; 3]) -> Form {
     let from_local = DMat4::from_cols(a.extend(0.0), b.extend(0.0), c.extend(0.0), center.extend(1.0));
     let to_local = from_local.inverse();
     let sphere = DMat4::from_diagonal(DVec4::new(1.0, 1.0, 1.0, -1.0));
-    Form::Quadric { q: to_local.transpose() * sphere * to_local, from_local }
+    Form::Quadric {
+        q: to_local.transpose() * sphere * to_local,
+        from_local,
+    }
 }
 
 /// A shape's material and its surfaces.
 fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
     match shape {
-        ShapeDescription::Rectangle(r) => {
-            (r.material.clone(), vec![flat(r.center, r.normal, r.tangent, Some(r.size), flaw)])
-        }
+        ShapeDescription::Rectangle(r) => (
+            r.material.clone(),
+            vec![flat(r.center, r.normal, r.tangent, Some(r.size), flaw)],
+        ),
         ShapeDescription::Plane(p) => (p.material.clone(), vec![flat(p.point, p.normal, p.tangent, None, flaw)]),
         ShapeDescription::Ellipsoid(e) => (e.material.clone(), vec![quadric(e.center, [e.a, e.b, e.c])]),
         ShapeDescription::Sphere(s) => {
@@ -306,15 +365,23 @@ fn crossings(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
             let q = to_origin.cross(edge1);
             let v = direction.dot(q) / determinant;
             let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
-            if inside { vec![edge2.dot(q) / determinant] } else { Vec::new() }
+            if inside {
+                vec![edge2.dot(q) / determinant]
+            } else {
+                Vec::new()
+            }
         }
-        Form::Flat { center, tangent, bitangent, half } => {
+        Form::Flat {
+            center,
+            tangent,
+            bitangent,
+            half,
+        } => {
             let normal = tangent.cross(*bitangent);
             let t = (*center - origin).dot(normal) / direction.dot(normal);
             let place = origin + direction * t - *center;
-            let inside = half.is_none_or(|half| {
-                place.dot(*tangent).abs() <= half.x && place.dot(*bitangent).abs() <= half.y
-            });
+            let inside =
+                half.is_none_or(|half| place.dot(*tangent).abs() <= half.x && place.dot(*bitangent).abs() <= half.y);
             if inside && t.is_finite() { vec![t] } else { Vec::new() }
         }
     }
@@ -329,16 +396,27 @@ fn facing(form: &Form, point: DVec3) -> (DVec3, DVec2) {
             let turn = std::f64::consts::TAU;
             let longitude = local.y.atan2(local.x) / turn;
             let latitude = 0.5 + local.z.clamp(-1.0, 1.0).asin() / (turn / 2.0);
-            (gradient.truncate().normalize(), DVec2::new(longitude - longitude.floor(), latitude))
+            (
+                gradient.truncate().normalize(),
+                DVec2::new(longitude - longitude.floor(), latitude),
+            )
         }
         Form::Triangle([v0, v1, v2]) => {
             let normal = (*v1 - *v0).cross(*v2 - *v1);
             // Weights as ratios of areas.
             let area = |a: DVec3, b: DVec3, c: DVec3| (b - a).cross(c - b).dot(normal);
             let whole = area(*v0, *v1, *v2);
-            (normal.normalize(), DVec2::new(area(*v0, point, *v2), area(*v0, *v1, point)) / whole)
+            (
+                normal.normalize(),
+                DVec2::new(area(*v0, point, *v2), area(*v0, *v1, point)) / whole,
+            )
         }
-        Form::Flat { center, tangent, bitangent, half } => {
+        Form::Flat {
+            center,
+            tangent,
+            bitangent,
+            half,
+        } => {
             let place = DVec2::new((point - *center).dot(*tangent), (point - *center).dot(*bitangent));
             let uv = half.map_or(place, |half| place / (2.0 * half) + 0.5);
             (tangent.cross(*bitangent), uv)

@@ -34,7 +34,10 @@ pub fn backend<'a>(packed: &'a Packed, way: Way) -> Box<dyn Backend + 'a> {
         return Box::new(Cpu::new(packed));
     }
     let device = adapter::device().expect("a device");
-    let options = Options { exact: way != Way::Plain && device.info.exact, baked: way == Way::Baked };
+    let options = Options {
+        exact: way != Way::Plain && device.info.exact,
+        baked: way == Way::Baked,
+    };
     let gpu = Gpu::new(device, packed, sources::shaders(), options);
     Box::new(gpu.unwrap_or_else(|error| panic!("{way:?}: {error}")))
 }
@@ -42,7 +45,10 @@ pub fn backend<'a>(packed: &'a Packed, way: Way) -> Box<dyn Backend + 'a> {
 /// The whole picture of a backend, cut in some way.
 pub fn film(backend: &mut dyn Backend, packed: &Packed, cut: &Cut) -> Film {
     let whole = Region::whole(packed.camera.width, packed.camera.height);
-    let mut film = Film { region: whole, sums: Vec::new() };
+    let mut film = Film {
+        region: whole,
+        sums: Vec::new(),
+    };
     let mut output = |band: Film| {
         film.sums.extend(band.sums);
         Ok(())

@@ -8,7 +8,9 @@ use wgray::cpu::light::{Segments, segment, segments_to_light, segments_to_local}
 use wgray::cpu::math::{atan2, cross, dot, exp2, log2, max, min, normalize, power, power_whole};
 use wgray::cpu::phong::{Lobes, phong_block, phong_lobes, phong_power};
 use wgray::cpu::plane::{intersect_plane, plane_blocks};
-use wgray::cpu::ray::{Hit, Ray, closer, crosses_plane, plane_distance, point_to_local, scaled_crossing, vector_to_local};
+use wgray::cpu::ray::{
+    Hit, Ray, closer, crosses_plane, plane_distance, point_to_local, scaled_crossing, vector_to_local,
+};
 use wgray::cpu::rectangle::{intersect_rectangle, rectangle_blocks};
 use wgray::cpu::rng::{hash4, unit_float};
 use wgray::cpu::sampling::{grid_sample, random_sample, sample_key, sample_square};
@@ -106,7 +108,10 @@ const EXCEPTIONS: &[(&str, &str)] = &[];
 
 /// The twin of a function.
 pub fn twin(name: &str) -> &'static Probe {
-    PROBES.iter().find(|probe| probe.name == name).unwrap_or_else(|| panic!("{name} has no probe"))
+    PROBES
+        .iter()
+        .find(|probe| probe.name == name)
+        .unwrap_or_else(|| panic!("{name} has no probe"))
 }
 
 impl Probe {
@@ -117,7 +122,12 @@ impl Probe {
         while !words.is_empty() {
             let before = out.len();
             (self.run)(&mut words, &mut out);
-            assert_eq!(out.len() - before, words_out, "{}: the twin's result has other words", self.name);
+            assert_eq!(
+                out.len() - before,
+                words_out,
+                "{}: the twin's result has other words",
+                self.name
+            );
         }
         out
     }
@@ -183,8 +193,15 @@ fn every_shared_function_has_a_probe() {
         let arguments: Vec<String> = function.arguments().into_iter().map(|(name, _)| name).collect();
         assert_eq!(arguments, probe.arguments, "{file}: {name}");
     }
-    for name in PROBES.iter().map(|probe| probe.name).chain(EXCEPTIONS.iter().map(|(name, _)| *name)) {
-        assert!(names.iter().any(|n| n == name), "{name} is probed, but no shared file has it");
+    for name in PROBES
+        .iter()
+        .map(|probe| probe.name)
+        .chain(EXCEPTIONS.iter().map(|(name, _)| *name))
+    {
+        assert!(
+            names.iter().any(|n| n == name),
+            "{name} is probed, but no shared file has it"
+        );
     }
 }
 
@@ -194,9 +211,12 @@ fn functions_give_the_same_bits_on_gpu_and_cpu() {
     let source = shared_source();
     let module = parse(&source);
     let functions = functions(&module, &source);
-    let probed = functions.iter().filter(|(_, f)| !EXCEPTIONS.iter().any(|(exception, _)| *exception == f.name()));
-    let problems: Vec<String> =
-        probed.filter_map(|(file, f)| compare(device, f).err().map(|message| format!("{file}: {message}"))).collect();
+    let probed = functions
+        .iter()
+        .filter(|(_, f)| !EXCEPTIONS.iter().any(|(exception, _)| *exception == f.name()));
+    let problems: Vec<String> = probed
+        .filter_map(|(file, f)| compare(device, f).err().map(|message| format!("{file}: {message}")))
+        .collect();
     assert!(problems.is_empty(), "{}", problems.join("\n"));
 }
 
@@ -207,7 +227,9 @@ fn inputs_take_both_ways_of_every_decision() {
     let module = parse(&source);
     for (file, function) in functions(&module, &source) {
         let (name, kinds) = (function.name(), function.words_out());
-        let Some(probe) = PROBES.iter().find(|probe| probe.name == name) else { continue };
+        let Some(probe) = PROBES.iter().find(|probe| probe.name == name) else {
+            continue;
+        };
         let words = inputs(&function, CALLS, 1);
         let results = probe.results(&words, kinds.len());
         let share = |wanted: &dyn Fn(u32) -> bool| {
@@ -215,17 +237,30 @@ fn inputs_take_both_ways_of_every_decision() {
         };
         if type_name(&module, function.result()) == "bool" {
             let yes = share(&|word| word != 0);
-            assert!((0.05..0.95).contains(&yes), "{file}: {name} is true for {yes} of the inputs");
+            assert!(
+                (0.05..0.95).contains(&yes),
+                "{file}: {name} is true for {yes} of the inputs"
+            );
         }
         if name.starts_with("intersect_") {
             let per = function.words_in();
             let limits = words.chunks_exact(per).map(|call| call[per - 1]);
-            let hits = results.iter().zip(limits).filter(|(result, limit)| **result != *limit).count();
+            let hits = results
+                .iter()
+                .zip(limits)
+                .filter(|(result, limit)| **result != *limit)
+                .count();
             let hits = hits as f64 / CALLS as f64;
-            assert!((0.1..0.9).contains(&hits), "{file}: {name} hits for {hits} of the inputs");
+            assert!(
+                (0.1..0.9).contains(&hits),
+                "{file}: {name} hits for {hits} of the inputs"
+            );
         }
         let nan = share(&|word| f32::from_bits(word).is_nan());
-        assert!(kinds[0] != ScalarKind::Float || nan < 0.5, "{file}: {name} is no number for {nan} of the inputs");
+        assert!(
+            kinds[0] != ScalarKind::Float || nan < 0.5,
+            "{file}: {name} is no number for {nan} of the inputs"
+        );
     }
 }
 
@@ -237,18 +272,27 @@ fn a_function_that_differs_by_one_ulp_is_found() {
         ("log2", "2.8853900817779268", "2.8853903"),
         ("exp2", "0.6931471805599453", "0.69314724"),
         ("unit_float", "5.9604644775390625e-8", "5.9604652e-8"),
-        ("dot", "a.x * b.x + a.y * b.y + a.z * b.z", "a.x * b.x + (a.y * b.y + a.z * b.z)"),
+        (
+            "dot",
+            "a.x * b.x + a.y * b.y + a.z * b.z",
+            "a.x * b.x + (a.y * b.y + a.z * b.z)",
+        ),
         ("min", "select(b, a, a < b)", "select(b, a, a <= b)"), // signed zeros
-        ("max", "select(b, a, a > b)", "select(a, b, a < b)"), // NaN
+        ("max", "select(b, a, a > b)", "select(a, b, a < b)"),  // NaN
     ] {
         let mut source = shared_source();
-        assert!(source.text.contains(from), "{name}: '{from}' is not there to be changed");
+        assert!(
+            source.text.contains(from),
+            "{name}: '{from}' is not there to be changed"
+        );
         let text = source.text.replacen(from, to, 1);
         source = wgray::gpu::compose::Source::default();
         source.append("changed", &text);
         let module = parse(&source);
-        let (_, function) =
-            functions(&module, &source).into_iter().find(|(_, f)| f.name() == name).expect("the function");
+        let (_, function) = functions(&module, &source)
+            .into_iter()
+            .find(|(_, f)| f.name() == name)
+            .expect("the function");
         let kinds = function.words_out();
         let words = inputs(&function, CALLS, 1);
         let changed = function.run_in(device, &source, &words);

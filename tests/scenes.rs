@@ -30,5 +30,8 @@ pub fn packed(description: &Description) -> Packed {
 
 /// The scenes as they are.
 pub fn all() -> Vec<(String, Packed)> {
-    descriptions().iter().map(|(name, description)| (name.clone(), packed(description))).collect()
+    descriptions()
+        .iter()
+        .map(|(name, description)| (name.clone(), packed(description)))
+        .collect()
 }
