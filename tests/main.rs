@@ -2,11 +2,14 @@
 
 mod adapter;
 mod against_oracle;
+mod agreement;
+mod analytic;
 mod bounds;
 mod inputs;
 mod kernel;
 mod layout;
 mod oracle;
+mod patterns;
 mod pictures;
 mod probes;
 mod random;

@@ -1,0 +1,246 @@
+//! Pictures are the same on GPU and CPU: all scenes, all ways, several sizes, seeds and patterns of samples; and
+//! however the work is cut.
+
+use std::ops::Range;
+
+use glam::Vec4;
+use wgray::film::{Film, Region};
+use wgray::gpu::{Gpu, Options};
+use wgray::job::{Backend, Cut};
+use wgray::pack::{FirstHit, Packed};
+use wgray::scene::Description;
+
+use crate::adapter::{self, KNOWN, allowed, bit_exact, judge};
+use crate::pictures::{Way, backend, film, first_hits, render};
+use crate::{patterns, scenes, sources};
+
+/// Where bits are not promised, a pixel is within this of its value ...
+const RELATIVE: f64 = 1e-4;
+/// ... but for this share of the pixels, on edges where a comparison flips ...
+const EDGES: f64 = 1e-3;
+/// ... and the mean of the picture is within this of its own.
+const MEAN: f64 = 1e-5;
+
+/// How a picture of the device differs from the CPU's more than is promised.
+pub fn compare(way: Way, gpu: &Film, cpu: &Film) -> Result<(), String> {
+    assert_eq!((gpu.region, gpu.sums.len()), (cpu.region, cpu.sums.len()));
+    let device = adapter::device().expect("the device that rendered the picture");
+    if way == Way::Plain || !bit_exact(device) {
+        return compare_nearly(gpu, cpu);
+    }
+    let differ = gpu.sums.iter().zip(&cpu.sums).filter(|(a, b)| bits(a) != bits(b)).count();
+    let known = allowed(KNOWN, &device.info.name, &device.info.driver, "picture");
+    judge(known, "picture", differ as f64 / cpu.sums.len() as f64)
+}
+
+fn bits(v: &Vec4) -> [u32; 4] {
+    v.to_array().map(f32::to_bits)
+}
+
+fn compare_nearly(gpu: &Film, cpu: &Film) -> Result<(), String> {
+    let mean = |v: &Vec4| v.truncate().as_dvec3() / f64::from(v.w);
+    let near = |a: &Vec4, b: &Vec4| (mean(a) - mean(b)).abs().cmple(mean(b).abs() * RELATIVE).all();
+    let differ = gpu.sums.iter().zip(&cpu.sums).filter(|(a, b)| !near(a, b)).count();
+    let share = differ as f64 / cpu.sums.len() as f64;
+    if share > EDGES {
+        return Err(format!("{:.3} % of the pixels differ by more than {RELATIVE}", share * 100.0));
+    }
+    let sum = |film: &Film| film.sums.iter().map(|v| mean(v).element_sum()).sum::<f64>();
+    let drift = (sum(gpu) - sum(cpu)).abs() / sum(cpu);
+    if !(drift <= MEAN) { Err(format!("the mean differs by {drift:.1e}")) } else { Ok(()) }
+}
+
+/// The same for first hits: on other devices than software Vulkan only the integers, away from edges.
+pub fn compare_hits(gpu: &[FirstHit], cpu: &[FirstHit]) -> Result<(), String> {
+    let device = adapter::device().expect("the device that rendered the picture");
+    assert_eq!(gpu.len(), cpu.len());
+    let same: fn(&FirstHit, &FirstHit) -> bool = if bit_exact(device) {
+        |a, b| bytemuck::bytes_of(a) == bytemuck::bytes_of(b)
+    } else {
+        |a, b| (a.shape, a.material) == (b.shape, b.material)
+    };
+    let share = gpu.iter().zip(cpu).filter(|(a, b)| !same(a, b)).count() as f64 / gpu.len() as f64;
+    if bit_exact(device) {
+        let known = allowed(KNOWN, &device.info.name, &device.info.driver, "first hits");
+        return judge(known, "first hits", share);
+    }
+    if share > EDGES { Err(format!("{share} of the first hits differ")) } else { Ok(()) }
+}
+
+/// A scene with another size, seed and samples.
+fn with(description: &Description, size: (u32, u32), seed: u32, pattern: usize, counts: (u32, u32)) -> Description {
+    let all = patterns::all();
+    let pattern = all[pattern % all.len()].1;
+    let mut d = description.clone();
+    (d.image.width, d.image.height) = size;
+    d.render.seed = seed;
+    d.render.pixel_samples = patterns::samples(pattern, counts.0);
+    d.render.light_samples = patterns::samples(pattern, counts.1);
+    d
+}
+
+/// Every scene as it is, but smaller.
+fn small_scenes() -> Vec<(String, Packed)> {
+    let small = |(name, mut d): (String, Description)| {
+        let scale = d.image.width.max(d.image.height).div_ceil(100);
+        (d.image.width, d.image.height) = (d.image.width / scale, d.image.height / scale);
+        d.render.pixel_samples = patterns::samples(d.render.pixel_samples.pattern, 4);
+        (name, scenes::packed(&d))
+    };
+    scenes::descriptions().into_iter().map(small).collect()
+}
+
+/// Every pattern in some scene, every scene with some pattern, with many sizes, seeds and numbers of samples.
+fn variations() -> Vec<(String, Packed)> {
+    let (scenes, patterns) = (scenes::descriptions(), patterns::all());
+    let vary = |i: usize| {
+        let (name, d) = &scenes[i % scenes.len()];
+        let (size, counts) = ([(33, 17), (64, 3), (1, 1), (8, 40)][i % 4], [(1, 1), (9, 4), (2, 36), (4, 100)][i % 4]);
+        let seed = [0, 1, u32::MAX][i % 3];
+        let name = format!("{name}, pattern {}, seed {seed}, {size:?}, {counts:?} samples", patterns[i % patterns.len()].0);
+        (name, scenes::packed(&with(d, size, seed, i, counts)))
+    };
+    (0..scenes.len().max(patterns.len())).map(vary).collect()
+}
+
+#[test]
+fn pictures_of_all_scenes_are_the_same() {
+    if adapter::device().is_none() {
+        return;
+    }
+    let small = small_scenes().into_iter().map(|scene| (scene, [Way::Baked, Way::Buffers, Way::Plain].as_slice()));
+    let varied = variations().into_iter().map(|scene| (scene, [Way::Baked, Way::Buffers].as_slice()));
+    for ((name, packed), ways) in small.chain(varied) {
+        let cpu = render(&packed, Way::Cpu);
+        for &way in ways {
+            let problem = compare(way, &render(&packed, way), &cpu);
+            assert!(problem.is_ok(), "{name}, {way:?}: {}", problem.unwrap_err());
+        }
+    }
+}
+
+#[test]
+fn first_hits_of_all_scenes_are_the_same() {
+    if adapter::device().is_none() {
+        return;
+    }
+    for (name, packed) in small_scenes() {
+        let cpu = first_hits(&packed, Way::Cpu);
+        for way in [Way::Baked, Way::Buffers] {
+            let problem = compare_hits(&first_hits(&packed, way), &cpu);
+            assert!(problem.is_ok(), "{name}, {way:?}: {}", problem.unwrap_err());
+        }
+    }
+}
+
+/// One unit in the last place of one number, and one pixel's last bit, are found.
+#[test]
+fn a_picture_that_differs_is_found() {
+    let Some(device) = adapter::device() else { return };
+    let (_, packed) = small_scenes().remove(0);
+    let cpu = render(&packed, Way::Cpu);
+    assert!(compare(Way::Baked, &cpu, &cpu).is_ok());
+    for (file, from, to) in [
+        ("light.wgsl", "(2.0 * at.x - 1.0)", "(2.0000002 * at.x - 1.0)"),
+        ("camera.wgsl", "(2.0 / f32(camera.width))", "(2.0000002 / f32(camera.width))"),
+        ("math.wgsl", "v * (1.0 / sqrt(dot(v, v)))", "v / sqrt(dot(v, v))"),
+    ] {
+        let shaders = sources::edited_shaders(file, from, to);
+        let options = Options { exact: device.info.exact, baked: true };
+        let mut gpu = Gpu::new(device, &packed, &shaders, options).expect("sound shaders");
+        let film = film(&mut gpu, &packed, &Cut::default());
+        if bit_exact(device) {
+            assert!(compare(Way::Baked, &film, &cpu).is_err(), "'{to}' in place of '{from}'");
+        }
+        // and yet it is nearly the same
+        assert!(compare_nearly(&film, &cpu).is_ok(), "'{to}' in place of '{from}'");
+    }
+    let mut other = cpu.clone();
+    other.sums[77].y = f32::from_bits(other.sums[77].y.to_bits() + 1);
+    assert!(!bit_exact(device) || compare(Way::Baked, &other, &cpu).is_err(), "one bit");
+    let mut other = cpu.clone();
+    other.sums.rotate_right(1);
+    assert!(compare_nearly(&other, &cpu).is_err(), "a shifted pixel");
+    let mut other = cpu.clone();
+    other.sums.iter_mut().for_each(|sum| *sum *= Vec4::new(1.00002, 1.00002, 1.00002, 1.0));
+    assert!(compare_nearly(&other, &cpu).is_err(), "a brighter picture");
+    let mut other = cpu.clone();
+    other.sums[5].x = f32::NAN;
+    assert!(compare_nearly(&other, &cpu).is_err(), "no number");
+    let hits = first_hits(&packed, Way::Cpu);
+    let mut other = hits.clone();
+    other.iter_mut().take(20).for_each(|hit| hit.shape ^= 1);
+    assert!(compare_hits(&other, &hits).is_err(), "another shape");
+}
+
+/// Pieces of work in some order: tiles, each with ranges of samples.
+fn pieces(backend: &mut dyn Backend, region: Region, pieces: &[(Region, Range<u32>)]) -> Film {
+    let mut run = || {
+        backend.begin(region)?;
+        for (tile, samples) in pieces {
+            backend.render(*tile, samples.clone())?;
+        }
+        backend.film()
+    };
+    run().unwrap_or_else(|error: wgray::error::RenderError| panic!("{error}"))
+}
+
+#[test]
+fn pictures_do_not_depend_on_how_the_work_is_cut() {
+    let (name, description) = scenes::descriptions().remove(0);
+    for pattern in 0..2 {
+        let packed = scenes::packed(&with(&description, (45, 37), 3, pattern, (9, 4)));
+        let whole = render(&packed, Way::Cpu);
+        let mut ways = vec![Way::Cpu];
+        if adapter::device().is_some_and(bit_exact) {
+            ways.extend([Way::Baked, Way::Buffers]);
+        }
+        for way in ways {
+            let mut backend = backend(&packed, way);
+            let same = |film: &Film, how: &str| {
+                assert_eq!(film.region, whole.region, "{name}, {way:?}, {how}");
+                let differ = film.sums.iter().zip(&whole.sums).filter(|(a, b)| bits(a) != bits(b)).count();
+                assert_eq!((film.sums.len(), differ), (whole.sums.len(), 0), "{name}, {way:?}, {how}");
+            };
+            for (band_pixels, samples_per_call, rows_per_call) in
+                [(4 << 20, None, None), (45 * 10, Some(1), Some(3)), (1, Some(4), None), (45 * 36, None, Some(1))]
+            {
+                let cut = Cut { band_pixels, samples_per_call, rows_per_call };
+                same(&film(&mut *backend, &packed, &cut), &format!("{cut:?}"));
+            }
+            // tiles of any shape in any order, each interrupted and continued
+            let region = whole.region;
+            let tile = |x0, y0, x1, y1| Region { x0, y0, x1, y1 };
+            let tiles = [tile(13, 20, 45, 37), tile(0, 0, 45, 7), tile(0, 7, 13, 37), tile(13, 7, 45, 20)];
+            let cuts = [0..2, 2..3, 3..9];
+            let mut order: Vec<_> = tiles.iter().flat_map(|tile| cuts.clone().map(|range| (*tile, range))).collect();
+            same(&pieces(&mut *backend, region, &order), "tiles");
+            order.sort_by_key(|(_, range)| range.start);
+            same(&pieces(&mut *backend, region, &order), "tiles, sample by sample");
+            // a part of the picture is that part of the whole picture
+            let part = tile(11, 5, 29, 33);
+            let film = pieces(&mut *backend, part, &[(part, 0..9)]);
+            let rows = whole.sums.chunks(45).skip(5).take(28);
+            let expected: Vec<Vec4> = rows.flat_map(|row| row[11..29].to_vec()).collect();
+            assert_eq!(film.sums.iter().map(bits).collect::<Vec<_>>(), expected.iter().map(bits).collect::<Vec<_>>());
+            // Only one order is promised: samples one after the other. Another gives other roundings.
+            let film = pieces(&mut *backend, region, &[(region, 5..9), (region, 0..5)]);
+            assert_ne!(film.sums, whole.sums, "{name}, {way:?}: the comparison cannot fail");
+        }
+    }
+}
+
+#[test]
+fn pictures_do_not_depend_on_the_number_of_threads() {
+    let (name, description) = scenes::descriptions().remove(0);
+    let packed = scenes::packed(&with(&description, (70, 31), 3, 1, (3, 4)));
+    let whole = render(&packed, Way::Cpu);
+    for threads in [1, 2, 3, 7] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let film = pool.install(|| render(&packed, Way::Cpu));
+        assert_eq!(film, whole, "{name}, {threads} threads");
+    }
+    // The same samples with another seed are another picture.
+    let other = render(&scenes::packed(&with(&description, (70, 31), 4, 1, (3, 4))), Way::Cpu);
+    assert_ne!(other, whole);
+}
