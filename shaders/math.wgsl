@@ -22,6 +22,13 @@ fn min(a: f32, b: f32) -> f32 {
     return select(b, a, a < b);
 }
 
+// x, but 0 for -0. Mesa takes the sign of a zero for free: it makes a selection of -1 or 0 the negative of a truth value,
+// and x + 0 it makes x. So this is about bits.
+fn positive_zero(x: f32) -> f32 {
+    let bits = bitcast<u32>(x);
+    return bitcast<f32>(select(bits, 0u, bits == 0x80000000u));
+}
+
 // x to the power n by squaring, for n below 2^bits: within n x 2^-24 relative for x from 0 to 1.
 fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     var result = 1.0;

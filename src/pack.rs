@@ -33,6 +33,14 @@ pub const EMITTER: u32 = 1;
 pub const GRID: u32 = 0;
 /// [`Pattern::Random`].
 pub const RANDOM: u32 = 1;
+/// [`Pattern::RotatedGrid`].
+pub const ROTATED_GRID: u32 = 2;
+/// [`Pattern::Jittered`].
+pub const JITTERED: u32 = 3;
+/// [`Pattern::Halton`].
+pub const HALTON: u32 = 4;
+/// [`Pattern::Sobol`].
+pub const SOBOL: u32 = 5;
 
 /// No distance of a hit is larger.
 pub const FAR: f32 = f32::MAX;
@@ -221,11 +229,11 @@ specialization! {
     delta_lights = "DELTA_LIGHTS",
     /// How the samples of a pixel are laid out.
     pixel_pattern = "PIXEL_PATTERN",
-    /// Side of their grid.
+    /// Side of their grid of cells; how many there are in patterns without cells.
     pixel_side = "PIXEL_SIDE",
     /// How the samples of an area light are laid out.
     light_pattern = "LIGHT_PATTERN",
-    /// Side of their grid.
+    /// Side of their grid of cells; how many there are in patterns without cells.
     light_side = "LIGHT_SIDE",
     /// How many there are.
     light_samples = "LIGHT_SAMPLES",
@@ -304,9 +312,9 @@ pub fn pack(scene: &Scene) -> Packed {
         area_lights,
         delta_lights: lights.len() as u32 - area_lights,
         pixel_pattern: pattern(pixels),
-        pixel_side: pixels.count.isqrt(),
+        pixel_side: side(pixels),
         light_pattern: pattern(light_samples),
-        light_side: light_samples.count.isqrt(),
+        light_side: side(light_samples),
         light_samples: light_samples.count,
         exponent_bits,
     };
@@ -332,6 +340,19 @@ fn pattern(samples: Samples) -> u32 {
     match samples.pattern {
         Pattern::Grid => GRID,
         Pattern::Random => RANDOM,
+        Pattern::RotatedGrid => ROTATED_GRID,
+        Pattern::Jittered => JITTERED,
+        Pattern::Halton => HALTON,
+        Pattern::Sobol => SOBOL,
+    }
+}
+
+/// The side of a pattern's grid of cells, or else the number of its samples.
+fn side(samples: Samples) -> u32 {
+    if samples.pattern.needs_square() {
+        samples.count.isqrt()
+    } else {
+        samples.count
     }
 }
 
@@ -463,7 +484,7 @@ fn parallelogram(kind: u32, p: &Parallelogram, material: u32, shape: u32) -> Pri
 }
 
 /// The primitive whose local space is mapped to the world by `columns` and then `center`.
-fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
+pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
     let rows = columns.inverse().transpose();
     Primitive {
         center: center.as_vec3(),

@@ -214,27 +214,6 @@ fn outlines_of_ellipsoids() {
     }
 }
 
-/// Ambient light alone is the product of two colours, to the last bit.
-#[test]
-fn ambient_light_alone() {
-    let mut scene = floor(DVec3::Z, 1.0, [0.3, 0.9, 0.9], 16.0);
-    scene.render.ambient = DVec3::new(0.25, 0.4, 0.8);
-    scene.render.pixel_samples = grid(16);
-    for way in both() {
-        for mean in render(&packed(&scene), way).means() {
-            let expected = [0.25, 0.4, 0.8].map(|ambient: f32| ambient * 0.3f32);
-            // The sum of sixteen equal numbers is rounded where their digits run out.
-            assert!(mean.iter().zip(expected).all(|(m, e)| (m - e).abs() <= 2.0 * f32::EPSILON * e), "{way:?}: {mean:?}");
-        }
-    }
-    scene.camera = empty(DVec3::Z, 2.0 * DVec3::Z, DVec3::Y, 1.0).camera;
-    scene.render.background = DVec3::new(0.5, 0.25, 0.125);
-    for way in both() {
-        let background = render(&packed(&scene), way).means().all(|mean| mean == [0.5, 0.25, 0.125]);
-        assert!(background, "{way:?}: rays that leave the scene bring its background");
-    }
-}
-
 /// A directional light on a plane is the same everywhere: kd n.l + ks (r.v)^s, seen straight from above.
 #[test]
 fn directional_light_on_a_plane() {

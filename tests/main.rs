@@ -1,10 +1,11 @@
-//! The promise that GPU and CPU agree (`docs/agreement.md`), and what it rests on. One binary: a test build links once.
+//! All tests of the program, of whole pictures, and of the promise that GPU and CPU agree (`docs/agreement.md`). One
+//! binary: a test build links once.
 
 mod adapter;
 mod against_oracle;
-mod agreement;
 mod analytic;
 mod bounds;
+mod cli;
 mod inputs;
 mod kernel;
 mod layout;
@@ -12,7 +13,10 @@ mod oracle;
 mod patterns;
 mod pictures;
 mod probes;
+mod radiance;
 mod random;
+mod render;
+mod robust;
 mod scenes;
 mod sources;
 mod twins;

@@ -5,7 +5,7 @@ use naga::ScalarKind;
 use wgray::cpu::camera::camera_ray;
 use wgray::cpu::ellipsoid::{ellipsoid_blocks, intersect_ellipsoid};
 use wgray::cpu::light::{Segments, segment, segments_to_light, segments_to_local};
-use wgray::cpu::math::{atan2, cross, dot, exp2, log2, max, min, normalize, power, power_whole};
+use wgray::cpu::math::{atan2, cross, dot, exp2, log2, max, min, normalize, positive_zero, power, power_whole};
 use wgray::cpu::phong::{Lobes, phong_block, phong_lobes, phong_power};
 use wgray::cpu::plane::{intersect_plane, plane_blocks};
 use wgray::cpu::ray::{Hit, Ray, closer, crosses_plane, plane_distance, point_to_local, scaled_crossing, vector_to_local};
@@ -57,6 +57,7 @@ probes! {
     normalize(v: Vec3) -> Vec3;
     max(a: f32, b: f32) -> f32;
     min(a: f32, b: f32) -> f32;
+    positive_zero(x: f32) -> f32;
     power_whole(x: f32, n: u32, bits: u32) -> f32;
     power(x: f32, y: f32) -> f32;
     log2(x: f32) -> f32;

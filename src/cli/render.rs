@@ -25,6 +25,7 @@ use super::stats::Stats;
 
 /// The arguments as they are written.
 #[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)] // so that a number out of range is told as such
 pub struct Args {
     /// Scene file; docs/scene-format.md says what is in it
     scene: PathBuf,
@@ -195,7 +196,7 @@ impl Plan {
             return Ok(self.cpu());
         };
         let device = match gpu::choose(choice) {
-            Err(RenderError::NoDevice(why)) if *choice == gpu::Choice::Auto => {
+            Err(why) if *choice == gpu::Choice::Auto => {
                 if !self.quiet {
                     eprintln!("warning: rendering on the CPU: {why}");
                 }

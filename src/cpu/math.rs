@@ -24,6 +24,11 @@ pub fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
+pub fn positive_zero(x: f32) -> f32 {
+    let bits = x.to_bits();
+    f32::from_bits(if bits == 0x8000_0000 { 0 } else { bits })
+}
+
 pub fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     let mut result = 1.0;
     let mut square = x;

@@ -16,6 +16,7 @@ pub mod rectangle;
 mod renderer;
 pub mod rng;
 pub mod sampling;
+pub mod sequence;
 pub mod shadow;
 pub mod surface;
 pub mod traverse;
