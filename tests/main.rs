@@ -19,5 +19,6 @@ mod render;
 mod robust;
 mod scenes;
 mod sources;
+mod statistics;
 mod twins;
 mod words;
