@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::super::{
-    Assets, CameraDescription, LightDescription, MaterialDescription, Overrides, RenderDescription, Scene, ShapeDescription,
-    TextureDescription,
+    Assets, CameraDescription, LightDescription, MaterialDescription, Overrides, RenderDescription, Scene,
+    ShapeDescription, TextureDescription,
 };
 use super::*;
 

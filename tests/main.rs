@@ -1,0 +1,3 @@
+//! Tests of the whole library. One binary: a test build links once.
+
+mod textures;
