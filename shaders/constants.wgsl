@@ -44,6 +44,10 @@ const FOR_NORMAL: u32 = 0x8000000u;
 
 const GRID: u32 = 0u;
 const RANDOM: u32 = 1u;
+const ROTATED_GRID: u32 = 2u;
+const JITTERED: u32 = 3u;
+const HALTON: u32 = 4u;
+const SOBOL: u32 = 5u;
 
 // No distance of a hit is larger.
 const FAR: f32 = 3.4028234663852886e38;

@@ -15,6 +15,7 @@ override BLOCKING_PLANES: u32;
 override AREA_LIGHTS: u32;
 override DELTA_LIGHTS: u32;
 
+// The samples of a pixel and of an area light. A side is that of a grid of cells, or the number of samples.
 override PIXEL_PATTERN: u32;
 override PIXEL_SIDE: u32;
 override PIXEL_SAMPLES: u32;

@@ -40,5 +40,8 @@ fn primitive_uv(q: Primitive, local: vec3f) -> vec2f {
 
 fn first_hit(q: Primitive, ray: Ray, t: f32) -> FirstHit {
     let local = point_to_local(q, ray.origin + ray.direction * t);
-    return FirstHit(primitive_normal(q, local), t, primitive_uv(q, local), q.shape, q.material);
+    let n = primitive_normal(q, local);
+    let normal = vec3f(positive_zero(n.x), positive_zero(n.y), positive_zero(n.z));
+    let uv = primitive_uv(q, local);
+    return FirstHit(normal, t, vec2f(positive_zero(uv.x), positive_zero(uv.y)), q.shape, q.material);
 }

@@ -83,6 +83,14 @@ pub const FOR_NORMAL: u32 = 0x800_0000;
 pub const GRID: u32 = 0;
 /// [`Pattern::Random`].
 pub const RANDOM: u32 = 1;
+/// [`Pattern::RotatedGrid`].
+pub const ROTATED_GRID: u32 = 2;
+/// [`Pattern::Jittered`].
+pub const JITTERED: u32 = 3;
+/// [`Pattern::Halton`].
+pub const HALTON: u32 = 4;
+/// [`Pattern::Sobol`].
+pub const SOBOL: u32 = 5;
 
 /// No distance of a hit is larger.
 pub const FAR: f32 = f32::MAX;
@@ -305,13 +313,13 @@ specialization! {
     delta_lights = "DELTA_LIGHTS",
     /// How the samples of a pixel are laid out.
     pixel_pattern = "PIXEL_PATTERN",
-    /// Side of their grid.
+    /// Side of their grid of cells; how many there are in patterns without cells.
     pixel_side = "PIXEL_SIDE",
     /// How many samples a pixel has.
     pixel_samples = "PIXEL_SAMPLES",
     /// How the samples of an area light are laid out.
     light_pattern = "LIGHT_PATTERN",
-    /// Side of their grid.
+    /// Side of their grid of cells; how many there are in patterns without cells.
     light_side = "LIGHT_SIDE",
     /// How many there are.
     light_samples = "LIGHT_SAMPLES",
@@ -410,10 +418,10 @@ pub fn pack(scene: &Scene) -> Packed {
         area_lights,
         delta_lights: lights.len() as u32 - area_lights,
         pixel_pattern: pattern(pixels),
-        pixel_side: pixels.count.isqrt(),
+        pixel_side: side(pixels),
         pixel_samples: pixels.count,
         light_pattern: pattern(light_samples),
-        light_side: light_samples.count.isqrt(),
+        light_side: side(light_samples),
         light_samples: light_samples.count,
         exponent_bits,
         bounces: if scene.materials.iter().any(is_specular) {
@@ -452,6 +460,19 @@ fn pattern(samples: Samples) -> u32 {
     match samples.pattern {
         Pattern::Grid => GRID,
         Pattern::Random => RANDOM,
+        Pattern::RotatedGrid => ROTATED_GRID,
+        Pattern::Jittered => JITTERED,
+        Pattern::Halton => HALTON,
+        Pattern::Sobol => SOBOL,
+    }
+}
+
+/// The side of a pattern's grid of cells, or else the number of its samples.
+fn side(samples: Samples) -> u32 {
+    if samples.pattern.needs_square() {
+        samples.count.isqrt()
+    } else {
+        samples.count
     }
 }
 
@@ -571,7 +592,7 @@ fn parallelogram(kind: u32, p: &Parallelogram, material: u32, shape: u32) -> Pri
 }
 
 /// The primitive whose local space is mapped to the world by `columns` and then `center`.
-fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
+pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
     let rows = columns.inverse().transpose();
     Primitive {
         center: center.as_vec3(),

@@ -1,3 +1,23 @@
-//! Tests of the whole library. One binary: a test build links once.
+//! All tests of the program, of whole pictures, and of the promise that GPU and CPU agree (`docs/agreement.md`). One
+//! binary: a test build links once.
 
+mod adapter;
+mod against_oracle;
+mod backends;
+mod bounds;
+mod cli;
+mod inputs;
+mod kernel;
+mod layout;
+mod oracle;
+mod pictures;
+mod probes;
+mod radiance;
+mod random;
+mod render;
+mod robust;
+mod scenes;
+mod sources;
 mod textures;
+mod twins;
+mod words;

@@ -25,6 +25,7 @@ use super::stats::Stats;
 
 /// The arguments as they are written.
 #[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)] // so that a number out of range is told as such
 pub struct Args {
     /// Scene file; docs/scene-format.md says what is in it
     scene: PathBuf,
@@ -50,7 +51,7 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
 
-    /// Folder that files named by the scene, its textures, must lie in, in place of the scene's own
+    /// Folder that pictures named by the scene must lie in, if not the scene's own
     #[arg(long, value_name = "DIR")]
     asset_root: Option<PathBuf>,
 
@@ -200,7 +201,7 @@ impl Plan {
             return Ok(self.cpu());
         };
         let device = match gpu::choose(choice) {
-            Err(RenderError::NoDevice(why)) if *choice == gpu::Choice::Auto => {
+            Err(why) if *choice == gpu::Choice::Auto => {
                 if !self.quiet {
                     eprintln!("warning: rendering on the CPU: {why}");
                 }

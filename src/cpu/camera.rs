@@ -48,3 +48,56 @@ pub fn image_plane_offset(camera: &Camera, at: Vec2) -> Vec3 {
     let y = 1.0 - at.y * (2.0 / camera.height as f32);
     camera.right * x + camera.up * y
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::pack::PERSPECTIVE;
+
+    /// Looks along +y, right is +x, up is +z; the image plane is 4 x 2, one unit ahead.
+    fn camera(projection: u32) -> Camera {
+        Camera {
+            position: Vec3::new(1.0, 2.0, 3.0),
+            projection,
+            right: Vec3::X * 2.0,
+            width: 8,
+            up: Vec3::Z,
+            height: 4,
+            forward: Vec3::Y,
+            seed: 0,
+        }
+    }
+
+    #[test]
+    fn perspective_rays_leave_one_point() {
+        let camera = camera(PERSPECTIVE);
+        for (at, direction) in [
+            ((4.0, 2.0), (0.0, 1.0, 0.0)),
+            ((0.0, 0.0), (-2.0, 1.0, 1.0)),
+            ((8.0, 4.0), (2.0, 1.0, -1.0)),
+        ] {
+            let ray = camera_ray(&camera, at.into());
+            assert_eq!(ray.origin, camera.position);
+            assert!(
+                (ray.direction - Vec3::from(direction).normalize()).length() < 1e-6,
+                "{at:?}: {}",
+                ray.direction
+            );
+        }
+    }
+
+    #[test]
+    fn orthographic_rays_are_parallel() {
+        let camera = camera(ORTHOGRAPHIC);
+        for (at, origin) in [
+            ((4.0, 2.0), (1.0, 2.0, 3.0)),
+            ((0.0, 0.0), (-1.0, 2.0, 4.0)),
+            ((8.0, 4.0), (3.0, 2.0, 2.0)),
+        ] {
+            let ray = camera_ray(&camera, at.into());
+            assert_eq!((ray.origin, ray.direction), (origin.into(), Vec3::Y), "{at:?}");
+        }
+    }
+}

@@ -20,6 +20,7 @@ pub mod rectangle;
 mod renderer;
 pub mod rng;
 pub mod sampling;
+pub mod sequence;
 pub mod shadow;
 pub mod specular;
 pub mod surface;

@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::{Vec2, Vec3};
 
-use super::math::{atan2, dot, max, normalize};
+use super::math::{atan2, dot, max, normalize, positive_zero};
 use super::ray::{Ray, point_to_local};
 use crate::pack::{ELLIPSOID, FirstHit, Primitive, RECTANGLE};
 
@@ -51,11 +51,13 @@ pub fn primitive_uv(q: &Primitive, local: Vec3) -> Vec2 {
 
 pub fn first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit {
     let local = point_to_local(q, ray.origin + ray.direction * t);
-    let (normal, uv) = (primitive_normal(q, local), primitive_uv(q, local));
+    let n = primitive_normal(q, local);
+    let normal = Vec3::new(positive_zero(n.x), positive_zero(n.y), positive_zero(n.z));
+    let uv = primitive_uv(q, local);
     FirstHit {
         normal,
         depth: t,
-        uv,
+        uv: Vec2::new(positive_zero(uv.x), positive_zero(uv.y)),
         shape: q.shape,
         material: q.material,
     }

@@ -12,8 +12,8 @@ use crate::pack::{
 /// Larger scenes are read from buffers: compiling grows with every primitive.
 pub const MOST_PRIMITIVES: usize = 64;
 
-/// The WGSL text of a scene's `closest_hit`, `shadow_candidates`, `load_primitive`, `load_material`, `load_light` and
-/// `load_texture`.
+/// The WGSL text of a scene's `closest_hit`, `shadow_candidates`, `load_primitive`, `load_blocker`, `load_material`,
+/// `load_light` and `load_texture`.
 pub fn bake(packed: &Packed) -> String {
     let mut out = String::new();
     let records: Vec<String> = packed.primitives.iter().map(primitive).collect();

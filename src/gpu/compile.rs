@@ -34,11 +34,14 @@ fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>
 impl Checked {
     /// The kernel as SPIR-V for one specialisation, computed on the device exactly as it is written.
     pub fn exact_spirv(&self, kernel: Kernel, constants: &Specialization) -> Result<Vec<u32>, ShaderError> {
+        self.exact_entry(kernel.entry_point(), &constants.constants())
+    }
+
+    /// The same for any compute entry point, with the values of its overrides.
+    pub fn exact_entry(&self, entry: &str, constants: &[(&str, u32)]) -> Result<Vec<u32>, ShaderError> {
         let constants = constants
-            .constants()
-            .into_iter()
-            .map(|(name, value)| (name.to_string(), f64::from(value)));
-        let entry = kernel.entry_point();
+            .iter()
+            .map(|(name, value)| (name.to_string(), f64::from(*value)));
         let (specialised, _): (Cow<'_, _>, Cow<'_, _>) = process_overrides(
             &self.module,
             &self.info,

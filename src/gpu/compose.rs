@@ -31,6 +31,7 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "rng.wgsl",
     "sampling.wgsl",
     "scene.wgsl",
+    "sequence.wgsl",
     "shadow.wgsl",
     "specialization.wgsl",
     "specular.wgsl",
@@ -49,6 +50,7 @@ pub const SHARED: &[&str] = &[
     "math.wgsl",
     "rng.wgsl",
     "sampling.wgsl",
+    "sequence.wgsl",
     "ray.wgsl",
     "rectangle.wgsl",
     "triangle.wgsl",
@@ -72,8 +74,8 @@ pub const SHARED: &[&str] = &[
 const KERNEL: &[&str] = &[
     "specialization.wgsl",
     "bindings.wgsl",
-    "texture.wgsl",
     "traverse.wgsl",
+    "texture.wgsl",
     "integrator.wgsl",
 ];
 /// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.

@@ -39,6 +39,8 @@ pub struct Gpu {
     device: Device,
     kernels: Kernels,
     render: wgpu::ComputePipeline,
+    /// The kernel of first hits, once it was asked for.
+    aov: Option<wgpu::ComputePipeline>,
     scene: [wgpu::Buffer; 8],
     work: wgpu::Buffer,
     film: Option<Target>,
@@ -89,6 +91,7 @@ impl Gpu {
             device: device.clone(),
             kernels,
             render,
+            aov: None,
             scene,
             work,
             film: None,
@@ -201,9 +204,13 @@ impl Backend for Gpu {
     }
 
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
-        let pipeline = self.kernels.compile(&self.device, Kernel::Aov)?;
+        let pipeline = match self.aov.take() {
+            Some(pipeline) => pipeline,
+            None => self.kernels.compile(&self.device, Kernel::Aov)?,
+        };
         let target = self.target::<FirstHit>(region)?;
         self.dispatch(&pipeline, &target, region, 0..0)?;
+        self.aov = Some(pipeline);
         self.device.download(&target.buffer)
     }
 

@@ -108,12 +108,20 @@ pub enum Pattern {
     Grid,
     /// Independent and uniform.
     Random,
+    /// The grid, turned by atan(1/2).
+    RotatedGrid,
+    /// A uniform position in each of n x n cells.
+    Jittered,
+    /// Halton's sequence in bases 2 and 3, randomly rotated.
+    Halton,
+    /// Sobol's sequence, Owen-scrambled.
+    Sobol,
 }
 
 impl Pattern {
     /// Whether the pattern is made of n x n cells, so that its count must be a square number.
     pub const fn needs_square(self) -> bool {
-        matches!(self, Pattern::Grid)
+        matches!(self, Pattern::Grid | Pattern::RotatedGrid | Pattern::Jittered)
     }
 }
 

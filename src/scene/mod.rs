@@ -125,7 +125,7 @@ pub enum Shadows {
 pub struct Samples {
     /// How they are laid out.
     pub pattern: Pattern,
-    /// How many, 1 to 65,536; a square for [`Pattern::Grid`].
+    /// How many, 1 to 65,536; a square for patterns of n x n cells.
     pub count: u32,
 }
 
