@@ -20,5 +20,6 @@ mod robust;
 mod scenes;
 mod sources;
 mod statistics;
+mod textures;
 mod twins;
 mod words;
