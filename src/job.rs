@@ -59,8 +59,7 @@ pub fn render(
     output: &mut dyn FnMut(Film) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
     let band_pixels = cut.band_pixels.min(backend.largest_film());
-    let band_rows =
-        (band_pixels / u64::from(region.width())).clamp(1, u64::from(region.height())) as u32;
+    let band_rows = (band_pixels / u64::from(region.width())).clamp(1, u64::from(region.height())) as u32;
     let total = region.pixels() as f64 * f64::from(samples);
     let mut pace = Pace::default();
     let mut done = 0.0;
@@ -123,8 +122,7 @@ impl Pace {
 
     /// Pixel samples that fit a call.
     fn work(&self) -> f64 {
-        self.speed
-            .map_or(Self::FIRST_CALL, |speed| speed * CALL.as_secs_f64())
+        self.speed.map_or(Self::FIRST_CALL, |speed| speed * CALL.as_secs_f64())
     }
 
     fn samples(&self, band: Region) -> u32 {

@@ -267,12 +267,7 @@ pub fn pack(scene: &Scene) -> Packed {
         let number = number as u32;
         if let scene::Light::Rectangle { rectangle, color } = light {
             let shape = scene.shapes.len() as u32 + number;
-            primitives.push(parallelogram(
-                RECTANGLE,
-                rectangle,
-                materials.len() as u32,
-                shape,
-            ));
+            primitives.push(parallelogram(RECTANGLE, rectangle, materials.len() as u32, shape));
             materials.push(Material {
                 ambient: color.as_vec3(),
                 kind: EMITTER,
@@ -389,16 +384,8 @@ fn exponent_bits(described: &[scene::Material], packed: &[Material]) -> u32 {
         let scene::Material::Phong { shininess, .. } = material;
         shininess.fract() == 0.0 && *shininess <= 4096.0
     });
-    let largest = packed
-        .iter()
-        .map(|material| material.exponent)
-        .max()
-        .unwrap_or(1);
-    if whole {
-        u32::BITS - largest.leading_zeros()
-    } else {
-        0
-    }
+    let largest = packed.iter().map(|material| material.exponent).max().unwrap_or(1);
+    if whole { u32::BITS - largest.leading_zeros() } else { 0 }
 }
 
 fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {

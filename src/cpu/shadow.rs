@@ -28,23 +28,13 @@ pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: Bloc
     let mut bits = 0;
     for i in 0..block.count {
         let d = segment(to, block_sample(block, i));
-        bits |= if blocks(kind, o, d, light.reach) {
-            1 << i
-        } else {
-            0
-        };
+        bits |= if blocks(kind, o, d, light.reach) { 1 << i } else { 0 };
     }
     bits
 }
 
 pub fn block_sample(block: Block, i: u32) -> Vec2 {
-    sample_square(
-        block.pattern,
-        block.side,
-        block.first + i,
-        block.group,
-        block.key,
-    )
+    sample_square(block.pattern, block.side, block.first + i, block.group, block.key)
 }
 
 #[inline(always)] // compiled for each kind

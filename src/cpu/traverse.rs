@@ -16,13 +16,12 @@ pub fn closest_hit(scene: &Packed, ray: Ray) -> Hit {
         t: FAR,
         primitive: NOTHING,
     };
-    let mut nearest =
-        |intersect: fn(&Primitive, Ray, f32) -> f32, primitives: &[Primitive], first: usize| {
-            for (i, q) in (first as u32..).zip(primitives) {
-                hit = closer(hit, intersect(q, ray, hit.t), i);
-            }
-            first + primitives.len()
-        };
+    let mut nearest = |intersect: fn(&Primitive, Ray, f32) -> f32, primitives: &[Primitive], first: usize| {
+        for (i, q) in (first as u32..).zip(primitives) {
+            hit = closer(hit, intersect(q, ray, hit.t), i);
+        }
+        first + primitives.len()
+    };
     let first = nearest(intersect_rectangle, kinds.rectangles, 0);
     let first = nearest(intersect_triangle, kinds.triangles, first);
     let first = nearest(intersect_ellipsoid, kinds.ellipsoids, first);

@@ -33,10 +33,7 @@ pub fn bake(packed: &Packed) -> String {
     write_function(&mut out, signature, "var bits = 0u;", "bits", |body| {
         for (p, record) in blocking(packed).map(|i| (&packed.primitives[i], &records[i])) {
             let kind = kind_name(p.kind).1;
-            let _ = writeln!(
-                body,
-                "    bits |= shadow_bits({kind}, {record}, p, light, block);"
-            );
+            let _ = writeln!(body, "    bits |= shadow_bits({kind}, {record}, p, light, block);");
         }
     });
     write_table(&mut out, "load_primitive", "Primitive", &records);
@@ -77,13 +74,7 @@ fn kind_name(kind: u32) -> (&'static str, &'static str) {
     }
 }
 
-fn write_function(
-    out: &mut String,
-    signature: &str,
-    start: &str,
-    result: &str,
-    body: impl FnOnce(&mut String),
-) {
+fn write_function(out: &mut String, signature: &str, start: &str, result: &str, body: impl FnOnce(&mut String)) {
     let _ = writeln!(out, "fn {signature} {{\n    {start}");
     body(out);
     let _ = writeln!(out, "    return {result};\n}}");

@@ -107,16 +107,12 @@ impl Shaders {
     pub fn read(folder: &Path) -> io::Result<Shaders> {
         let read = |name: &str| {
             let path = folder.join(name);
-            let text = fs::read_to_string(&path).map_err(|error| {
-                io::Error::new(error.kind(), format!("{}: {error}", path.display()))
-            })?;
+            let text = fs::read_to_string(&path)
+                .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))?;
             Ok((name.to_string(), text))
         };
         Ok(Shaders {
-            files: BUILT_IN
-                .iter()
-                .map(|(name, _)| read(name))
-                .collect::<io::Result<_>>()?,
+            files: BUILT_IN.iter().map(|(name, _)| read(name)).collect::<io::Result<_>>()?,
         })
     }
 
@@ -174,14 +170,8 @@ impl Source {
 
     /// The file that a byte of the text came from, its own text, and the byte's offset in it.
     pub fn locate(&self, offset: usize) -> Option<(&str, &str, usize)> {
-        let i = self
-            .parts
-            .partition_point(|part| part.start <= offset)
-            .checked_sub(1)?;
-        let end = self
-            .parts
-            .get(i + 1)
-            .map_or(self.text.len(), |next| next.start);
+        let i = self.parts.partition_point(|part| part.start <= offset).checked_sub(1)?;
+        let end = self.parts.get(i + 1).map_or(self.text.len(), |next| next.start);
         let part = &self.parts[i];
         Some((&part.file, &self.text[part.start..end], offset - part.start))
     }

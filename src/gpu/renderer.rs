@@ -63,16 +63,10 @@ struct Target {
 impl Gpu {
     /// Compiles the kernel for a scene and uploads it. The device has run the kernel once, on nothing, when this
     /// returns: drivers compile at the first dispatch.
-    pub fn new(
-        device: &Device,
-        packed: &Packed,
-        shaders: &Shaders,
-        options: Options,
-    ) -> Result<Gpu, RenderError> {
+    pub fn new(device: &Device, packed: &Packed, shaders: &Shaders, options: Options) -> Result<Gpu, RenderError> {
         let kernels = Kernels {
             shaders: shaders.clone(),
-            baked: (options.baked && packed.primitives.len() <= MOST_PRIMITIVES)
-                .then(|| bake(packed)),
+            baked: (options.baked && packed.primitives.len() <= MOST_PRIMITIVES).then(|| bake(packed)),
             constants: packed.specialization,
             layout: bind_group_layout(device),
             exact: options.exact,
@@ -87,10 +81,7 @@ impl Gpu {
                 device.upload(BufferUsages::STORAGE, &packed.lights),
             ]
         })?;
-        let work = device.buffer(
-            size_of::<Work>() as u64,
-            BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-        );
+        let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         let mut gpu = Gpu {
             device: device.clone(),
             kernels,
@@ -113,19 +104,9 @@ impl Gpu {
     fn target<T: Pod>(&self, region: Region) -> Result<Target, RenderError> {
         let size = region.pixels() * size_of::<T>() as u64;
         self.device.checked(|| {
-            let buffer = self
-                .device
-                .buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+            let buffer = self.device.buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
             let [camera, environment, primitives, materials, lights] = &self.scene;
-            let buffers = [
-                &self.work,
-                camera,
-                environment,
-                primitives,
-                materials,
-                lights,
-                &buffer,
-            ];
+            let buffers = [&self.work, camera, environment, primitives, materials, lights, &buffer];
             let entries: Vec<wgpu::BindGroupEntry> = (0..)
                 .zip(buffers)
                 .map(|(binding, buffer)| wgpu::BindGroupEntry {
@@ -133,19 +114,12 @@ impl Gpu {
                     resource: buffer.as_entire_binding(),
                 })
                 .collect();
-            let group = self
-                .device
-                .device
-                .create_bind_group(&wgpu::BindGroupDescriptor {
-                    label: None,
-                    layout: &self.kernels.layout,
-                    entries: &entries,
-                });
-            Target {
-                region,
-                buffer,
-                group,
-            }
+            let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &self.kernels.layout,
+                entries: &entries,
+            });
+            Target { region, buffer, group }
         })
     }
 
@@ -171,11 +145,7 @@ impl Gpu {
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &target.group, &[]);
-            pass.dispatch_workgroups(
-                tile.width().div_ceil(WORKGROUP),
-                tile.height().div_ceil(WORKGROUP),
-                1,
-            );
+            pass.dispatch_workgroups(tile.width().div_ceil(WORKGROUP), tile.height().div_ceil(WORKGROUP), 1);
             drop(pass);
             queue.submit([encoder.finish()]);
         })?;
@@ -221,19 +191,8 @@ impl Backend for Gpu {
 }
 
 impl Kernels {
-    fn compile(
-        &self,
-        device: &Device,
-        kernel: Kernel,
-    ) -> Result<wgpu::ComputePipeline, RenderError> {
+    fn compile(&self, device: &Device, kernel: Kernel) -> Result<wgpu::ComputePipeline, RenderError> {
         let source = self.shaders.compose(kernel, self.baked.as_deref());
-        pipeline(
-            device,
-            &self.layout,
-            kernel,
-            &source,
-            &self.constants,
-            self.exact,
-        )
+        pipeline(device, &self.layout, kernel, &source, &self.constants, self.exact)
     }
 }

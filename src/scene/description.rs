@@ -108,10 +108,7 @@ pub enum Pattern {
 impl Pattern {
     /// Whether the pattern is made of n x n cells, so that its count must be a square number.
     pub const fn needs_square(self) -> bool {
-        matches!(
-            self,
-            Pattern::Grid | Pattern::RotatedGrid | Pattern::Jittered
-        )
+        matches!(self, Pattern::Grid | Pattern::RotatedGrid | Pattern::Jittered)
     }
 }
 

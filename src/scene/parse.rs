@@ -60,9 +60,7 @@ fn locate(text: &str, path: &KeyPath) -> usize {
                 let entry = table.iter().find(|(key, _)| key.get_ref() == name);
                 entry.map(|(key, value)| (key.span(), value))
             }
-            (Segment::Index(index), DeValue::Array(array)) => {
-                array.get(*index).map(|value| (value.span(), value))
-            }
+            (Segment::Index(index), DeValue::Array(array)) => array.get(*index).map(|value| (value.span(), value)),
             _ => None,
         };
         let Some((span, inner)) = step else { break };
@@ -113,9 +111,7 @@ fn read_file(file: Table) -> Result<Description, Problem> {
 
 fn read_list<T: Tagged>(tables: Vec<Table>) -> Result<Vec<T>, Problem> {
     let tables = tables.into_iter().enumerate();
-    tables
-        .map(|(i, table)| read_tagged(table, None).at(i))
-        .collect()
+    tables.map(|(i, table)| read_tagged(table, None).at(i)).collect()
 }
 
 fn read<T: DeserializeOwned>(table: Table) -> Result<T, Problem> {
@@ -195,10 +191,7 @@ fn explain(error: ReadError, table: Table, tagged: bool) -> Problem {
         let mut names = quoted(message).into_iter();
         path.extend(names.next().map(Segment::Key));
         let tag = (tagged && path.len() == 1).then(|| "type".to_owned());
-        format!(
-            "unknown key; the keys here are {}",
-            list(tag.into_iter().chain(names))
-        )
+        format!("unknown key; the keys here are {}", list(tag.into_iter().chain(names)))
     } else if message.starts_with("missing field") {
         path.extend(quoted(message).into_iter().map(Segment::Key));
         "is missing".to_owned()
@@ -227,10 +220,7 @@ fn explain(error: ReadError, table: Table, tagged: bool) -> Problem {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{
-        CameraDescription, LightDescription, MaterialDescription, Overrides, Scene,
-        ShapeDescription,
-    };
+    use super::super::{CameraDescription, LightDescription, MaterialDescription, Overrides, Scene, ShapeDescription};
     use super::*;
 
     const PAGE: &str = include_str!("../../docs/scene-format.md");
@@ -277,31 +267,11 @@ fov = 45
                 1,
                 "camera.type: 3 must be one of \"perspective\", \"orthographic\"",
             ),
-            (
-                "focal_length = '1'",
-                1,
-                "camera.focal_length: \"1\" must be a number",
-            ),
-            (
-                "up = [0, 1]",
-                1,
-                "camera.up: [0, 1] must be a list of 3 numbers",
-            ),
-            (
-                "up = [0, 0, 1, 0]",
-                1,
-                "camera.up: [0, 0, 1, 0] must be a shorter list",
-            ),
-            (
-                "up = [0, 0, true]",
-                1,
-                "camera.up[2]: true must be a number",
-            ),
-            (
-                "up = { z = 1 }",
-                1,
-                "camera.up: { z = 1 } must be a list of 3 numbers",
-            ),
+            ("focal_length = '1'", 1, "camera.focal_length: \"1\" must be a number"),
+            ("up = [0, 1]", 1, "camera.up: [0, 1] must be a list of 3 numbers"),
+            ("up = [0, 0, 1, 0]", 1, "camera.up: [0, 0, 1, 0] must be a shorter list"),
+            ("up = [0, 0, true]", 1, "camera.up[2]: true must be a number"),
+            ("up = { z = 1 }", 1, "camera.up: { z = 1 } must be a list of 3 numbers"),
             (
                 "[render]\nseed = -1",
                 2,
@@ -332,11 +302,7 @@ fov = 45
                 3,
                 "render.light_samples.n: unknown key; the keys here are \"pattern\", \"count\"",
             ),
-            (
-                "[materials]\nred = 3",
-                2,
-                "materials.red: 3 must be a table",
-            ),
+            ("[materials]\nred = 3", 2, "materials.red: 3 must be a table"),
             (
                 "[materials.red]\ncolor = [1, 0, 0]",
                 1,
@@ -379,10 +345,7 @@ fov = 45
             ),
         ] {
             let line = START.lines().count() + line;
-            assert_eq!(
-                message(&format!("{START}{added}")),
-                format!("s.toml:{line}: {told}")
-            );
+            assert_eq!(message(&format!("{START}{added}")), format!("s.toml:{line}: {told}"));
         }
     }
 
@@ -440,11 +403,7 @@ fov = 45
                 path.display()
             );
             description.validate().unwrap();
-            assert!(
-                text.starts_with("# "),
-                "{} does not say what it shows",
-                path.display()
-            );
+            assert!(text.starts_with("# "), "{} does not say what it shows", path.display());
             count += 1;
         }
         assert!(count >= 4);
@@ -452,13 +411,7 @@ fov = 45
 
     #[test]
     fn the_example_of_the_page_is_a_scene() {
-        let example = PAGE
-            .split("```toml\n")
-            .nth(1)
-            .unwrap()
-            .split("```")
-            .next()
-            .unwrap();
+        let example = PAGE.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
         let scene = Scene::parse(example, "scene-format.md", &Overrides::default()).unwrap();
         assert_eq!(scene.shapes.len(), 1);
     }
@@ -521,10 +474,7 @@ fov = 45
         let names: Vec<_> = names.split('"').skip(1).step_by(2).collect();
         let mut rows = rows("### Samples");
         rows.retain(|name| name.starts_with('"'));
-        let rows: Vec<_> = rows
-            .into_iter()
-            .map(|name| name.trim_matches('"'))
-            .collect();
+        let rows: Vec<_> = rows.into_iter().map(|name| name.trim_matches('"')).collect();
         assert_eq!(rows, names);
     }
 

@@ -9,10 +9,9 @@ use glam::DVec3;
 use super::error::{At, Problem};
 use super::parse::list;
 use super::{
-    Camera, CameraDescription, Description, EllipsoidDescription, Geometry, Light,
-    LightDescription, Material, MaterialDescription, Parallelogram, Pattern, PhongDescription,
-    Projection, Render, RenderDescription, Samples, SamplesDescription, Scene, Shape,
-    ShapeDescription,
+    Camera, CameraDescription, Description, EllipsoidDescription, Geometry, Light, LightDescription, Material,
+    MaterialDescription, Parallelogram, Pattern, PhongDescription, Projection, Render, RenderDescription, Samples,
+    SamplesDescription, Scene, Shape, ShapeDescription,
 };
 
 /// Largest absolute coordinate.
@@ -56,9 +55,7 @@ impl Description {
 
 fn each<D, T>(descriptions: &[D], check: impl Fn(&D) -> Checked<T>) -> Checked<Vec<T>> {
     let descriptions = descriptions.iter().enumerate();
-    descriptions
-        .map(|(i, description)| check(description).at(i))
-        .collect()
+    descriptions.map(|(i, description)| check(description).at(i)).collect()
 }
 
 /// The number of pixels along a side.
@@ -165,10 +162,7 @@ fn material(description: &MaterialDescription) -> Checked<Material> {
 
 fn factor(phong: &PhongDescription, own: Option<DVec3>, key: &str) -> Checked<DVec3> {
     let missing = || Problem::new("is missing, and there is no color to stand in for it");
-    own.or(phong.color)
-        .ok_or_else(missing)
-        .and_then(color)
-        .at(key)
+    own.or(phong.color).ok_or_else(missing).and_then(color).at(key)
 }
 
 fn light(description: &LightDescription) -> Checked<Light> {
@@ -201,12 +195,8 @@ fn shape(description: &ShapeDescription, materials: &BTreeMap<&str, usize>) -> C
             let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * radius);
             (Geometry::Ellipsoid { center, axes }, &shape.material)
         }
-        ShapeDescription::Triangle(shape) => {
-            (triangle(shape.vertices).at("vertices")?, &shape.material)
-        }
-        ShapeDescription::Tetrahedron(shape) => {
-            (tetrahedron(shape.vertices).at("vertices")?, &shape.material)
-        }
+        ShapeDescription::Triangle(shape) => (triangle(shape.vertices).at("vertices")?, &shape.material),
+        ShapeDescription::Tetrahedron(shape) => (tetrahedron(shape.vertices).at("vertices")?, &shape.material),
         ShapeDescription::Plane(shape) => {
             let point = point(shape.point).at("point")?;
             let (tangent, bitangent) = frame(shape.normal, shape.tangent)?;
@@ -221,10 +211,7 @@ fn shape(description: &ShapeDescription, materials: &BTreeMap<&str, usize>) -> C
     let unknown = || {
         let message = match materials.is_empty() {
             true => format!("{material:?} is no material; the file has none"),
-            false => format!(
-                "{material:?} is no material; there are {}",
-                list(materials.keys())
-            ),
+            false => format!("{material:?} is no material; there are {}", list(materials.keys())),
         };
         Problem::new(message).at("material")
     };
@@ -232,12 +219,7 @@ fn shape(description: &ShapeDescription, materials: &BTreeMap<&str, usize>) -> C
     Ok(Shape { geometry, material })
 }
 
-fn rectangle(
-    center: DVec3,
-    size: [f64; 2],
-    normal: DVec3,
-    tangent: DVec3,
-) -> Checked<Parallelogram> {
+fn rectangle(center: DVec3, size: [f64; 2], normal: DVec3, tangent: DVec3) -> Checked<Parallelogram> {
     let center = point(center).at("center")?;
     let width = length(size[0]).at("size")?;
     let height = length(size[1]).at("size")?;
@@ -255,11 +237,7 @@ fn ellipsoid(shape: &EllipsoidDescription) -> Checked<Geometry> {
     let y = unit(shape.b).at("b")?;
     let z = unit(shape.c).at("c")?;
     check(x.cross(y).length() > FLATTEST, || {
-        format!(
-            "{} must not be parallel to a, {}",
-            show(shape.b),
-            show(shape.a)
-        )
+        format!("{} must not be parallel to a, {}", show(shape.b), show(shape.a))
     })
     .at("b")?;
     check(x.cross(y).dot(z).abs() > FLATTEST, || {
@@ -306,11 +284,7 @@ fn longest_edge(vertices: &[DVec3]) -> Checked<f64> {
     let from = |a: &DVec3| vertices.iter().map(|b| a.distance(*b)).fold(0.0, f64::max);
     let longest = vertices.iter().map(from).fold(0.0, f64::max);
     check(longest >= LENGTHS.0, || {
-        format!(
-            "{} must be at least {} apart",
-            show_all(vertices),
-            number(LENGTHS.0)
-        )
+        format!("{} must be at least {} apart", show_all(vertices), number(LENGTHS.0))
     })?;
     Ok(longest)
 }
@@ -321,11 +295,7 @@ fn frame(normal: DVec3, tangent: DVec3) -> Checked<(DVec3, DVec3)> {
     let t = unit(tangent).at("tangent")?;
     let t = t - n * n.dot(t);
     check(t.length() > FLATTEST, || {
-        format!(
-            "{} must not be parallel to the normal, {}",
-            show(tangent),
-            show(normal)
-        )
+        format!("{} must not be parallel to the normal, {}", show(tangent), show(normal))
     })
     .at("tangent")?;
     let t = t.normalize();
@@ -373,12 +343,7 @@ fn length(x: f64) -> Checked<f64> {
 
 fn between(x: f64, low: f64, high: f64) -> Checked<f64> {
     check((low..=high).contains(&x), || {
-        format!(
-            "{} must be from {} to {}",
-            number(x),
-            number(low),
-            number(high)
-        )
+        format!("{} must be from {} to {}", number(x), number(low), number(high))
     })?;
     Ok(x)
 }
@@ -520,10 +485,7 @@ tangent = [1, 1, 0]
         };
         let (white, red) = (DVec3::splat(0.7), DVec3::X);
         let dark_red = phong(red * 0.3, red * 0.4, red * 0.5, 16.0);
-        assert_eq!(
-            scene.materials,
-            [dark_red, phong(white, white, DVec3::ONE, 20.0)]
-        );
+        assert_eq!(scene.materials, [dark_red, phong(white, white, DVec3::ONE, 20.0)]);
         let square = |z, u, v| Parallelogram {
             center: DVec3::new(0.0, 0.0, z),
             u,
@@ -576,11 +538,7 @@ tangent = [1, 1, 0]
 
     /// A line of the good scene, a bad one in its place, and what is said of it.
     const BAD: &[(&str, &str, &str)] = &[
-        (
-            "width = 8",
-            "width = 0",
-            "image.width: 0 must be from 1 to 65536",
-        ),
+        ("width = 8", "width = 0", "image.width: 0 must be from 1 to 65536"),
         (
             "height = 4",
             "height = 65537",
@@ -611,21 +569,9 @@ tangent = [1, 1, 0]
             "fov = 90\nup = [0, 0, 0]",
             "camera.up: [0, 0, 0] must not be zero: its length must be at least 1e-9",
         ),
-        (
-            "fov = 90",
-            "fov = 0",
-            "camera.fov: 0 must be from 0.001 to 179.999",
-        ),
-        (
-            "fov = 90",
-            "fov = 180",
-            "camera.fov: 180 must be from 0.001 to 179.999",
-        ),
-        (
-            "fov = 90",
-            "fov = nan",
-            "camera.fov: nan must be from 0.001 to 179.999",
-        ),
+        ("fov = 90", "fov = 0", "camera.fov: 0 must be from 0.001 to 179.999"),
+        ("fov = 90", "fov = 180", "camera.fov: 180 must be from 0.001 to 179.999"),
+        ("fov = 90", "fov = nan", "camera.fov: nan must be from 0.001 to 179.999"),
         (
             "focal_length = 2",
             "focal_length = 0",
@@ -828,9 +774,7 @@ tangent = [1, 1, 0]
 
     #[test]
     fn a_factor_without_color_is_missing() {
-        let message = parse(&with("diffuse = [0.4, 0, 0]", ""))
-            .unwrap_err()
-            .to_string();
+        let message = parse(&with("diffuse = [0.4, 0, 0]", "")).unwrap_err().to_string();
         let line = GOOD
             .lines()
             .position(|line| line.starts_with("[materials.\"dark"))
@@ -845,11 +789,10 @@ tangent = [1, 1, 0]
 
     #[test]
     fn a_scene_may_be_empty_but_not_name_a_material_that_is_not_there() {
-        let empty = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n";
+        let empty =
+            "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n";
         assert_eq!(parse(empty).unwrap().shapes, []);
-        let text = format!(
-            "{empty}[[shapes]]\ntype = 'sphere'\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'a'\n"
-        );
+        let text = format!("{empty}[[shapes]]\ntype = 'sphere'\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'a'\n");
         let told = "s.toml:7: shapes[0].material: \"a\" is no material; the file has none";
         assert_eq!(parse(&text).unwrap_err().to_string(), told);
     }
