@@ -3,20 +3,24 @@
 
 mod adapter;
 mod against_oracle;
-mod backends;
+mod analytic;
 mod bounds;
 mod cli;
 mod inputs;
 mod kernel;
 mod layout;
 mod oracle;
+mod patterns;
 mod pictures;
 mod probes;
 mod radiance;
 mod random;
 mod render;
 mod robust;
+mod sampling;
 mod scenes;
 mod sources;
+mod statistics;
+mod textures;
 mod twins;
 mod words;
