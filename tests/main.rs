@@ -3,13 +3,14 @@
 
 mod adapter;
 mod against_oracle;
-mod backends;
+mod analytic;
 mod bounds;
 mod cli;
 mod inputs;
 mod kernel;
 mod layout;
 mod oracle;
+mod patterns;
 mod pictures;
 mod probes;
 mod radiance;
@@ -18,6 +19,7 @@ mod render;
 mod robust;
 mod scenes;
 mod sources;
+mod statistics;
 mod textures;
 mod twins;
 mod words;

@@ -70,7 +70,7 @@ pub struct Args {
 
     /// What else to write, of the first hit through each pixel's centre. In an EXR these are further layers: normal.X,
     /// .Y, .Z; depth.Z; uv.U, .V; primitive.ID. Beside a PNG they are further files, NAME.normal.png and so on: normals
-    /// moved to 0..1, depth bright where near, fractions of texture coordinates in red and green, shapes in colours
+    /// moved to 0..1, depth bright where near (half bright at the picture's middle), fractions of texture coordinates in red and green, shapes in colours
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = aov_parser())]
     aov: Vec<Aov>,
 
