@@ -322,7 +322,7 @@ fn override_differences(source: &Source, given: &[&str]) -> Vec<String> {
 fn overrides_are_the_fields_of_the_specialization() {
     let constants = Specialization::default().constants();
     let names: Vec<&str> = constants.iter().map(|(name, _)| *name).collect();
-    for kernel in [Kernel::Render, Kernel::Aov] {
+    for kernel in [Kernel::Render, Kernel::Adaptive, Kernel::Aov] {
         let source = sources::shaders().compose(kernel, None);
         assert_eq!(override_differences(&source, &names), Vec::<String>::new());
         // negative controls
