@@ -29,6 +29,13 @@ fn positive_zero(x: f32) -> f32 {
     return bitcast<f32>(select(bits, 0u, bits == 0x80000000u));
 }
 
+// The largest whole number that is not above x.
+fn floor(x: f32) -> f32 {
+    let small = abs(x) < 8388608.0; // larger ones are whole
+    let whole = f32(i32(select(0.0, x, small)));
+    return select(x, select(whole, whole - 1.0, whole > x), small);
+}
+
 // x to the power n by squaring, for n below 2^bits: within n x 2^-24 relative for x from 0 to 1.
 fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     var result = 1.0;

@@ -17,6 +17,10 @@ fn load_light(i: u32) -> Light {
     return lights[i];
 }
 
+fn load_texture(i: u32) -> Texture {
+    return textures[i];
+}
+
 // The nearest primitive that a ray meets, by one loop for each kind of primitive.
 fn closest_hit(ray: Ray) -> Hit {
     var hit = Hit(FAR, NOTHING);

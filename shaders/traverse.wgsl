@@ -8,7 +8,7 @@ fn hidden_samples(p: vec3f, light: Light, block: Block) -> u32 {
     let ellipsoids = triangles + ELLIPSOIDS;
     return hidden_by(RECTANGLE, 0u, BLOCKING_RECTANGLES, cone, light, block)
         | hidden_by(TRIANGLE, RECTANGLES, RECTANGLES + BLOCKING_TRIANGLES, cone, light, block)
-        | hidden_by(ELLIPSOID, triangles, ellipsoids, cone, light, block)
+        | hidden_by(ELLIPSOID, triangles, triangles + BLOCKING_ELLIPSOIDS, cone, light, block)
         | hidden_by(PLANE, ellipsoids, ellipsoids + BLOCKING_PLANES, cone, light, block);
 }
 

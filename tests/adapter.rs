@@ -26,7 +26,10 @@ fn open() -> Option<Device> {
     match choose(&choice) {
         Ok(device) => {
             let info = &device.info;
-            tell(&format!("adapter: {}, {} ({}, {})", info.name, info.driver, info.backend, info.kind));
+            tell(&format!(
+                "adapter: {}, {} ({}, {})",
+                info.name, info.driver, info.backend, info.kind
+            ));
             Some(device)
         }
         Err(error) => panic!("{error}. To run only the tests that need no adapter, set {WITHOUT}=1."),
@@ -61,7 +64,9 @@ pub const KNOWN: &[Known] = &[];
 
 /// What the table allows a check on this device.
 pub fn allowed<'a>(known: &'a [Known], name: &str, driver: &str, what: &str) -> Option<&'a Known> {
-    known.iter().find(|k| k.what == what && (name.contains(k.adapter) || driver.contains(k.adapter)))
+    known
+        .iter()
+        .find(|k| k.what == what && (name.contains(k.adapter) || driver.contains(k.adapter)))
 }
 
 /// Holds the share of results that differ against the table: without an entry none may, and an entry that no longer
@@ -71,14 +76,21 @@ pub fn judge(known: Option<&Known>, what: &str, share: f64) -> Result<(), String
         None if share == 0.0 => Ok(()),
         None => Err(format!("{what}: {:.4} % of the results differ", share * 100.0)),
         Some(k) if share == 0.0 => Err(format!("{what}: nothing differs any more, so its entry must go: {k:?}")),
-        Some(k) if share > k.share => Err(format!("{what}: {share} of the results differ, more than is known: {k:?}")),
+        Some(k) if share > k.share => Err(format!(
+            "{what}: {share} of the results differ, more than is known: {k:?}"
+        )),
         Some(_) => Ok(()),
     }
 }
 
 #[test]
 fn known_differences_that_no_longer_apply_or_have_grown_fail() {
-    let known = [Known { adapter: "Some GPU", what: "dot", reason: "division by an approximation", share: 0.1 }];
+    let known = [Known {
+        adapter: "Some GPU",
+        what: "dot",
+        reason: "division by an approximation",
+        share: 0.1,
+    }];
     let entry = allowed(&known, "Some GPU 9000", "driver 1", "dot");
     assert!(entry.is_some());
     assert!(judge(entry, "dot", 0.05).is_ok());

@@ -15,8 +15,25 @@ const TOLERANCE: f64 = 1e-5;
 /// The share of pixels that may not agree: on edges, where one of a pixel's samples falls on the other side.
 const EDGES: f64 = 0.0005;
 
+/// Scenes with more edges than that, their share, and why.
+const MORE_EDGES: &[(&str, f64, &str)] = &[(
+    "balls-checker.toml",
+    0.003,
+    "a checker without filter up to the horizon",
+)];
+
+fn edges(scene: &str) -> f64 {
+    MORE_EDGES
+        .iter()
+        .find(|(name, ..)| *name == scene)
+        .map_or(EDGES, |(_, share, _)| *share)
+}
+
 /// Scenes that the oracle does not know enough for, and why.
-const BEYOND: &[(&str, &str)] = &[];
+const BEYOND: &[(&str, &str)] = &[
+    ("textures.toml", "images and normal maps"),
+    ("ground-grid.toml", "an image"),
+];
 
 /// The scene, small, with grids of samples.
 fn small(description: &Description) -> Description {
@@ -24,21 +41,36 @@ fn small(description: &Description) -> Description {
     let scale = f64::from(d.image.width) / 96.0;
     d.image.width = 96;
     d.image.height = (f64::from(d.image.height) / scale) as u32;
-    d.render.pixel_samples = SamplesDescription { pattern: Pattern::Grid, count: 4 };
-    d.render.light_samples = SamplesDescription { pattern: Pattern::Grid, count: 16 };
+    d.render.pixel_samples = SamplesDescription {
+        pattern: Pattern::Grid,
+        count: 4,
+    };
+    // The oracle knows textures at points, and follows both branches of every path through glass: so do the first two.
+    d.render.ray_differentials = false;
+    d.render.max_depth = 2;
+    d.render.light_samples = SamplesDescription {
+        pattern: Pattern::Grid,
+        count: 16,
+    };
     d
 }
 
 fn known() -> impl Iterator<Item = (String, Description)> {
     let scenes = scenes::descriptions().into_iter();
-    scenes.filter(|(name, _)| !BEYOND.iter().any(|(beyond, _)| beyond == name)).map(|(name, d)| (name, small(&d)))
+    scenes
+        .filter(|(name, _)| !BEYOND.iter().any(|(beyond, _)| beyond == name))
+        .map(|(name, d)| (name, small(&d)))
 }
 
 /// The share of pixels that differ by more than the tolerance.
 fn differing(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     assert_eq!(a.len(), b.len());
     let agree = |a: &f64, b: &f64| (a - b).abs() <= TOLERANCE * (1.0 + b.abs());
-    let differ = a.iter().zip(b).filter(|(a, b)| !a.iter().zip(*b).all(|(a, b)| agree(a, b))).count();
+    let differ = a
+        .iter()
+        .zip(b)
+        .filter(|(a, b)| !a.iter().zip(*b).all(|(a, b)| agree(a, b)))
+        .count();
     differ as f64 / a.len() as f64
 }
 
@@ -49,7 +81,11 @@ fn pictures_are_the_oracles() {
         for way in both() {
             let picture = means(&render(&scenes::packed(&description), way));
             let share = differing(&picture, &truth);
-            let worst = picture.iter().flatten().zip(truth.iter().flatten()).map(|(a, b)| (a - b).abs());
+            let worst = picture
+                .iter()
+                .flatten()
+                .zip(truth.iter().flatten())
+                .map(|(a, b)| (a - b).abs());
             let mean = |p: &[[f64; 3]]| p.iter().flatten().sum::<f64>() / p.len() as f64;
             println!(
                 "{name} {way:?}: {} of {} pixels differ by more than {TOLERANCE}, worst {:.1e}, mean by {:.1e}",
@@ -58,8 +94,12 @@ fn pictures_are_the_oracles() {
                 worst.fold(0.0, f64::max),
                 mean(&picture) / mean(&truth) - 1.0
             );
-            assert!(share <= EDGES, "{name}, {way:?}: {share} of the pixels differ");
-            assert!((mean(&picture) / mean(&truth) - 1.0).abs() < 1e-4, "{name}, {way:?}: the mean differs");
+            assert!(share <= edges(&name), "{name}, {way:?}: {share} of the pixels differ");
+            let drift = (mean(&picture) / mean(&truth) - 1.0).abs();
+            assert!(
+                drift < 0.2 * edges(&name),
+                "{name}, {way:?}: the mean differs by {drift}"
+            );
         }
     }
 }
@@ -78,23 +118,36 @@ fn a_flawed_oracle_is_found() {
             Flaw::CornerSamples,
             Flaw::NoShadows,
             Flaw::Exponent,
+            Flaw::InvertedIndex,
+            Flaw::TransposedTexture,
         ] {
             let share = differing(&picture, &Oracle::new(&description, flaw).picture());
             if share > 10.0 * EDGES {
                 found.push(flaw);
             }
             let everywhere = matches!(flaw, Flaw::MissingCosine | Flaw::ShiftedPixel | Flaw::CornerSamples);
-            assert!(!everywhere || share > 10.0 * EDGES, "{name}: {flaw:?} differs in {share} of the pixels only");
+            assert!(
+                !everywhere || share > 10.0 * EDGES,
+                "{name}: {flaw:?} differs in {share} of the pixels only"
+            );
         }
     }
-    for flaw in [Flaw::SwappedAxes, Flaw::NoShadows, Flaw::Exponent] {
+    for flaw in [
+        Flaw::SwappedAxes,
+        Flaw::NoShadows,
+        Flaw::Exponent,
+        Flaw::InvertedIndex,
+        Flaw::TransposedTexture,
+    ] {
         assert!(found.contains(&flaw), "{flaw:?} is found in no scene");
     }
 }
 
 /// Whether a first hit is what the oracle met.
 fn same_first_hit(hit: &FirstHit, meeting: &Option<Meeting>) -> bool {
-    let Some(meeting) = meeting else { return hit.shape == NOTHING && hit.depth == 0.0 };
+    let Some(meeting) = meeting else {
+        return hit.shape == NOTHING && hit.depth == 0.0;
+    };
     let close = |a: f64, b: f64| (a - b).abs() <= 2e-5 * (1.0 + b.abs());
     let (normal, uv): (DVec3, DVec2) = (hit.normal.as_dvec3(), hit.uv.as_dvec2());
     // An angle may be told from either side of where it starts, and has no digits near its pole.
@@ -116,12 +169,19 @@ fn first_hits_are_the_oracles() {
             let hits = first_hits(&scenes::packed(&description), way);
             let differing = |truth: &[Option<Meeting>]| {
                 assert_eq!(hits.len(), truth.len());
-                let differ = hits.iter().zip(truth).filter(|(hit, meeting)| !same_first_hit(hit, meeting)).count();
+                let differ = hits
+                    .iter()
+                    .zip(truth)
+                    .filter(|(hit, meeting)| !same_first_hit(hit, meeting))
+                    .count();
                 differ as f64 / hits.len() as f64
             };
             let share = differing(&truth);
             println!("{name} {way:?}: the first hits of {share} of the pixels differ");
-            assert!(share <= EDGES, "{name}, {way:?}: the first hits of {share} of the pixels differ");
+            assert!(
+                share <= EDGES,
+                "{name}, {way:?}: the first hits of {share} of the pixels differ"
+            );
             assert!(differing(&shifted) > 0.1, "{name}: a shifted pixel is not found");
         }
     }

@@ -4,10 +4,10 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 use wgray::scene::{
-    CameraDescription, Description, DirectionalLightDescription, EllipsoidDescription, ImageDescription,
-    LightDescription, MaterialDescription, OrthographicDescription, Pattern, PhongDescription, PlaneDescription,
-    PointLightDescription, RectangleLightDescription, RenderDescription, SamplesDescription, ShapeDescription,
-    SphereDescription,
+    CameraDescription, ColorDescription, Description, DirectionalLightDescription, EllipsoidDescription,
+    ImageDescription, LightDescription, MaterialDescription, OrthographicDescription, Pattern, PhongDescription,
+    PlaneDescription, PointLightDescription, RectangleLightDescription, RenderDescription, SamplesDescription,
+    ShapeDescription, SphereDescription,
 };
 
 use crate::pictures::{Way, both, first_hits, means, render};
@@ -17,16 +17,32 @@ use crate::scenes::packed;
 const SIDE: u32 = 64;
 
 fn grid(count: u32) -> SamplesDescription {
-    SamplesDescription { pattern: Pattern::Grid, count }
+    SamplesDescription {
+        pattern: Pattern::Grid,
+        count,
+    }
 }
 
 /// Nothing, seen by parallel rays from `from` towards `to`.
 fn empty(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
-    let camera = OrthographicDescription { position: from, look_at: to, up, height };
+    let camera = OrthographicDescription {
+        position: from,
+        look_at: to,
+        up,
+        height,
+    };
     Description {
-        image: ImageDescription { width: SIDE, height: SIDE },
+        image: ImageDescription {
+            width: SIDE,
+            height: SIDE,
+        },
         camera: CameraDescription::Orthographic(camera),
-        render: RenderDescription { pixel_samples: grid(1), shadow_epsilon: 1e-6, ..Default::default() },
+        render: RenderDescription {
+            pixel_samples: grid(1),
+            shadow_epsilon: 1e-6,
+            ..Default::default()
+        },
+        textures: Default::default(),
         materials: Default::default(),
         lights: Vec::new(),
         shapes: Vec::new(),
@@ -36,13 +52,14 @@ fn empty(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
 /// The plane z = 0 of a material, seen from above.
 fn floor(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shininess: f64) -> Description {
     let mut scene = empty(from, DVec3::new(from.x, from.y, 0.0), DVec3::Y, height);
-    let factor = |x| Some(DVec3::splat(x));
+    let factor = |x| Some(ColorDescription::Plain(DVec3::splat(x)));
     let phong = PhongDescription {
         color: None,
         ambient: factor(ambient),
         diffuse: factor(diffuse),
         specular: factor(specular),
         shininess,
+        normal_map: None,
     };
     scene.materials.insert("m".into(), MaterialDescription::Phong(phong));
     scene.shapes.push(ShapeDescription::Plane(PlaneDescription {
@@ -58,14 +75,20 @@ fn floor(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shini
 fn on_floor(from: DVec3, height: f64, pixel: u32) -> DVec2 {
     let step = height / f64::from(SIDE);
     let (column, row) = (f64::from(pixel % SIDE) + 0.5, f64::from(pixel / SIDE) + 0.5);
-    DVec2::new(from.x + column * step - height / 2.0, from.y + height / 2.0 - row * step)
+    DVec2::new(
+        from.x + column * step - height / 2.0,
+        from.y + height / 2.0 - row * step,
+    )
 }
 
 /// The largest difference of any pixel's green from its expected value.
 fn worst(scene: &Description, way: Way, expected: impl Fn(u32) -> f64) -> f64 {
     let picture = means(&render(&packed(scene), way));
     let difference = |(i, mean): (u32, &[f64; 3])| (mean[1] - expected(i)).abs();
-    (0..).zip(&picture).map(difference).fold(0.0, |a, b| if b <= a { a } else { b })
+    (0..)
+        .zip(&picture)
+        .map(difference)
+        .fold(0.0, |a, b| if b <= a { a } else { b })
 }
 
 /// Integral over x and y of 1 / sqrt(x^2 + y^2 + h^2): its mixed derivative is that.
@@ -106,13 +129,15 @@ fn light_of_a_rectangle_on_a_plane() {
     let (size, h) = ([1.5, 0.5], 0.8);
     let mut scene = floor(from, height, [0.0, 0.7, 0.0], 1.0);
     scene.render.light_samples = grid(1024);
-    scene.lights.push(LightDescription::Rectangle(RectangleLightDescription {
-        center: DVec3::new(0.0, 0.0, h),
-        size,
-        normal: -DVec3::Z,
-        tangent: DVec3::X,
-        color: DVec3::splat(0.9),
-    }));
+    scene
+        .lights
+        .push(LightDescription::Rectangle(RectangleLightDescription {
+            center: DVec3::new(0.0, 0.0, h),
+            size,
+            normal: -DVec3::Z,
+            tangent: DVec3::X,
+            color: DVec3::splat(0.9),
+        }));
     let swapped = [size[1], size[0]];
     for way in both() {
         let worst = |expected: &dyn Fn(DVec2) -> f64| {
@@ -124,7 +149,10 @@ fn light_of_a_rectangle_on_a_plane() {
         assert!(!(worst(&|_| 1.0) < 1e-2), "a missing cosine");
         assert!(!(worst(&|at| mean_cosine(swapped, h, at)) < 1e-2), "swapped axes");
         let pixel = height / f64::from(SIDE);
-        assert!(!(worst(&|at| mean_cosine(size, h, at + DVec2::X * pixel)) < 1e-2), "a shifted pixel");
+        assert!(
+            !(worst(&|at| mean_cosine(size, h, at + DVec2::X * pixel)) < 1e-2),
+            "a shifted pixel"
+        );
     }
 }
 
@@ -135,8 +163,15 @@ fn shadow_of_a_sphere() {
     let (center, radius, light) = (DVec3::new(0.0, 0.0, 2.0), 0.5, DVec3::new(-3.0, 0.0, 6.0));
     let mut scene = floor(from, height, [0.0, 1.0, 0.0], 1.0);
     scene.materials.insert("s".into(), scene.materials["m"].clone());
-    scene.shapes.push(ShapeDescription::Sphere(SphereDescription { material: "s".into(), center, radius }));
-    let point = PointLightDescription { position: light, color: DVec3::ONE };
+    scene.shapes.push(ShapeDescription::Sphere(SphereDescription {
+        material: "s".into(),
+        center,
+        radius,
+    }));
+    let point = PointLightDescription {
+        position: light,
+        color: DVec3::ONE,
+    };
     scene.lights.push(LightDescription::Point(point));
     let axis = center - light;
     let half_angle = (radius / axis.length()).asin();
@@ -147,7 +182,9 @@ fn shadow_of_a_sphere() {
         let lit = |pixel: u32| picture[pixel as usize][1] > 0.0;
         let wrong = |shift: DVec2, margin: f64| {
             let pixels = (0..SIDE * SIDE).filter(|pixel| inside(on_floor(from, height, *pixel)).abs() > margin);
-            pixels.filter(|pixel| lit(*pixel) == (inside(on_floor(from, height, *pixel) + shift) > 0.0)).count()
+            pixels
+                .filter(|pixel| lit(*pixel) == (inside(on_floor(from, height, *pixel) + shift) > 0.0))
+                .count()
         };
         assert_eq!(wrong(DVec2::ZERO, 1e-5), 0, "{way:?}");
         let pixel = height / f64::from(SIDE);
@@ -160,7 +197,10 @@ fn shadow_of_a_sphere() {
         let dark = (0..SIDE * SIDE).filter(|pixel| !lit(*pixel)).count() as f64 * pixel * pixel;
         println!("{way:?}: the shadow's area is {dark:.4}, of {:.4}", PI * long * short);
         assert!((dark / (PI * long * short) - 1.0).abs() < 0.01, "{way:?}: {dark}");
-        assert!(!((dark / (PI * long * long) - 1.0).abs() < 0.05), "a circle is found out");
+        assert!(
+            !((dark / (PI * long * long) - 1.0).abs() < 0.05),
+            "a circle is found out"
+        );
         // Outside of it the light arrives at the plane without falloff, by the cosine alone.
         let worst = (0..SIDE * SIDE).filter(|pixel| lit(*pixel)).map(|pixel| {
             let to = light - on_floor(from, height, pixel).extend(0.0);
@@ -174,21 +214,45 @@ fn shadow_of_a_sphere() {
 #[test]
 fn outlines_of_ellipsoids() {
     let ellipsoids = [
-        (DVec3::new(0.1, 0.2, -0.1), [DVec3::new(0.9, 0.3, 0.0), DVec3::new(-0.2, 0.6, 0.1), DVec3::new(0.1, 0.0, 0.4)]),
+        (
+            DVec3::new(0.1, 0.2, -0.1),
+            [
+                DVec3::new(0.9, 0.3, 0.0),
+                DVec3::new(-0.2, 0.6, 0.1),
+                DVec3::new(0.1, 0.0, 0.4),
+            ],
+        ),
         (DVec3::new(-0.3, 0.1, 0.2), [DVec3::X, DVec3::Y, DVec3::Z]),
-        (DVec3::new(0.2, -0.4, 0.0), [DVec3::X * 1.2, DVec3::new(0.6, 0.5, 0.0), DVec3::Z * 0.2]), // sheared
+        (
+            DVec3::new(0.2, -0.4, 0.0),
+            [DVec3::X * 1.2, DVec3::new(0.6, 0.5, 0.0), DVec3::Z * 0.2],
+        ), // sheared
     ];
-    let views = [DVec3::new(0.0, -5.0, 0.0), DVec3::new(3.0, -3.0, 2.0), DVec3::new(-2.0, 1.0, 4.0)];
+    let views = [
+        DVec3::new(0.0, -5.0, 0.0),
+        DVec3::new(3.0, -3.0, 2.0),
+        DVec3::new(-2.0, 1.0, 4.0),
+    ];
     for ((center, [a, b, c]), view) in ellipsoids.into_iter().flat_map(|e| views.map(|view| (e, view))) {
         let height = 4.0;
         let mut scene = floor(DVec3::Z, 1.0, [1.0, 0.0, 0.0], 1.0);
         scene.camera = empty(view, DVec3::ZERO, DVec3::Z, height).camera;
         (scene.image.width, scene.image.height) = (256, 256);
-        scene.shapes = vec![ShapeDescription::Ellipsoid(EllipsoidDescription { material: "m".into(), center, a, b, c })];
+        scene.shapes = vec![ShapeDescription::Ellipsoid(EllipsoidDescription {
+            material: "m".into(),
+            center,
+            a,
+            b,
+            c,
+        })];
         let forward = -view.normalize();
         let right = forward.cross(DVec3::Z).normalize();
         let up = right.cross(forward);
-        let shadow = DVec3::new(a.cross(b).dot(forward), b.cross(c).dot(forward), c.cross(a).dot(forward));
+        let shadow = DVec3::new(
+            a.cross(b).dot(forward),
+            b.cross(c).dot(forward),
+            c.cross(a).dot(forward),
+        );
         let area = PI * shadow.length();
         let pixel = height / 256.0;
         // From the middle of the picture, in pixels, to the right and down.
@@ -202,14 +266,32 @@ fn outlines_of_ellipsoids() {
                 .collect();
             let seen = covered.len() as f64 * pixel * pixel;
             let centroid = covered.iter().sum::<DVec2>() / covered.len() as f64;
-            assert!((seen / area - 1.0).abs() < 0.005, "{way:?} {center} from {view}: {seen} of {area}");
-            assert!((centroid - middle).length() < 0.1, "{way:?} {center} from {view}: {centroid} for {middle}");
+            assert!(
+                (seen / area - 1.0).abs() < 0.005,
+                "{way:?} {center} from {view}: {seen} of {area}"
+            );
+            assert!(
+                (centroid - middle).length() < 0.1,
+                "{way:?} {center} from {view}: {centroid} for {middle}"
+            );
             assert!(!((centroid + DVec2::X - middle).length() < 0.1), "a shifted pixel");
             // The nearest points of all: the middle's depth less the half width along the view.
-            let half = [a, b, c].map(|axis| axis.dot(forward)).map(|h| h * h).iter().sum::<f64>().sqrt();
+            let half = [a, b, c]
+                .map(|axis| axis.dot(forward))
+                .map(|h| h * h)
+                .iter()
+                .sum::<f64>()
+                .sqrt();
             let expected = (center - view).dot(forward) - half;
-            let nearest = hits.iter().filter(|hit| hit.shape == 0).map(|hit| f64::from(hit.depth)).fold(1e9, f64::min);
-            assert!((0.0..1e-3).contains(&(nearest - expected + 1e-6)), "{way:?}: {nearest} for {expected}");
+            let nearest = hits
+                .iter()
+                .filter(|hit| hit.shape == 0)
+                .map(|hit| f64::from(hit.depth))
+                .fold(1e9, f64::min);
+            assert!(
+                (0.0..1e-3).contains(&(nearest - expected + 1e-6)),
+                "{way:?}: {nearest} for {expected}"
+            );
         }
     }
 }
@@ -220,7 +302,12 @@ fn directional_light_on_a_plane() {
     for (exponent, other) in [(16.0, 15.0), (2.5, 2.4), (0.5, 0.6), (1.0, 1.5)] {
         let mut scene = floor(DVec3::new(5.0, -3.0, 2.0), 1.0, [0.0, 0.4, 0.6], exponent);
         let direction = DVec3::new(0.3, -0.2, -1.0);
-        scene.lights.push(LightDescription::Directional(DirectionalLightDescription { direction, color: DVec3::ONE }));
+        scene
+            .lights
+            .push(LightDescription::Directional(DirectionalLightDescription {
+                direction,
+                color: DVec3::ONE,
+            }));
         let cosine = -direction.z / direction.length();
         // Straight from above, v is the normal, so that r.v is n.l.
         let expected = |exponent: f64| 0.4 * cosine + 0.6 * cosine.powf(exponent);

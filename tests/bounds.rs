@@ -50,7 +50,11 @@ const BOUNDS: &[Bound] = &[
         unit: "2^-23 (1 + |y log2 x|) relative, where the power is a normal number",
         bound: 1.7,
         arguments: |random| loop {
-            let x = if random.once_in(2) { random.unit() } else { 1.0 - random.magnitude(-7.0, 0.0) } as f32;
+            let x = if random.once_in(2) {
+                random.unit()
+            } else {
+                1.0 - random.magnitude(-7.0, 0.0)
+            } as f32;
             let y = random.magnitude(-6.0, 6.0) as f32;
             if x > 0.0 && (f64::from(x).log2() * f64::from(y)) > -125.0 {
                 return vec![x, y];
@@ -126,7 +130,9 @@ fn largest(bound: &Bound, evaluate: &dyn Fn(&[u32]) -> Vec<u32>) -> f64 {
     let per = results.len() / CALLS;
     let errors = arguments.iter().zip(results.chunks_exact(per));
     // NaN must not pass, and `max` would drop it
-    errors.map(|(x, r)| (bound.error)(x, f64::from(f32::from_bits(r[0])))).fold(0.0, |a, b| if b <= a { a } else { b })
+    errors
+        .map(|(x, r)| (bound.error)(x, f64::from(f32::from_bits(r[0]))))
+        .fold(0.0, |a, b| if b <= a { a } else { b })
 }
 
 #[test]
@@ -136,14 +142,23 @@ fn functions_are_as_near_to_the_truth_as_they_promise() {
     let functions = functions(&module, &source);
     let mut problems = Vec::new();
     for bound in BOUNDS {
-        let (_, function) = functions.iter().find(|(_, f)| f.name() == bound.function).expect("the function");
+        let (_, function) = functions
+            .iter()
+            .find(|(_, f)| f.name() == bound.function)
+            .expect("the function");
         let words_out = function.words_out().len();
-        let mut figures = vec![("CPU", largest(bound, &|words| twin(bound.function).results(words, words_out)))];
+        let mut figures = vec![(
+            "CPU",
+            largest(bound, &|words| twin(bound.function).results(words, words_out)),
+        )];
         if let Some(device) = adapter::device() {
             figures.push(("GPU", largest(bound, &|words| function.run(device, words))));
         }
         for (path, error) in figures {
-            let line = format!("{path} {}: {error:.3} {}; promised {}", bound.function, bound.unit, bound.bound);
+            let line = format!(
+                "{path} {}: {error:.3} {}; promised {}",
+                bound.function, bound.unit, bound.bound
+            );
             println!("{line}");
             if !(error <= bound.bound) {
                 problems.push(line);
@@ -196,7 +211,11 @@ fn functions_have_their_exact_answers() {
         let mut results = vec![twin(name).results(&words, function.words_out().len())];
         results.extend(adapter::device().map(|device| function.run(device, &words)));
         for result in results {
-            assert_eq!(f32::from_bits(result[0]).to_bits(), expected.to_bits(), "{name}{arguments:?}");
+            assert_eq!(
+                f32::from_bits(result[0]).to_bits(),
+                expected.to_bits(),
+                "{name}{arguments:?}"
+            );
         }
     }
 }
@@ -218,7 +237,10 @@ fn a_function_that_is_further_from_the_truth_is_found() {
         source.append("changed", &text.replacen(from, to, 1));
         let module = parse(&source);
         let functions = functions(&module, &source);
-        let (_, function) = functions.iter().find(|(_, f)| f.name() == bound.function).expect("the function");
+        let (_, function) = functions
+            .iter()
+            .find(|(_, f)| f.name() == bound.function)
+            .expect("the function");
         let error = largest(bound, &|words| function.run_in(device, &source, words));
         assert!(!(error <= bound.bound), "{}: {error} with '{to}'", bound.function);
     }

@@ -2,14 +2,17 @@
 //! point of it, in its inside, on its edge or past it. Some of these have single numbers replaced by edge values, and
 //! some are random bits of all magnitudes.
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
 use naga::{Handle, Module, ScalarKind, Type};
+use wgray::cpu::differential::{Arrival, Derivative, Differential};
+use wgray::cpu::footprint::Footprint;
 use wgray::cpu::light::Segments;
+use wgray::cpu::path::Path;
 use wgray::cpu::phong::Lobes;
 use wgray::cpu::ray::{Hit, Ray};
 use wgray::cpu::shadow::{Block, cone_to_light};
 use wgray::cpu::surface::Surface;
-use wgray::pack::{Camera, FAR, Light, Material, NOTHING, Primitive, Sphere};
+use wgray::pack::{Camera, FAR, Light, Material, NOTHING, Primitive, Sphere, Texture};
 
 use crate::kernel::{Function, scalars};
 use crate::random::Random;
@@ -109,7 +112,11 @@ impl Situation {
         let rows = columns.inverse().transpose();
         let local = local_point(random);
         let away = vector(random) * random.pick(&[0.3, 1.0, 3.0, 300.0]);
-        let local_start = if random.once_in(8) { local + DVec3::new(away.x, away.y, 0.0) } else { local + away };
+        let local_start = if random.once_in(8) {
+            local + DVec3::new(away.x, away.y, 0.0)
+        } else {
+            local + away
+        };
         let target = center + columns * local;
         let start = center + columns * local_start;
         let primitive = Primitive {
@@ -125,7 +132,12 @@ impl Situation {
         let directional = random.once_in(4);
         let size = scale * random.pick(&[0.0, 0.3, 3.0]);
         let light = Light {
-            center: if directional { (target - start).normalize_or(DVec3::Z) } else { target + (target - start) }.as_vec3(),
+            center: if directional {
+                (target - start).normalize_or(DVec3::Z)
+            } else {
+                target + (target - start)
+            }
+            .as_vec3(),
             reach: if directional { 1e10 } else { 1.0 - 1e-5 },
             u: (vector(random) * size).as_vec3(),
             finite: if directional { 0.0 } else { 1.0 },
@@ -135,29 +147,64 @@ impl Situation {
             number: random.below(4),
         };
         let direction = target - start;
-        Situation { primitive, local, target, start, local_start, direction, light }
+        Situation {
+            primitive,
+            local,
+            target,
+            start,
+            local_start,
+            direction,
+            light,
+        }
     }
 
     /// An argument's words, by its type, and where a type says too little by its name.
-    fn argument(&self, (function, name): (&str, &str), module: &Module, ty: Handle<Type>, random: &Random, words: &mut Vec<u32>) {
+    fn argument(
+        &self,
+        (function, name): (&str, &str),
+        module: &Module,
+        ty: Handle<Type>,
+        random: &Random,
+        words: &mut Vec<u32>,
+    ) {
         match type_name(module, ty).as_str() {
             "Primitive" => self.primitive.write(words),
             "Light" => self.light.write(words),
             "Ray" => self.ray(random).write(words),
             "Hit" => {
-                Hit { t: random.pick(&[FAR, self.t() as f32]), primitive: random.pick(&[NOTHING, 0, 7]) }.write(words);
+                Hit {
+                    t: random.pick(&[FAR, self.t() as f32]),
+                    primitive: random.pick(&[NOTHING, 0, 7]),
+                }
+                .write(words);
             }
             "Surface" => self.surface(random).write(words),
             "Segments" => {
                 let towards = (self.target - self.start).as_vec3();
-                Segments { towards, u: self.light.u, v: self.light.v }.write(words);
+                Segments {
+                    towards,
+                    u: self.light.u,
+                    v: self.light.v,
+                }
+                .write(words);
             }
             "Block" => block(random).write(words),
+            "Path" => self.path(random).write(words),
+            "Derivative" => derivative(random).write(words),
+            "Differential" => differential(random).write(words),
+            "Arrival" => arrival(random).write(words),
+            "Footprint" => footprint(random).write(words),
+            "Texture" => texture(random).write(words),
+            "i32" => words.push((random.pick(&[random.below(20), random.below(40_000)]) as i32 - 20) as u32),
             "Sphere" => self.sphere(random).write(words),
             "Cone" => cone_to_light(&self.light, self.start.as_vec3()).write(words),
             "Material" => material(random).write(words),
             "Camera" => self.camera(random).write(words),
-            "Lobes" => Lobes { diffuse: random.unit() as f32, specular: random.unit() as f32 }.write(words),
+            "Lobes" => Lobes {
+                diffuse: random.unit() as f32,
+                specular: random.unit() as f32,
+            }
+            .write(words),
             "vec3<f32>" => self.vector(name, random).write(words),
             "f32" => self.number(name, random).write(words),
             "u32" => whole(function, name, random).write(words),
@@ -180,22 +227,52 @@ impl Situation {
             1 => -self.direction,
             _ => self.direction,
         };
-        let origin = if random.once_in(8) { self.primitive.center.as_dvec3() } else { self.start };
-        Ray { origin: origin.as_vec3(), direction: along.normalize_or(DVec3::X).as_vec3() }
+        let origin = if random.once_in(8) {
+            self.primitive.center.as_dvec3()
+        } else {
+            self.start
+        };
+        Ray {
+            origin: origin.as_vec3(),
+            direction: along.normalize_or(DVec3::X).as_vec3(),
+        }
     }
 
     fn surface(&self, random: &Random) -> Surface {
         let normal = vector(random).normalize().as_vec3();
         let position = self.start.as_vec3();
-        let wo = if random.once_in(4) { normal } else { vector(random).normalize().as_vec3() };
-        Surface { position, normal, wo, start: position + normal * 1e-5 }
+        let wo = if random.once_in(4) {
+            normal
+        } else {
+            vector(random).normalize().as_vec3()
+        };
+        Surface {
+            position,
+            normal,
+            wo,
+            start: position + normal * 1e-5,
+            side: random.pick(&[1.0, -1.0]),
+        }
+    }
+
+    fn path(&self, random: &Random) -> Path {
+        Path {
+            ray: self.ray(random),
+            differential: differential(random),
+            throughput: color(random),
+            depth: random.below(10),
+            branch: random.below(4),
+        }
     }
 
     /// About the way to the light, or off it.
     fn sphere(&self, random: &Random) -> Sphere {
         let away = self.direction.length() * random.pick(&[0.0, 0.1, 0.5, 2.0]);
         let center = self.start + self.direction * random.between(-0.5, 1.5) + vector(random) * away;
-        Sphere { center: center.as_vec3(), radius: (away * random.pick(&[0.5, 1.0, 0.1, 1e18])) as f32 }
+        Sphere {
+            center: center.as_vec3(),
+            radius: (away * random.pick(&[0.5, 1.0, 0.1, 1e18])) as f32,
+        }
     }
 
     fn camera(&self, random: &Random) -> Camera {
@@ -228,10 +305,17 @@ impl Situation {
             "limit" => random.pick(&[FAR, FAR, self.t() as f32, (2.0 * self.t()) as f32]),
             "t" => random.pick(&[self.t() as f32, FAR]),
             "reach" => random.pick(&[self.light.reach, 1.0 - 1e-5, 1e10, 1.0]),
+            "cosine" | "cosine_i" | "cosine_t" | "random" | "line_width" => random.unit() as f32,
+            "eta" | "anisotropy" => random.magnitude(-1.0, 1.0) as f32,
             "epsilon" => random.pick(&[1e-5, 1e-4, 0.0]),
             _ => {
                 let (unit, sign) = (random.unit(), random.pick(&[1.0, -1.0]));
-                random.pick(&[unit, unit * sign, sign * random.magnitude(-5.0, 3.0), 1000.0 * unit.floor()]) as f32
+                random.pick(&[
+                    unit,
+                    unit * sign,
+                    sign * random.magnitude(-5.0, 3.0),
+                    1000.0 * unit.floor(),
+                ]) as f32
             }
         }
     }
@@ -266,6 +350,65 @@ fn local_point(random: &Random) -> DVec3 {
     }
 }
 
+fn derivative(random: &Random) -> Derivative {
+    let any = || (vector(random) * random.pick(&[0.0, 1e-3, 1e-3, 1.0])).as_vec3();
+    Derivative {
+        position: any(),
+        direction: any(),
+    }
+}
+
+fn differential(random: &Random) -> Differential {
+    Differential {
+        x: derivative(random),
+        y: derivative(random),
+    }
+}
+
+fn arrival(random: &Random) -> Arrival {
+    let Differential { x, y } = differential(random);
+    Arrival {
+        x,
+        y,
+        normal_x: derivative(random).position,
+        normal_y: derivative(random).direction,
+    }
+}
+
+/// From a point to many repetitions of a texture, long and short, along its axes and across.
+fn footprint(random: &Random) -> Footprint {
+    let uv = Vec2::new(random.between(-3.0, 3.0) as f32, random.between(-3.0, 3.0) as f32);
+    let size = random.magnitude(-4.0, 1.5);
+    let edge = |size: f64| {
+        let v = vector(random) * size;
+        random
+            .pick(&[v.truncate(), v.truncate(), DVec2::new(v.x, 0.0), DVec2::ZERO])
+            .as_vec2()
+    };
+    Footprint {
+        uv,
+        dx: edge(size),
+        dy: edge(size * random.pick(&[1.0, 0.1, 0.01])),
+    }
+}
+
+fn texture(random: &Random) -> Texture {
+    Texture {
+        first: color(random),
+        kind: random.below(6),
+        second: color(random),
+        parameter: random.unit() as f32,
+        u: vector(random).as_vec3(),
+        format: random.below(3),
+        v: vector(random).as_vec3(),
+        wrap: random.below(3),
+        texels: 0,
+        width: 1 + random.below(300),
+        height: 1 + random.below(300),
+        levels: 1 + random.below(9),
+    }
+}
+
 fn block(random: &Random) -> Block {
     Block {
         pattern: whole("block_sample", "pattern", random),
@@ -281,24 +424,37 @@ fn material(random: &Random) -> Material {
     let exponent = random.pick(&[0, 1, 2, 16, 50, 4096]);
     let mut material: Material = bytemuck::Zeroable::zeroed();
     material.ambient = color(random);
-    material.kind = random.below(2);
+    material.kind = random.below(4);
     material.diffuse = color(random);
     material.specular = color(random);
     material.exponent = exponent;
-    material.shininess = if random.once_in(2) { exponent as f32 } else { random.magnitude(-6.0, 6.0) as f32 };
+    material.shininess = if random.once_in(2) {
+        exponent as f32
+    } else {
+        random.magnitude(-6.0, 6.0) as f32
+    };
     material
 }
 
 /// Whole numbers are small where they count something.
 fn whole(function: &str, name: &str, random: &Random) -> u32 {
     match name {
-        "kind" | "pattern" => random.below(8),
+        "kind" | "pattern" | "wrap" | "format" => random.below(8),
+        "size" => 1 + random.pick(&[random.below(20), random.below(16_384)]),
+        "level" => random.below(15),
         "count" => 1 + random.below(256),
         "i" if function == "block_sample" => random.below(32),
         "exponent_bits" => random.below(14),
         "bits" if function == "power_whole" => random.below(14),
         "side" => 1 + random.below(16),
-        _ => random.pick(&[0, 1, random.below(300), random.below(1 << 16), random.bits() as u32, u32::MAX]),
+        _ => random.pick(&[
+            0,
+            1,
+            random.below(300),
+            random.below(1 << 16),
+            random.bits() as u32,
+            u32::MAX,
+        ]),
     }
 }
 

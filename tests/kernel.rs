@@ -16,9 +16,11 @@ pub fn scalars(module: &Module, ty: Handle<Type>) -> Vec<ScalarKind> {
         TypeInner::Scalar(s) => vec![s.kind],
         TypeInner::Vector { size, scalar } => vec![scalar.kind; *size as usize],
         TypeInner::Struct { members, .. } => members.iter().flat_map(|m| scalars(module, m.ty)).collect(),
-        TypeInner::Array { base, size: naga::ArraySize::Constant(n), .. } => {
-            scalars(module, *base).repeat(n.get() as usize)
-        }
+        TypeInner::Array {
+            base,
+            size: naga::ArraySize::Constant(n),
+            ..
+        } => scalars(module, *base).repeat(n.get() as usize),
         other => panic!("no kernel can be made for a function of {other:?}"),
     }
 }
@@ -32,7 +34,10 @@ pub struct Function<'a> {
 /// The functions of the shared files, by file.
 pub fn functions<'a>(module: &'a Module, source: &Source) -> Vec<(String, Function<'a>)> {
     let of = |(handle, function)| {
-        (file_of(source, module.functions.get_span(handle)), Function { module, function })
+        (
+            file_of(source, module.functions.get_span(handle)),
+            Function { module, function },
+        )
     };
     module.functions.iter().map(of).collect()
 }
@@ -44,16 +49,27 @@ impl Function<'_> {
 
     /// Names and types of the arguments.
     pub fn arguments(&self) -> Vec<(String, Handle<Type>)> {
-        self.function.arguments.iter().map(|a| (a.name.clone().unwrap_or_default(), a.ty)).collect()
+        self.function
+            .arguments
+            .iter()
+            .map(|a| (a.name.clone().unwrap_or_default(), a.ty))
+            .collect()
     }
 
     pub fn result(&self) -> Handle<Type> {
-        self.function.result.as_ref().expect("a shared function has a result").ty
+        self.function
+            .result
+            .as_ref()
+            .expect("a shared function has a result")
+            .ty
     }
 
     /// How many words its arguments have.
     pub fn words_in(&self) -> usize {
-        self.arguments().iter().map(|(_, ty)| scalars(self.module, *ty).len()).sum()
+        self.arguments()
+            .iter()
+            .map(|(_, ty)| scalars(self.module, *ty).len())
+            .sum()
     }
 
     /// The kinds of the words of its result.
@@ -69,10 +85,17 @@ impl Function<'_> {
                         fn probe(@builtin(global_invocation_id) id: vec3u) {\n"
             .to_string();
         let (words_in, words_out) = (self.words_in(), self.words_out().len());
-        let _ = writeln!(text, "    let i = id.x * {words_in}u;\n    let o = id.x * {words_out}u;");
+        let _ = writeln!(
+            text,
+            "    let i = id.x * {words_in}u;\n    let o = id.x * {words_out}u;"
+        );
         let _ = writeln!(text, "    if i >= arrayLength(&probe_in) {{ return; }}");
         let mut next = 0;
-        let arguments: Vec<String> = self.arguments().iter().map(|(_, ty)| self.read(*ty, &mut next)).collect();
+        let arguments: Vec<String> = self
+            .arguments()
+            .iter()
+            .map(|(_, ty)| self.read(*ty, &mut next))
+            .collect();
         let _ = writeln!(text, "    let result = {}({});", self.name(), arguments.join(", "));
         self.write(self.result(), "result", &mut 0, &mut text);
         text.push_str("}\n");
@@ -88,9 +111,11 @@ impl Function<'_> {
                 list((0..*size as u8).map(|_| read_word(scalar.kind, next)).collect())
             }
             TypeInner::Struct { members, .. } => list(members.iter().map(|m| self.read(m.ty, next)).collect()),
-            TypeInner::Array { base, size: naga::ArraySize::Constant(n), .. } => {
-                list((0..n.get()).map(|_| self.read(*base, next)).collect())
-            }
+            TypeInner::Array {
+                base,
+                size: naga::ArraySize::Constant(n),
+                ..
+            } => list((0..n.get()).map(|_| self.read(*base, next)).collect()),
             other => panic!("no kernel can be made for an argument {other:?}"),
         }
     }
@@ -110,7 +135,11 @@ impl Function<'_> {
                     self.write(member.ty, &format!("{value}.{field}"), next, text);
                 }
             }
-            TypeInner::Array { base, size: naga::ArraySize::Constant(n), .. } => {
+            TypeInner::Array {
+                base,
+                size: naga::ArraySize::Constant(n),
+                ..
+            } => {
                 for i in 0..n.get() {
                     self.write(*base, &format!("{value}[{i}]"), next, text);
                 }
@@ -158,12 +187,18 @@ fn write_word(kind: ScalarKind, value: &str, next: &mut u32, text: &mut String) 
 /// take SPIR-V it goes the way of the renderer's exact kernels.
 fn run(device: &Device, source: &Source, input: &[u32], calls: usize, output: usize) -> Vec<u32> {
     let (wgpu, queue) = device.wgpu();
-    let checked = check(source).unwrap_or_else(|error| panic!("{error}\n{}", error.excerpt.clone().unwrap_or_default()));
+    let checked =
+        check(source).unwrap_or_else(|error| panic!("{error}\n{}", error.excerpt.clone().unwrap_or_default()));
     let module = if device.info.exact {
-        let spirv = checked.exact_entry("probe", &[]).expect("SPIR-V of a kernel that naga accepts");
+        let spirv = checked
+            .exact_entry("probe", &[])
+            .expect("SPIR-V of a kernel that naga accepts");
         let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
-            entry_points: vec![wgpu::PassthroughShaderEntryPoint { name: "probe".into(), workgroup_size: (64, 1, 1) }]
-                .into(),
+            entry_points: vec![wgpu::PassthroughShaderEntryPoint {
+                name: "probe".into(),
+                workgroup_size: (64, 1, 1),
+            }]
+            .into(),
             spirv: Some(spirv.into()),
             ..Default::default()
         };
@@ -205,15 +240,26 @@ fn run(device: &Device, source: &Source, input: &[u32], calls: usize, output: us
         contents: bytemuck::cast_slice(input),
         usage: wgpu::BufferUsages::STORAGE,
     });
-    let buffer = |usage| wgpu::BufferDescriptor { label: None, size: output as u64 * 4, usage, mapped_at_creation: false };
+    let buffer = |usage| wgpu::BufferDescriptor {
+        label: None,
+        size: output as u64 * 4,
+        usage,
+        mapped_at_creation: false,
+    };
     let written = wgpu.create_buffer(&buffer(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC));
     let staging = wgpu.create_buffer(&buffer(wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ));
     let group = wgpu.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,
         layout: &layout,
         entries: &[
-            wgpu::BindGroupEntry { binding: 0, resource: read.as_entire_binding() },
-            wgpu::BindGroupEntry { binding: 1, resource: written.as_entire_binding() },
+            wgpu::BindGroupEntry {
+                binding: 0,
+                resource: read.as_entire_binding(),
+            },
+            wgpu::BindGroupEntry {
+                binding: 1,
+                resource: written.as_entire_binding(),
+            },
         ],
     });
     let mut encoder = wgpu.create_command_encoder(&Default::default());
@@ -224,8 +270,11 @@ fn run(device: &Device, source: &Source, input: &[u32], calls: usize, output: us
     drop(pass);
     encoder.copy_buffer_to_buffer(&written, 0, &staging, 0, staging.size());
     queue.submit([encoder.finish()]);
-    staging.map_async(wgpu::MapMode::Read, .., |result| result.expect("a buffer that can be mapped"));
-    wgpu.poll(wgpu::PollType::wait_indefinitely()).expect("the end of the kernel");
+    staging.map_async(wgpu::MapMode::Read, .., |result| {
+        result.expect("a buffer that can be mapped")
+    });
+    wgpu.poll(wgpu::PollType::wait_indefinitely())
+        .expect("the end of the kernel");
     let view = staging.get_mapped_range(..).expect("a mapped buffer");
     bytemuck::pod_collect_to_vec(&view)
 }

@@ -25,12 +25,21 @@ fn wgsl_layouts(source: &Source) -> BTreeMap<String, Layout> {
     let module = parse(source);
     let mut layouts = BTreeMap::new();
     for (handle, ty) in module.types.iter() {
-        let TypeInner::Struct { members, span } = &ty.inner else { continue };
+        let TypeInner::Struct { members, span } = &ty.inner else {
+            continue;
+        };
         if file_of(source, module.types.get_span(handle)) == LAYOUT {
             let field = |m: &naga::StructMember| {
-                (m.name.clone().unwrap_or_default(), sources::type_name(&module, m.ty), m.offset)
+                (
+                    m.name.clone().unwrap_or_default(),
+                    sources::type_name(&module, m.ty),
+                    m.offset,
+                )
             };
-            layouts.insert(ty.name.clone().unwrap_or_default(), (members.iter().map(field).collect(), *span));
+            layouts.insert(
+                ty.name.clone().unwrap_or_default(),
+                (members.iter().map(field).collect(), *span),
+            );
         }
     }
     layouts
@@ -54,7 +63,10 @@ fn rust_layouts(records: &[Signature]) -> BTreeMap<String, Layout> {
 
 /// In bytes, of a scalar, vector or array as glam has them.
 fn size(ty: &str) -> u32 {
-    if let Some((element, length)) = ty.strip_prefix("array<").and_then(|t| t.strip_suffix('>')?.rsplit_once(", ")) {
+    if let Some((element, length)) = ty
+        .strip_prefix("array<")
+        .and_then(|t| t.strip_suffix('>')?.rsplit_once(", "))
+    {
         return size(element) * length.parse::<u32>().expect("a length");
     }
     match ty.split_once('<').map_or(ty, |(vector, _)| vector) {
@@ -108,7 +120,10 @@ fn every_uploaded_record_is_known_to_have_no_padding() {
         let Item::Struct(record) = item else { continue };
         if record.attrs.iter().any(|a| a.path().is_ident("repr")) {
             let derives = |a: &syn::Attribute| {
-                a.path().is_ident("derive") && a.meta.require_list().is_ok_and(|l| l.tokens.to_string().contains("Pod"))
+                a.path().is_ident("derive")
+                    && a.meta
+                        .require_list()
+                        .is_ok_and(|l| l.tokens.to_string().contains("Pod"))
             };
             assert!(record.attrs.iter().any(derives), "{} must derive Pod", record.ident);
         }
@@ -118,25 +133,42 @@ fn every_uploaded_record_is_known_to_have_no_padding() {
 #[test]
 fn a_changed_record_is_found() {
     let changes = [
-        ("dropped", "    determinant: f32, ", "    // determinant: f32, "),
-        ("renamed", "    determinant: f32, ", "    determinants: f32, "),
+        ("dropped", "    number: u32, ", "    // number: u32, "),
+        ("renamed", "    number: u32, ", "    numbers: u32, "),
         ("of another type", "    seed: u32,", "    seed: i32,"),
         ("at another offset", "    reach: f32, ", "    @align(16) reach: f32, "),
         ("added", "    seed: u32,", "    seed: u32,\n    seed2: u32,"),
-        ("moved", "    position: vec3f,\n    projection: u32, ", "    projection: u32,\n    position: vec3f, "),
-        ("a new record", "struct Work {", "struct Other { a: u32 }\nstruct Work {"),
+        (
+            "moved",
+            "    position: vec3f,\n    projection: u32, ",
+            "    projection: u32,\n    position: vec3f, ",
+        ),
+        (
+            "a new record",
+            "struct Work {",
+            "struct Other { a: u32 }\nstruct Work {",
+        ),
     ];
     for (what, from, to) in changes {
         let mut source = shared_source();
-        assert!(source.text.contains(from), "{what}: '{from}' is not there to be changed");
+        assert!(
+            source.text.contains(from),
+            "{what}: '{from}' is not there to be changed"
+        );
         source = edited(&source, from, to);
         assert!(!layout_differences(&source, &pack_records()).is_empty(), "{what}");
     }
     let mut records = pack_records();
     records[0].parts.pop();
-    assert!(!layout_differences(&shared_source(), &records).is_empty(), "a field dropped in Rust");
+    assert!(
+        !layout_differences(&shared_source(), &records).is_empty(),
+        "a field dropped in Rust"
+    );
     records.remove(0);
-    assert!(!layout_differences(&shared_source(), &records).is_empty(), "a record dropped in Rust");
+    assert!(
+        !layout_differences(&shared_source(), &records).is_empty(),
+        "a record dropped in Rust"
+    );
 }
 
 /// The shared files with one place changed.
@@ -162,7 +194,9 @@ fn wgsl_constants(source: &Source) -> BTreeMap<String, Value> {
     let of_file = module.constants.iter().filter(|(handle, constant)| {
         constant.name.is_some() && file_of(source, module.constants.get_span(*handle)) == CONSTANTS
     });
-    of_file.map(|(_, c)| (c.name.clone().unwrap_or_default(), wgsl_value(&module, c.init))).collect()
+    of_file
+        .map(|(_, c)| (c.name.clone().unwrap_or_default(), wgsl_value(&module, c.init)))
+        .collect()
 }
 
 fn wgsl_value(module: &Module, handle: naga::Handle<Expression>) -> Value {
@@ -170,7 +204,9 @@ fn wgsl_value(module: &Module, handle: naga::Handle<Expression>) -> Value {
         Expression::Literal(Literal::F32(x)) => Value::Float(x.to_bits()),
         Expression::Literal(Literal::U32(n)) => Value::Whole(*n),
         Expression::Constant(constant) => wgsl_value(module, module.constants[*constant].init),
-        Expression::Compose { components, .. } => Value::List(components.iter().map(|c| wgsl_value(module, *c)).collect()),
+        Expression::Compose { components, .. } => {
+            Value::List(components.iter().map(|c| wgsl_value(module, *c)).collect())
+        }
         other => panic!("a shared constant is a number, not {other:?}"),
     }
 }
@@ -230,7 +266,10 @@ fn number(expression: &Expr) -> Option<f64> {
 
 #[test]
 fn constants_are_the_same() {
-    let (wgsl, rust) = (wgsl_constants(&shared_source()), rust_constants(&sources::rust("src/pack.rs")));
+    let (wgsl, rust) = (
+        wgsl_constants(&shared_source()),
+        rust_constants(&sources::rust("src/pack.rs")),
+    );
     assert!(wgsl.len() >= 13, "the constants were not found");
     assert_eq!(wgsl, rust);
 }
@@ -242,7 +281,10 @@ fn a_changed_constant_is_found() {
         ("const PLANE: u32 = 3u;", "const PLANE: u32 = 4u;"),
         ("const PLANE: u32 = 3u;", ""),
         ("3.4028234663852886e38", "3.4028232635611926e38"),
-        ("const BLOCK: u32 = 32u;", "const BLOCK: u32 = 32u;\nconst OTHER: u32 = 1u;"),
+        (
+            "const BLOCK: u32 = 32u;",
+            "const BLOCK: u32 = 32u;\nconst OTHER: u32 = 1u;",
+        ),
     ] {
         let source = without_users(from, to);
         assert_ne!(wgsl_constants(&source), rust, "'{to}' in place of '{from}'");
@@ -284,14 +326,19 @@ fn overrides_are_the_fields_of_the_specialization() {
         let source = sources::shaders().compose(kernel, None);
         assert_eq!(override_differences(&source, &names), Vec::<String>::new());
         // negative controls
-        assert!(!override_differences(&source, &names[1..]).is_empty(), "one that Rust lacks");
+        assert!(
+            !override_differences(&source, &names[1..]).is_empty(),
+            "one that Rust lacks"
+        );
         let more: Vec<&str> = names.iter().copied().chain(["MORE"]).collect();
         assert!(!override_differences(&source, &more).is_empty(), "one that WGSL lacks");
     }
     let upper = |field: &str| field.to_uppercase();
     let debug = format!("{:?}", Specialization::default());
     for name in names {
-        let field = debug.split(|c: char| !c.is_alphanumeric() && c != '_').any(|field| upper(field) == name);
+        let field = debug
+            .split(|c: char| !c.is_alphanumeric() && c != '_')
+            .any(|field| upper(field) == name);
         assert!(field, "{name} is the upper case of a field's name");
     }
 }
@@ -301,7 +348,11 @@ fn every_shader_file_is_in_the_program() {
     let mut found = Vec::new();
     for folder in ["", "kernels/"] {
         for entry in std::fs::read_dir(sources::path("shaders").join(folder)).expect("the shaders") {
-            let name = entry.expect("an entry").file_name().into_string().expect("a plain name");
+            let name = entry
+                .expect("an entry")
+                .file_name()
+                .into_string()
+                .expect("a plain name");
             if name.ends_with(".wgsl") {
                 found.push(format!("{folder}{name}"));
             }

@@ -2,9 +2,10 @@
 //! the twins, which could share a mistake: ellipsoids are quadrics, triangles Moeller and Trumbore's, rectangles are
 //! cut out of their planes by projection, and Phong's model is the formula of `docs/scene-format.md` with unit vectors.
 
-use glam::{DMat4, DVec2, DVec3, DVec4};
+use glam::{DMat4, DVec2, DVec3, DVec4, Vec2Swizzles};
 use wgray::scene::{
-    CameraDescription, Description, LightDescription, MaterialDescription, PhongDescription, ShapeDescription,
+    CameraDescription, ColorDescription, Description, LightDescription, MaterialDescription, PhongDescription, Shadows,
+    ShapeDescription, TextureDescription,
 };
 
 /// A mistake that the tests of the tests make on purpose.
@@ -23,6 +24,10 @@ pub enum Flaw {
     NoShadows,
     /// The specular exponent one too low.
     Exponent,
+    /// Glass and what is before it confused.
+    InvertedIndex,
+    /// Rows of a texture confused with columns.
+    TransposedTexture,
 }
 
 pub struct Oracle<'a> {
@@ -42,10 +47,18 @@ struct Solid {
 
 enum Form {
     /// The points p with (p, 1)^T Q (p, 1) = 0, and the map from its local space.
-    Quadric { q: DMat4, from_local: DMat4 },
+    Quadric {
+        q: DMat4,
+        from_local: DMat4,
+    },
     Triangle([DVec3; 3]),
     /// Centre, unit tangent and bitangent, and half the sizes along them; endless if there are no sizes.
-    Flat { center: DVec3, tangent: DVec3, bitangent: DVec3, half: Option<DVec2> },
+    Flat {
+        center: DVec3,
+        tangent: DVec3,
+        bitangent: DVec3,
+        half: Option<DVec2>,
+    },
 }
 
 /// What a ray meets.
@@ -63,13 +76,21 @@ impl<'a> Oracle<'a> {
         let mut solids = Vec::new();
         for (shape, description) in scene.shapes.iter().enumerate() {
             let (material, forms) = forms(description, flaw);
-            let solid = |form| Solid { form, shape, material: Some(material.clone()) };
+            let solid = |form| Solid {
+                form,
+                shape,
+                material: Some(material.clone()),
+            };
             solids.extend(forms.into_iter().map(solid));
         }
         for (number, light) in scene.lights.iter().enumerate() {
             if let LightDescription::Rectangle(light) = light {
                 let form = flat(light.center, light.normal, light.tangent, Some(light.size), flaw);
-                solids.push(Solid { form, shape: scene.shapes.len() + number, material: None });
+                solids.push(Solid {
+                    form,
+                    shape: scene.shapes.len() + number,
+                    material: None,
+                });
             }
         }
         Oracle { scene, solids, flaw }
@@ -81,7 +102,10 @@ impl<'a> Oracle<'a> {
         let places = self.grid(self.scene.render.pixel_samples.count);
         let pixel = |i: u32| {
             let corner = DVec2::new(f64::from(i % width), f64::from(i / width));
-            let sum: DVec3 = places.iter().map(|place| self.radiance(self.camera_ray(corner + *place))).sum();
+            let sum: DVec3 = places
+                .iter()
+                .map(|place| self.radiance(self.camera_ray(corner + *place), 0))
+                .sum();
             (sum / places.len() as f64).to_array()
         };
         (0..width * height).map(pixel).collect()
@@ -116,13 +140,20 @@ impl<'a> Oracle<'a> {
             let right = forward.cross(up).normalize();
             (forward, right, right.cross(forward))
         };
-        let column = if self.flaw == Flaw::ShiftedPixel { at.x - 1.0 } else { at.x };
+        let column = if self.flaw == Flaw::ShiftedPixel {
+            at.x - 1.0
+        } else {
+            at.x
+        };
         let (to_right, to_top) = (column - width / 2.0, height / 2.0 - at.y);
         match &self.scene.camera {
             CameraDescription::Perspective(c) => {
                 let (forward, right, up) = basis(c.position, c.look_at, c.up);
                 let pixel = 2.0 * (c.fov.to_radians() / 2.0).tan() / height;
-                (c.position, (forward + right * (to_right * pixel) + up * (to_top * pixel)).normalize())
+                (
+                    c.position,
+                    (forward + right * (to_right * pixel) + up * (to_top * pixel)).normalize(),
+                )
             }
             CameraDescription::Orthographic(c) => {
                 let (forward, right, up) = basis(c.position, c.look_at, c.up);
@@ -144,31 +175,74 @@ impl<'a> Oracle<'a> {
         }
         let (t, i) = nearest?;
         let (normal, uv) = facing(&self.solids[i].form, origin + direction * t);
-        Some(Meeting { t, shape: self.solids[i].shape, normal, uv, solid: i })
+        Some(Meeting {
+            t,
+            shape: self.solids[i].shape,
+            normal,
+            uv,
+            solid: i,
+        })
     }
 
-    fn radiance(&self, (origin, direction): (DVec3, DVec3)) -> DVec3 {
+    /// `bounces` by mirrors and glass lie behind.
+    fn radiance(&self, (origin, direction): (DVec3, DVec3), bounces: u32) -> DVec3 {
         let render = &self.scene.render;
-        let Some(meeting) = self.nearest(origin, direction) else { return render.background };
+        let Some(meeting) = self.nearest(origin, direction) else {
+            return render.background;
+        };
         let Some(material) = &self.solids[meeting.solid].material else {
             return light_color(&self.scene.lights[meeting.shape - self.scene.shapes.len()]);
         };
-        let phong = match &self.scene.materials[material] {
-            MaterialDescription::Phong(phong) => phong,
-            other => panic!("the oracle does not know the material {other:?}"),
-        };
-        let factor = |own: Option<DVec3>| own.or(phong.color).expect("a checked material");
         let point = origin + direction * meeting.t;
-        let viewer = -direction;
-        let normal = if meeting.normal.dot(viewer) < 0.0 { -meeting.normal } else { meeting.normal };
+        let facing = meeting.normal.dot(direction) < 0.0;
+        let normal = if facing { meeting.normal } else { -meeting.normal };
         // "how far above the surface a shadow ray starts, relative to the largest coordinate there"
-        let coordinate = point.abs().max_element().max(meeting.t);
-        let above = point + normal * (render.shadow_epsilon * coordinate);
-        let mut sum = render.ambient * factor(phong.ambient);
+        let offset = normal * (render.shadow_epsilon * point.abs().max_element().max(meeting.t));
+        let follow = |origin: DVec3, direction: DVec3| self.radiance((origin, direction), bounces + 1);
+        match &self.scene.materials[material] {
+            MaterialDescription::Phong(phong) => self.direct(phong, &meeting, normal, point + offset, -direction),
+            _ if bounces == render.max_depth => render.background,
+            MaterialDescription::Mirror(mirror) => {
+                assert!(mirror.normal_map.is_none(), "the oracle knows no normal maps");
+                self.color(&mirror.tint, meeting.uv) * follow(point + offset, direction.reflect(normal))
+            }
+            MaterialDescription::Glass(glass) => {
+                assert!(glass.normal_map.is_none(), "the oracle knows no normal maps");
+                let outside_in = facing != (self.flaw == Flaw::InvertedIndex);
+                let (n1, n2) = if outside_in { (1.0, glass.ior) } else { (glass.ior, 1.0) };
+                let reflected = follow(point + offset, direction.reflect(normal));
+                // Snell's law by sines, in the plane of incidence
+                let along = direction - normal * direction.dot(normal);
+                let sine = along.length() * n1 / n2;
+                if sine >= 1.0 {
+                    return reflected;
+                }
+                let (cosine1, cosine2) = (-direction.dot(normal), (1.0 - sine * sine).sqrt());
+                let refracted = along * (n1 / n2) - normal * cosine2;
+                // Fresnel's equations with both indices: Hecht, "Optics", 4.6.2
+                let perpendicular = (n1 * cosine1 - n2 * cosine2) / (n1 * cosine1 + n2 * cosine2);
+                let parallel = (n2 * cosine1 - n1 * cosine2) / (n2 * cosine1 + n1 * cosine2);
+                let share = (perpendicular.powi(2) + parallel.powi(2)) / 2.0;
+                let through = self.color(&glass.tint, meeting.uv) * follow(point - offset, refracted);
+                reflected * share + through * (1.0 - share)
+            }
+            other => panic!("the oracle does not know the material {other:?}"),
+        }
+    }
+
+    /// What a surface reflects of the lights, and of ambient light; `above` is where its shadow rays start.
+    fn direct(&self, phong: &PhongDescription, meeting: &Meeting, normal: DVec3, above: DVec3, viewer: DVec3) -> DVec3 {
+        assert!(phong.normal_map.is_none(), "the oracle knows no normal maps");
+        let factor = |own: &Option<ColorDescription>| {
+            let color = own.as_ref().or(phong.color.as_ref()).expect("a checked material");
+            self.color(color, meeting.uv)
+        };
+        let (diffuse, specular) = (factor(&phong.diffuse), factor(&phong.specular));
+        let mut sum = self.scene.render.ambient * factor(&phong.ambient);
         for light in &self.scene.lights {
             let samples = self.samples(light, above);
             for (to_light, distance) in &samples {
-                let reflected = self.reflected(phong, normal, viewer, *to_light, factor);
+                let reflected = self.reflected(diffuse, specular, phong.shininess, normal, viewer, *to_light);
                 if self.flaw == Flaw::NoShadows || !self.hidden(above, *to_light, *distance) {
                     sum += light_color(light) * reflected / samples.len() as f64;
                 }
@@ -177,24 +251,59 @@ impl<'a> Oracle<'a> {
         sum
     }
 
+    /// A colour of a material, of textures at the point alone.
+    fn color(&self, color: &ColorDescription, uv: DVec2) -> DVec3 {
+        let name = match color {
+            ColorDescription::Plain(color) => return *color,
+            ColorDescription::Texture(reference) => &reference.texture,
+        };
+        let uv = if self.flaw == Flaw::TransposedTexture {
+            uv.yx()
+        } else {
+            uv
+        };
+        let place = |scale: [f64; 2], rotate: f64, offset: [f64; 2]| {
+            let turned = DVec2::from_angle(rotate.to_radians()).rotate(DVec2::from_array(scale) * uv);
+            turned + DVec2::from_array(offset)
+        };
+        match &self.scene.textures[name] {
+            TextureDescription::Constant(texture) => texture.color,
+            TextureDescription::Checker(texture) => {
+                let square = place(texture.scale, texture.rotate, texture.offset).floor();
+                let even = (square.x + square.y).rem_euclid(2.0) == 0.0;
+                if even { texture.even } else { texture.odd }
+            }
+            TextureDescription::Grid(texture) => {
+                let at = place(texture.scale, texture.rotate, texture.offset);
+                let on_line = (at - at.round()).abs().min_element() < texture.line_width / 2.0;
+                if on_line { texture.line } else { texture.cell }
+            }
+            other => panic!("the oracle does not know the texture {other:?}"),
+        }
+    }
+
     /// kd max(0, n.l) + ks max(0, r.v)^shininess; nothing where n.l <= 0.
     fn reflected(
         &self,
-        phong: &PhongDescription,
+        diffuse: DVec3,
+        specular: DVec3,
+        shininess: f64,
         normal: DVec3,
         viewer: DVec3,
         light: DVec3,
-        factor: impl Fn(Option<DVec3>) -> DVec3,
     ) -> DVec3 {
         let cosine = normal.dot(light);
         if cosine <= 0.0 {
             return DVec3::ZERO;
         }
         let mirrored = (-light).reflect(normal);
-        let exponent = if self.flaw == Flaw::Exponent { phong.shininess - 1.0 } else { phong.shininess };
+        let exponent = if self.flaw == Flaw::Exponent {
+            shininess - 1.0
+        } else {
+            shininess
+        };
         let highlight = mirrored.dot(viewer).max(0.0).powf(exponent);
-        let diffuse = if self.flaw == Flaw::MissingCosine { 1.0 } else { cosine };
-        factor(phong.diffuse) * diffuse + factor(phong.specular) * highlight
+        diffuse * if self.flaw == Flaw::MissingCosine { 1.0 } else { cosine } + specular * highlight
     }
 
     /// Unit directions and distances from a point to a light's samples.
@@ -204,10 +313,12 @@ impl<'a> Oracle<'a> {
             LightDescription::Rectangle(light) => {
                 let (tangent, bitangent) = frame(light.normal, light.tangent);
                 let [width, height] = sizes(light.size, self.flaw);
-                let place = |at: DVec2| {
-                    light.center + tangent * (width * (at.x - 0.5)) + bitangent * (height * (at.y - 0.5))
-                };
-                self.grid(self.scene.render.light_samples.count).into_iter().map(|at| way(place(at))).collect()
+                let place =
+                    |at: DVec2| light.center + tangent * (width * (at.x - 0.5)) + bitangent * (height * (at.y - 0.5));
+                self.grid(self.scene.render.light_samples.count)
+                    .into_iter()
+                    .map(|at| way(place(at)))
+                    .collect()
             }
             LightDescription::Point(light) => vec![way(light.position)],
             LightDescription::Directional(light) => vec![(-light.direction.normalize(), f64::INFINITY)],
@@ -218,8 +329,18 @@ impl<'a> Oracle<'a> {
     /// Whether a shape, not a light, is between a point and a light.
     fn hidden(&self, from: DVec3, direction: DVec3, distance: f64) -> bool {
         let end = distance * (1.0 - self.scene.render.shadow_epsilon);
-        let shapes = self.solids.iter().filter(|solid| solid.material.is_some());
-        shapes.flat_map(|solid| crossings(&solid.form, from, direction)).any(|t| t > 0.0 && t < end)
+        let transparent = self.scene.render.shadows == Shadows::Transparent;
+        let glass = |name: &String| matches!(self.scene.materials[name], MaterialDescription::Glass(_));
+        let blocks = |solid: &&Solid| {
+            solid
+                .material
+                .as_ref()
+                .is_some_and(|name| !(transparent && glass(name)))
+        };
+        let shapes = self.solids.iter().filter(blocks);
+        shapes
+            .flat_map(|solid| crossings(&solid.form, from, direction))
+            .any(|t| t > 0.0 && t < end)
     }
 }
 
@@ -240,13 +361,22 @@ fn frame(normal: DVec3, tangent: DVec3) -> (DVec3, DVec3) {
 
 fn sizes(size: [f64; 2], flaw: Flaw) -> [f64; 2] {
     let [width, height] = size;
-    if flaw == Flaw::SwappedAxes { [height, width] } else { size }
+    if flaw == Flaw::SwappedAxes {
+        [height, width]
+    } else {
+        size
+    }
 }
 
 fn flat(center: DVec3, normal: DVec3, tangent: DVec3, size: Option<[f64; 2]>, flaw: Flaw) -> Form {
     let (tangent, bitangent) = frame(normal, tangent);
     let half = size.map(|size| DVec2::from_array(sizes(size, flaw)) / 2.0);
-    Form::Flat { center, tangent, bitangent, half }
+    Form::Flat {
+        center,
+        tangent,
+        bitangent,
+        half,
+    }
 }
 
 fn quadric(center: DVec3, axes: [DVec3; 3]) -> Form {
@@ -254,15 +384,19 @@ fn quadric(center: DVec3, axes: [DVec3; 3]) -> Form {
     let from_local = DMat4::from_cols(a.extend(0.0), b.extend(0.0), c.extend(0.0), center.extend(1.0));
     let to_local = from_local.inverse();
     let sphere = DMat4::from_diagonal(DVec4::new(1.0, 1.0, 1.0, -1.0));
-    Form::Quadric { q: to_local.transpose() * sphere * to_local, from_local }
+    Form::Quadric {
+        q: to_local.transpose() * sphere * to_local,
+        from_local,
+    }
 }
 
 /// A shape's material and its surfaces.
 fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
     match shape {
-        ShapeDescription::Rectangle(r) => {
-            (r.material.clone(), vec![flat(r.center, r.normal, r.tangent, Some(r.size), flaw)])
-        }
+        ShapeDescription::Rectangle(r) => (
+            r.material.clone(),
+            vec![flat(r.center, r.normal, r.tangent, Some(r.size), flaw)],
+        ),
         ShapeDescription::Plane(p) => (p.material.clone(), vec![flat(p.point, p.normal, p.tangent, None, flaw)]),
         ShapeDescription::Ellipsoid(e) => (e.material.clone(), vec![quadric(e.center, [e.a, e.b, e.c])]),
         ShapeDescription::Sphere(s) => {
@@ -306,15 +440,23 @@ fn crossings(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
             let q = to_origin.cross(edge1);
             let v = direction.dot(q) / determinant;
             let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
-            if inside { vec![edge2.dot(q) / determinant] } else { Vec::new() }
+            if inside {
+                vec![edge2.dot(q) / determinant]
+            } else {
+                Vec::new()
+            }
         }
-        Form::Flat { center, tangent, bitangent, half } => {
+        Form::Flat {
+            center,
+            tangent,
+            bitangent,
+            half,
+        } => {
             let normal = tangent.cross(*bitangent);
             let t = (*center - origin).dot(normal) / direction.dot(normal);
             let place = origin + direction * t - *center;
-            let inside = half.is_none_or(|half| {
-                place.dot(*tangent).abs() <= half.x && place.dot(*bitangent).abs() <= half.y
-            });
+            let inside =
+                half.is_none_or(|half| place.dot(*tangent).abs() <= half.x && place.dot(*bitangent).abs() <= half.y);
             if inside && t.is_finite() { vec![t] } else { Vec::new() }
         }
     }
@@ -329,16 +471,27 @@ fn facing(form: &Form, point: DVec3) -> (DVec3, DVec2) {
             let turn = std::f64::consts::TAU;
             let longitude = local.y.atan2(local.x) / turn;
             let latitude = 0.5 + local.z.clamp(-1.0, 1.0).asin() / (turn / 2.0);
-            (gradient.truncate().normalize(), DVec2::new(longitude - longitude.floor(), latitude))
+            (
+                gradient.truncate().normalize(),
+                DVec2::new(longitude - longitude.floor(), latitude),
+            )
         }
         Form::Triangle([v0, v1, v2]) => {
             let normal = (*v1 - *v0).cross(*v2 - *v1);
             // Weights as ratios of areas.
             let area = |a: DVec3, b: DVec3, c: DVec3| (b - a).cross(c - b).dot(normal);
             let whole = area(*v0, *v1, *v2);
-            (normal.normalize(), DVec2::new(area(*v0, point, *v2), area(*v0, *v1, point)) / whole)
+            (
+                normal.normalize(),
+                DVec2::new(area(*v0, point, *v2), area(*v0, *v1, point)) / whole,
+            )
         }
-        Form::Flat { center, tangent, bitangent, half } => {
+        Form::Flat {
+            center,
+            tangent,
+            bitangent,
+            half,
+        } => {
             let place = DVec2::new((point - *center).dot(*tangent), (point - *center).dot(*bitangent));
             let uv = half.map_or(place, |half| place / (2.0 * half) + 0.5);
             (tangent.cross(*bitangent), uv)

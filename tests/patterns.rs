@@ -38,5 +38,8 @@ fn snake_case(name: &str) -> String {
 /// Samples of a pattern, as near to `count` as it takes.
 pub fn samples(pattern: Pattern, count: u32) -> SamplesDescription {
     let side = count.isqrt();
-    SamplesDescription { pattern, count: if pattern.needs_square() { side * side } else { count } }
+    SamplesDescription {
+        pattern,
+        count: if pattern.needs_square() { side * side } else { count },
+    }
 }

@@ -35,7 +35,10 @@ pub fn backend<'a>(packed: &'a Packed, way: Way) -> Box<dyn Backend + 'a> {
         return Box::new(Cpu::new(packed));
     }
     let device = adapter::device().expect("a device");
-    let options = Options { exact: way != Way::Plain && device.info.exact, baked: way == Way::Baked };
+    let options = Options {
+        exact: way != Way::Plain && device.info.exact,
+        baked: way == Way::Baked,
+    };
     let gpu = Gpu::new(device, packed, sources::shaders(), options);
     Box::new(gpu.unwrap_or_else(|error| panic!("{way:?}: {error}")))
 }
@@ -47,14 +50,21 @@ pub fn whole(packed: &Packed) -> Region {
 
 /// A region rendered in bands, put together.
 pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Cut) -> Film {
-    let mut all = Film { region, sums: Vec::new() };
+    let mut all = Film {
+        region,
+        sums: Vec::new(),
+    };
     let mut output = |band: Film| {
         all.sums.extend(band.sums);
         Ok(())
     };
     let result = wgray::job::render(backend, region, packed.pixel_samples, cut, &mut |_| true, &mut output);
     result.unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(all.sums.len() as u64, region.pixels(), "the bands do not make up the region");
+    assert_eq!(
+        all.sums.len() as u64,
+        region.pixels(),
+        "the bands do not make up the region"
+    );
     all
 }
 
@@ -75,7 +85,11 @@ pub fn first_hits(packed: &Packed, way: Way) -> Vec<FirstHit> {
 
 /// How many pixels are not the same bits.
 pub fn differing(a: &Film, b: &Film) -> usize {
-    assert_eq!((a.region, a.sums.len()), (b.region, b.sums.len()), "films of different regions");
+    assert_eq!(
+        (a.region, a.sums.len()),
+        (b.region, b.sums.len()),
+        "films of different regions"
+    );
     let bits = |sum: &Vec4| sum.to_array().map(f32::to_bits);
     a.sums.iter().zip(&b.sums).filter(|(a, b)| bits(a) != bits(b)).count()
 }
@@ -83,9 +97,16 @@ pub fn differing(a: &Film, b: &Film) -> usize {
 /// A part of a film.
 pub fn crop(film: &Film, part: Region) -> Film {
     let (whole, width) = (film.region, film.region.width() as usize);
-    let rows = film.sums.chunks(width).skip((part.y0 - whole.y0) as usize).take(part.height() as usize);
+    let rows = film
+        .sums
+        .chunks(width)
+        .skip((part.y0 - whole.y0) as usize)
+        .take(part.height() as usize);
     let columns = (part.x0 - whole.x0) as usize..(part.x1 - whole.x0) as usize;
-    Film { region: part, sums: rows.flat_map(|row| row[columns.clone()].to_vec()).collect() }
+    Film {
+        region: part,
+        sums: rows.flat_map(|row| row[columns.clone()].to_vec()).collect(),
+    }
 }
 
 /// The means of the pixels as f64.

@@ -2,26 +2,40 @@
 
 use glam::{UVec2, UVec4, Vec2, Vec3};
 use naga::ScalarKind;
-use wgray::cpu::camera::camera_ray;
+use wgray::cpu::camera::{camera_derivative, camera_differential, camera_ray, image_plane_offset};
+use wgray::cpu::differential::{
+    Arrival, Derivative, Differential, arrival, normal_derivative, reflected_derivative, reflected_differential,
+    refracted_derivative, refracted_differential, transferred,
+};
 use wgray::cpu::ellipsoid::{ellipsoid_blocks, intersect_ellipsoid};
+use wgray::cpu::footprint::{
+    Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint, uv_derivative,
+};
 use wgray::cpu::light::{Segments, segment, segments_to_light, segments_to_local};
-use wgray::cpu::math::{atan2, cross, dot, exp2, log2, max, min, normalize, positive_zero, power, power_whole};
+use wgray::cpu::math::{atan2, cross, dot, exp2, floor, log2, max, min, normalize, positive_zero, power, power_whole};
+use wgray::cpu::path::{Path, Scattered, glass_path, mirrored_path, reflected_path, refracted_path, usable_normal};
+use wgray::cpu::pattern::{
+    checker_in_box, lines_in_box, pattern_share, pulse, pulse_integral, square_wave, square_wave_integral,
+};
 use wgray::cpu::phong::{Lobes, phong_block, phong_lobes, phong_power};
 use wgray::cpu::plane::{intersect_plane, plane_blocks};
-use wgray::cpu::ray::{Hit, Ray, closer, crosses_plane, plane_distance, point_to_local, scaled_crossing, vector_to_local};
+use wgray::cpu::ray::{
+    Hit, Ray, closer, crosses_plane, plane_distance, point_to_local, scaled_crossing, vector_to_local,
+};
 use wgray::cpu::rectangle::{intersect_rectangle, rectangle_blocks};
 use wgray::cpu::rng::{hash4, unit_float};
 use wgray::cpu::sampling::{
     grid_sample, jittered_sample, random_sample, rotated_grid_sample, sample_key, sample_square, wrap,
 };
-use wgray::cpu::sequence::{
-    halton_sample, radical_inverse_3, scramble, shuffled_index, sobol_reversed, sobol_sample,
-};
+use wgray::cpu::sequence::{halton_sample, radical_inverse_3, scramble, shuffled_index, sobol_reversed, sobol_sample};
 use wgray::cpu::shadow::{Block, Cone, block_sample, blocks, cone_to_light, may_block, shadow_bits};
+use wgray::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
 use wgray::cpu::surface::{Surface, first_hit, primitive_normal, primitive_uv, surface_at};
+use wgray::cpu::tangent::{Tangents, local_tangents, mapped_normal, vector_to_world};
+use wgray::cpu::texel::{gaussian_weight, level_size, near_coordinate, srgb_to_linear, unpacked_color, wrapped_index};
 use wgray::cpu::triangle::{intersect_triangle, triangle_blocks};
 use wgray::gpu::Device;
-use wgray::pack::{Camera, FirstHit, Light, Material, Primitive, Sphere};
+use wgray::pack::{Camera, FirstHit, Light, Material, Primitive, Sphere, Texture};
 
 use crate::adapter::{self, allowed, judge};
 use crate::inputs::inputs;
@@ -63,6 +77,7 @@ probes! {
     max(a: f32, b: f32) -> f32;
     min(a: f32, b: f32) -> f32;
     positive_zero(x: f32) -> f32;
+    floor(x: f32) -> f32;
     power_whole(x: f32, n: u32, bits: u32) -> f32;
     power(x: f32, y: f32) -> f32;
     log2(x: f32) -> f32;
@@ -114,6 +129,46 @@ probes! {
     phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32;
     phong_block(surface: Surface, material: &Material, to: Segments, block: Block, hidden: u32, exponent_bits: u32,
                 sum: Lobes) -> Lobes;
+    camera_differential(camera: &Camera, at: Vec2, spacing: f32) -> Differential;
+    camera_derivative(camera: &Camera, at: Vec2, step: Vec3) -> Derivative;
+    image_plane_offset(camera: &Camera, at: Vec2) -> Vec3;
+    transferred(derivative: Derivative, ray: Ray, t: f32, normal: Vec3) -> Derivative;
+    normal_derivative(q: &Primitive, local: Vec3, dp: Vec3) -> Vec3;
+    reflected_derivative(derivative: Derivative, d: Vec3, n: Vec3, dn: Vec3) -> Derivative;
+    refracted_derivative(derivative: Derivative, d: Vec3, n: Vec3, dn: Vec3, eta: f32, cosine: f32) -> Derivative;
+    arrival(q: &Primitive, differential: Differential, ray: Ray, t: f32, surface: Surface) -> Arrival;
+    reflected_differential(at: Arrival, d: Vec3, n: Vec3) -> Differential;
+    refracted_differential(at: Arrival, d: Vec3, n: Vec3, eta: f32, cosine: f32) -> Differential;
+    reflected_direction(d: Vec3, n: Vec3) -> Vec3;
+    refracted_direction(d: Vec3, n: Vec3, eta: f32, cosine_i: f32, cosine_t: f32) -> Vec3;
+    refracted_cosine(cosine_i: f32, eta: f32) -> f32;
+    fresnel(cosine_i: f32, cosine_t: f32, eta: f32) -> f32;
+    mirrored_path(path: Path, surface: Surface, at: Arrival, material: &Material) -> Scattered;
+    usable_normal(surface: Surface, normal: Vec3) -> Vec3;
+    glass_path(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Scattered;
+    reflected_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3) -> Path;
+    refracted_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3, eta: f32, cosine_i: f32,
+                   cosine_t: f32) -> Path;
+    surface_footprint(q: &Primitive, local: Vec3, dx: Vec3, dy: Vec3) -> Footprint;
+    uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2;
+    texture_footprint(t: &Texture, f: Footprint) -> Footprint;
+    footprint_ellipse(dx: Vec2, dy: Vec2, anisotropy: f32) -> Ellipse;
+    pattern_share(kind: u32, line_width: f32, f: Footprint) -> f32;
+    checker_in_box(at: Vec2, width: Vec2) -> f32;
+    square_wave(x: f32, width: f32) -> f32;
+    square_wave_integral(x: f32) -> f32;
+    lines_in_box(at: Vec2, width: Vec2, line_width: f32) -> f32;
+    pulse(x: f32, width: f32, line_width: f32) -> f32;
+    pulse_integral(x: f32, line_width: f32) -> f32;
+    near_coordinate(u: f32, wrap: u32) -> f32;
+    wrapped_index(i: i32, size: u32, wrap: u32) -> u32;
+    level_size(size: u32, level: u32) -> u32;
+    unpacked_color(word: u32, format: u32) -> Vec3;
+    srgb_to_linear(x: f32) -> f32;
+    gaussian_weight(r2: f32) -> f32;
+    vector_to_world(q: &Primitive, v: Vec3) -> Vec3;
+    local_tangents(q: &Primitive, local: Vec3) -> Tangents;
+    mapped_normal(q: &Primitive, local: Vec3, surface: Surface, t: &Texture, n: Vec3) -> Vec3;
 }
 
 /// Shared functions that are not probed, and why.
@@ -121,7 +176,10 @@ const EXCEPTIONS: &[(&str, &str)] = &[];
 
 /// The twin of a function.
 pub fn twin(name: &str) -> &'static Probe {
-    PROBES.iter().find(|probe| probe.name == name).unwrap_or_else(|| panic!("{name} has no probe"))
+    PROBES
+        .iter()
+        .find(|probe| probe.name == name)
+        .unwrap_or_else(|| panic!("{name} has no probe"))
 }
 
 impl Probe {
@@ -132,7 +190,12 @@ impl Probe {
         while !words.is_empty() {
             let before = out.len();
             (self.run)(&mut words, &mut out);
-            assert_eq!(out.len() - before, words_out, "{}: the twin's result has other words", self.name);
+            assert_eq!(
+                out.len() - before,
+                words_out,
+                "{}: the twin's result has other words",
+                self.name
+            );
         }
         out
     }
@@ -198,9 +261,20 @@ fn every_shared_function_has_a_probe() {
             None => missing.push(format!("{file}: {name}({})", arguments.join(", "))),
         }
     }
-    assert!(missing.is_empty(), "add probes to tests/probes.rs for\n{}", missing.join("\n"));
-    for name in PROBES.iter().map(|probe| probe.name).chain(EXCEPTIONS.iter().map(|(name, _)| *name)) {
-        assert!(names.iter().any(|n| n == name), "{name} is probed, but no shared file has it");
+    assert!(
+        missing.is_empty(),
+        "add probes to tests/probes.rs for\n{}",
+        missing.join("\n")
+    );
+    for name in PROBES
+        .iter()
+        .map(|probe| probe.name)
+        .chain(EXCEPTIONS.iter().map(|(name, _)| *name))
+    {
+        assert!(
+            names.iter().any(|n| n == name),
+            "{name} is probed, but no shared file has it"
+        );
     }
 }
 
@@ -210,9 +284,12 @@ fn functions_give_the_same_bits_on_gpu_and_cpu() {
     let source = shared_source();
     let module = parse(&source);
     let functions = functions(&module, &source);
-    let probed = functions.iter().filter(|(_, f)| !EXCEPTIONS.iter().any(|(exception, _)| *exception == f.name()));
-    let problems: Vec<String> =
-        probed.filter_map(|(file, f)| compare(device, f).err().map(|message| format!("{file}: {message}"))).collect();
+    let probed = functions
+        .iter()
+        .filter(|(_, f)| !EXCEPTIONS.iter().any(|(exception, _)| *exception == f.name()));
+    let problems: Vec<String> = probed
+        .filter_map(|(file, f)| compare(device, f).err().map(|message| format!("{file}: {message}")))
+        .collect();
     assert!(problems.is_empty(), "{}", problems.join("\n"));
 }
 
@@ -223,7 +300,9 @@ fn inputs_take_both_ways_of_every_decision() {
     let module = parse(&source);
     for (file, function) in functions(&module, &source) {
         let (name, kinds) = (function.name(), function.words_out());
-        let Some(probe) = PROBES.iter().find(|probe| probe.name == name) else { continue };
+        let Some(probe) = PROBES.iter().find(|probe| probe.name == name) else {
+            continue;
+        };
         let words = inputs(&function, CALLS, 1);
         let results = probe.results(&words, kinds.len());
         let share = |wanted: &dyn Fn(u32) -> bool| {
@@ -231,17 +310,30 @@ fn inputs_take_both_ways_of_every_decision() {
         };
         if type_name(&module, function.result()) == "bool" {
             let yes = share(&|word| word != 0);
-            assert!((0.05..0.95).contains(&yes), "{file}: {name} is true for {yes} of the inputs");
+            assert!(
+                (0.05..0.95).contains(&yes),
+                "{file}: {name} is true for {yes} of the inputs"
+            );
         }
         if name.starts_with("intersect_") {
             let per = function.words_in();
             let limits = words.chunks_exact(per).map(|call| call[per - 1]);
-            let hits = results.iter().zip(limits).filter(|(result, limit)| **result != *limit).count();
+            let hits = results
+                .iter()
+                .zip(limits)
+                .filter(|(result, limit)| **result != *limit)
+                .count();
             let hits = hits as f64 / CALLS as f64;
-            assert!((0.1..0.9).contains(&hits), "{file}: {name} hits for {hits} of the inputs");
+            assert!(
+                (0.1..0.9).contains(&hits),
+                "{file}: {name} hits for {hits} of the inputs"
+            );
         }
         let nan = share(&|word| f32::from_bits(word).is_nan());
-        assert!(kinds[0] != ScalarKind::Float || nan < 0.5, "{file}: {name} is no number for {nan} of the inputs");
+        assert!(
+            kinds[0] != ScalarKind::Float || nan < 0.5,
+            "{file}: {name} is no number for {nan} of the inputs"
+        );
     }
 }
 
@@ -253,18 +345,27 @@ fn a_function_that_differs_by_one_ulp_is_found() {
         ("log2", "2.8853900817779268", "2.8853903"),
         ("exp2", "0.6931471805599453", "0.69314724"),
         ("unit_float", "5.9604644775390625e-8", "5.9604652e-8"),
-        ("dot", "a.x * b.x + a.y * b.y + a.z * b.z", "a.x * b.x + (a.y * b.y + a.z * b.z)"),
+        (
+            "dot",
+            "a.x * b.x + a.y * b.y + a.z * b.z",
+            "a.x * b.x + (a.y * b.y + a.z * b.z)",
+        ),
         ("min", "select(b, a, a < b)", "select(b, a, a <= b)"), // signed zeros
-        ("max", "select(b, a, a > b)", "select(a, b, a < b)"), // NaN
+        ("max", "select(b, a, a > b)", "select(a, b, a < b)"),  // NaN
     ] {
         let mut source = shared_source();
-        assert!(source.text.contains(from), "{name}: '{from}' is not there to be changed");
+        assert!(
+            source.text.contains(from),
+            "{name}: '{from}' is not there to be changed"
+        );
         let text = source.text.replacen(from, to, 1);
         source = wgray::gpu::compose::Source::default();
         source.append("changed", &text);
         let module = parse(&source);
-        let (_, function) =
-            functions(&module, &source).into_iter().find(|(_, f)| f.name() == name).expect("the function");
+        let (_, function) = functions(&module, &source)
+            .into_iter()
+            .find(|(_, f)| f.name() == name)
+            .expect("the function");
         let kinds = function.words_out();
         let words = inputs(&function, CALLS, 1);
         let changed = function.run_in(device, &source, &words);

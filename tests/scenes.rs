@@ -3,7 +3,7 @@
 use std::fs;
 
 use wgray::pack::{Packed, pack};
-use wgray::scene::Description;
+use wgray::scene::{Assets, Description};
 
 use crate::sources;
 
@@ -25,7 +25,11 @@ pub fn descriptions() -> Vec<(String, Description)> {
 
 /// One scene of the project.
 pub fn scene(name: &str) -> Description {
-    descriptions().into_iter().find(|(file, _)| file == name).unwrap_or_else(|| panic!("no scene is called {name}")).1
+    descriptions()
+        .into_iter()
+        .find(|(file, _)| file == name)
+        .unwrap_or_else(|| panic!("no scene is called {name}"))
+        .1
 }
 
 /// A scene from its text.
@@ -35,10 +39,18 @@ pub fn parse(text: &str) -> Packed {
 
 /// A description as the backends read it.
 pub fn packed(description: &Description) -> Packed {
-    pack(&description.validate().unwrap_or_else(|problem| panic!("{problem}")))
+    let beside = Assets::beside(&sources::path("scenes"));
+    pack(
+        &description
+            .validate_with(&beside)
+            .unwrap_or_else(|problem| panic!("{problem}")),
+    )
 }
 
 /// The scenes as they are.
 pub fn all() -> Vec<(String, Packed)> {
-    descriptions().iter().map(|(name, description)| (name.clone(), packed(description))).collect()
+    descriptions()
+        .iter()
+        .map(|(name, description)| (name.clone(), packed(description)))
+        .collect()
 }

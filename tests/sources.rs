@@ -97,12 +97,21 @@ pub fn wgsl_functions(module: &Module, source: &Source, file: &str) -> Vec<Signa
 pub fn wgsl_records(module: &Module, source: &Source, file: &str) -> Vec<Signature> {
     let mut records: Vec<(naga::Span, Signature)> = Vec::new();
     for (handle, ty) in module.types.iter() {
-        let TypeInner::Struct { members, .. } = &ty.inner else { continue };
+        let TypeInner::Struct { members, .. } = &ty.inner else {
+            continue;
+        };
         let span = module.types.get_span(handle);
         if file_of(source, span) == file {
             let field = |m: &naga::StructMember| (m.name.clone().unwrap_or_default(), type_name(module, m.ty));
             let name = ty.name.clone().unwrap_or_default();
-            records.push((span, Signature { name, parts: members.iter().map(field).collect(), result: None }));
+            records.push((
+                span,
+                Signature {
+                    name,
+                    parts: members.iter().map(field).collect(),
+                    result: None,
+                },
+            ));
         }
     }
     records.sort_by_key(|(span, _)| span.to_range().map(|range| range.start));
@@ -122,7 +131,11 @@ pub fn type_name(module: &Module, ty: naga::Handle<naga::Type>) -> String {
         TypeInner::Scalar(s) => scalar(*s).to_string(),
         TypeInner::Vector { size, scalar: s } => format!("vec{}<{}>", *size as u8, scalar(*s)),
         TypeInner::Struct { .. } => inner.name.clone().unwrap_or_default(),
-        TypeInner::Array { base, size: ArraySize::Constant(n), .. } => format!("array<{}, {n}>", type_name(module, *base)),
+        TypeInner::Array {
+            base,
+            size: ArraySize::Constant(n),
+            ..
+        } => format!("array<{}, {n}>", type_name(module, *base)),
         TypeInner::Array { base, .. } => format!("array<{}>", type_name(module, *base)),
         other => format!("{other:?}"),
     }
@@ -160,11 +173,18 @@ pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
 
 /// The structs of a Rust file for which `wanted` holds, in its order.
 pub fn rust_records(file: &syn::File, wanted: impl Fn(&syn::ItemStruct) -> bool) -> Vec<Signature> {
-    let field = |f: &syn::Field| (f.ident.as_ref().map(|i| i.to_string()).unwrap_or_default(), rust_type(&f.ty));
+    let field = |f: &syn::Field| {
+        (
+            f.ident.as_ref().map(|i| i.to_string()).unwrap_or_default(),
+            rust_type(&f.ty),
+        )
+    };
     let record = |item: &Item| match item {
-        Item::Struct(s) if wanted(s) => {
-            Some(Signature { name: s.ident.to_string(), parts: s.fields.iter().map(field).collect(), result: None })
-        }
+        Item::Struct(s) if wanted(s) => Some(Signature {
+            name: s.ident.to_string(),
+            parts: s.fields.iter().map(field).collect(),
+            result: None,
+        }),
         _ => None,
     };
     file.items.iter().filter_map(record).collect()
@@ -176,7 +196,11 @@ fn rust_type(ty: &Type) -> String {
         Type::Reference(reference) => rust_type(&reference.elem),
         Type::Array(array) => {
             let length = &array.len;
-            let syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Int(length), .. }) = length else {
+            let syn::Expr::Lit(syn::ExprLit {
+                lit: syn::Lit::Int(length),
+                ..
+            }) = length
+            else {
                 panic!("the length of a shared array is a literal, not {length:?}");
             };
             format!("array<{}, {}>", rust_type(&array.elem), length.base10_digits())
@@ -189,7 +213,11 @@ fn rust_type(ty: &Type) -> String {
                 Some("IVec") => (true, "i32"),
                 _ => (false, ""),
             };
-            if vector { format!("vec{}<{scalar}>", &name[name.len() - 1..]) } else { name }
+            if vector {
+                format!("vec{}<{scalar}>", &name[name.len() - 1..])
+            } else {
+                name
+            }
         }
         other => format!("{other:?}"), // like nothing in WGSL
     }

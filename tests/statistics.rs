@@ -28,12 +28,17 @@ fn positions(pattern: Pattern, count: u32, sets: u32) -> Vec<Vec<Vec2>> {
     let places = evaluate("sample_square", calls.collect());
     let place = |words: &[u32]| Vec2::new(f32::from_bits(words[0]), f32::from_bits(words[1]));
     let places: Vec<Vec2> = places.chunks_exact(2).map(place).collect();
-    places.chunks_exact(packed.pixel_samples as usize).map(<[Vec2]>::to_vec).collect()
+    places
+        .chunks_exact(packed.pixel_samples as usize)
+        .map(<[Vec2]>::to_vec)
+        .collect()
 }
 
 /// A shared function with two words of a result, over the words of many calls.
 fn evaluate(name: &str, words: Vec<u32>) -> Vec<u32> {
-    let Some(device) = adapter::device() else { return twin(name).results(&words, 2) };
+    let Some(device) = adapter::device() else {
+        return twin(name).results(&words, 2);
+    };
     let source = shared_source();
     let module = parse(&source);
     let functions = functions(&module, &source);
@@ -61,7 +66,13 @@ fn upper_tail(z: f64) -> f64 {
         return 1.0 - upper_tail(-z);
     }
     let t = 1.0 / (1.0 + 0.231_641_9 * z);
-    let series = [0.319_381_530, -0.356_563_782, 1.781_477_937, -1.821_255_978, 1.330_274_429];
+    let series = [
+        0.319_381_530,
+        -0.356_563_782,
+        1.781_477_937,
+        -1.821_255_978,
+        1.330_274_429,
+    ];
     let sum: f64 = series.iter().rev().fold(0.0, |sum, c| (sum + c) * t);
     (-z * z / 2.0).exp() / std::f64::consts::TAU.sqrt() * sum
 }
@@ -69,7 +80,10 @@ fn upper_tail(z: f64) -> f64 {
 /// Pearson's chi-square of counts that should be equal.
 fn chi_square(counts: &[u32]) -> f64 {
     let expected = f64::from(counts.iter().sum::<u32>()) / counts.len() as f64;
-    counts.iter().map(|count| (f64::from(*count) - expected).powi(2) / expected).sum()
+    counts
+        .iter()
+        .map(|count| (f64::from(*count) - expected).powi(2) / expected)
+        .sum()
 }
 
 /// What is not uniform in a list of independent positions: the square, either coordinate, or two sums of them.
@@ -84,7 +98,9 @@ fn flaw(positions: &[Vec2]) -> Option<String> {
         ("fine digits of x + 3 y", |p| ((p.x + 3.0 * p.y) * 1024.0).fract()),
     ];
     let mut square = vec![0; CELLS * CELLS];
-    positions.iter().for_each(|p| square[cell(p.y) * CELLS + cell(p.x)] += 1);
+    positions
+        .iter()
+        .for_each(|p| square[cell(p.y) * CELLS + cell(p.x)] += 1);
     let mut tests = vec![("the square", square)];
     for (name, place) in projections {
         let mut line = vec![0; CELLS];
@@ -104,7 +120,10 @@ fn the_chances_are_those_of_the_tables() {
     }
     // Abramowitz and Stegun, table 26.8
     for (chi_square, freedom, expected) in [(24.996, 15.0, 0.05), (37.697, 15.0, 0.001), (124.342, 100.0, 0.05)] {
-        assert!((chance(chi_square, freedom) / expected - 1.0).abs() < 0.05, "{chi_square} {freedom}");
+        assert!(
+            (chance(chi_square, freedom) / expected - 1.0).abs() < 0.05,
+            "{chi_square} {freedom}"
+        );
     }
 }
 
@@ -128,7 +147,11 @@ fn random_patterns_are_uniform_over_pixels() {
         let sets = positions(pattern, 16, 40_000);
         // A position may be confined to a cell of a grid; all of a set together are not.
         for (first, last) in [(0, 0), (7, 7), (15, 15), (0, 15)] {
-            let confined = first == last && sets.iter().take(100).all(|set| set[first].distance(sets[0][first]) < 0.36);
+            let confined = first == last
+                && sets
+                    .iter()
+                    .take(100)
+                    .all(|set| set[first].distance(sets[0][first]) < 0.36);
             let list: Vec<Vec2> = sets.iter().flat_map(|set| set[first..=last].iter().copied()).collect();
             let problem = if confined { None } else { flaw(&list) };
             assert!(problem.is_none(), "{name}, positions {first} to {last}: {problem:?}");
@@ -217,9 +240,15 @@ fn pictures_of_random_patterns_have_the_mean_of_grids() {
         assert!(result.is_ok(), "{name}: {}", result.unwrap_err());
         // A picture that is two per cent too bright, or one of another camera, is not its mean.
         let brighter: Vec<[f64; 3]> = truth.iter().map(|pixel| pixel.map(|v| v * 1.02)).collect();
-        assert!(unbiased(&deviations(&pictures, &brighter)).is_err(), "{name}: a bias is not found");
+        assert!(
+            unbiased(&deviations(&pictures, &brighter)).is_err(),
+            "{name}: a bias is not found"
+        );
         let mut shifted = truth.clone();
         shifted.rotate_right(1);
-        assert!(unbiased(&deviations(&pictures, &shifted)).is_err(), "{name}: a shift is not found");
+        assert!(
+            unbiased(&deviations(&pictures, &shifted)).is_err(),
+            "{name}: a shift is not found"
+        );
     }
 }

@@ -18,7 +18,10 @@ const RECORDS: &[&str] = &["layout.wgsl", "constants.wgsl"];
 const WITHOUT_TWIN: &[(&str, &str)] = &[
     ("bindings.wgsl", "buffers only"),
     ("specialization.wgsl", "overrides only"),
-    ("scene.wgsl", "how a kernel reads the scene; baked kernels have the same functions with constants"),
+    (
+        "scene.wgsl",
+        "how a kernel reads the scene; baked kernels have the same functions with constants",
+    ),
 ];
 
 /// Files of `src/cpu` that are no file's twin.
@@ -26,15 +29,26 @@ const NO_TWIN: &[&str] = &["mod.rs", "renderer.rs"];
 
 /// Functions and records that only one side has, or that differ, and why: file, name, reason.
 const ONE_SIDED: &[(&str, &str, &str)] = &[
-    ("traverse.wgsl", "closest_hit", "in WGSL it is in scene.wgsl, as it reads the scene"),
-    ("traverse.wgsl", "hidden_by", "Rust has a range of indices where WGSL has two numbers"),
+    (
+        "traverse.wgsl",
+        "closest_hit",
+        "in WGSL it is in scene.wgsl, as it reads the scene",
+    ),
+    (
+        "traverse.wgsl",
+        "hidden_by",
+        "Rust has a range of indices where WGSL has two numbers",
+    ),
 ];
 
 /// How the functions and records of a WGSL file differ from those of its twin.
 fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String> {
     let module = parse(source);
     let two_sided = |s: &Signature| !ONE_SIDED.iter().any(|(f, name, _)| *f == file && *name == s.name);
-    let functions: Vec<_> = sources::wgsl_functions(&module, source, file).into_iter().filter(two_sided).collect();
+    let functions: Vec<_> = sources::wgsl_functions(&module, source, file)
+        .into_iter()
+        .filter(two_sided)
+        .collect();
     let mut twins: Vec<_> = rust_functions(twin).into_iter().filter(two_sided).collect();
     if !SHARED.contains(&file) {
         for twin in &mut twins {
@@ -81,26 +95,51 @@ fn a_twin_that_drifted_is_found() {
         syn::parse_file(&text.replacen(from, to, 1)).expect("still Rust")
     };
     for (what, file, from, to) in [
-        ("swapped arguments", "math.rs", "cross(a: Vec3, b: Vec3)", "cross(b: Vec3, a: Vec3)"),
+        (
+            "swapped arguments",
+            "math.rs",
+            "cross(a: Vec3, b: Vec3)",
+            "cross(b: Vec3, a: Vec3)",
+        ),
         ("another type", "ray.rs", "t: f32, i: u32", "t: f32, i: i32"),
         ("another result", "rng.rs", "(bits: u32) -> f32", "(bits: u32) -> f64"),
         ("a renamed function", "plane.rs", "fn plane_blocks", "fn plane_block"),
-        ("one more function", "plane.rs", "pub fn plane_blocks", "fn more() {}\npub fn plane_blocks"),
+        (
+            "one more function",
+            "plane.rs",
+            "pub fn plane_blocks",
+            "fn more() {}\npub fn plane_blocks",
+        ),
         ("a renamed field", "light.rs", "pub towards: Vec3", "pub toward: Vec3"),
-        ("moved fields", "phong.rs", "pub diffuse: f32,\n    pub specular: f32", "pub specular: f32,\n    pub diffuse: f32"),
+        (
+            "moved fields",
+            "phong.rs",
+            "pub diffuse: f32,\n    pub specular: f32",
+            "pub specular: f32,\n    pub diffuse: f32",
+        ),
     ] {
         let twin = changed(file, from, to);
-        assert!(!twin_differences(&shared, &file.replace(".rs", ".wgsl"), &twin).is_empty(), "{what}");
+        assert!(
+            !twin_differences(&shared, &file.replace(".rs", ".wgsl"), &twin).is_empty(),
+            "{what}"
+        );
     }
 }
 
 #[test]
 fn every_twin_is_some_files() {
     for entry in std::fs::read_dir(sources::path("src/cpu")).expect("the twins") {
-        let name = entry.expect("an entry").file_name().into_string().expect("a plain name");
+        let name = entry
+            .expect("an entry")
+            .file_name()
+            .into_string()
+            .expect("a plain name");
         let wgsl = name.replace(".rs", ".wgsl");
         let twin = wgray::gpu::compose::BUILT_IN.iter().any(|(file, _)| *file == wgsl);
-        assert!(twin || NO_TWIN.contains(&name.as_str()), "src/cpu/{name} is no file's twin");
+        assert!(
+            twin || NO_TWIN.contains(&name.as_str()),
+            "src/cpu/{name} is no file's twin"
+        );
     }
 }
 
@@ -110,18 +149,31 @@ mod opcode {
     use std::ops::RangeInclusive;
 
     /// Names, modes, decorations, types, constants, variables.
-    pub const DECLARATIONS: &[RangeInclusive<u16>] = &[3..=8, 10..=11, 14..=17, 19..=24, 28..=30, 32..=33, 41..=46, 71..=72];
+    pub const DECLARATIONS: &[RangeInclusive<u16>] =
+        &[3..=8, 10..=11, 14..=17, 19..=24, 28..=30, 32..=33, 41..=46, 71..=72];
     /// Functions, memory and control flow.
     pub const STRUCTURE: &[RangeInclusive<u16>] = &[1..=1, 54..=57, 59..=59, 61..=62, 65..=65, 68..=68, 245..=255];
     /// Vectors and records put together and taken apart; copies; selections; bits read as another type.
     pub const MOVES: &[RangeInclusive<u16>] = &[77..=83, 124..=124, 169..=169];
     /// Integers, logic and comparisons.
-    pub const INTEGERS: &[RangeInclusive<u16>] =
-        &[126..=126, 128..=128, 130..=130, 132..=132, 134..=135, 137..=139, 149..=152, 154..=155, 164..=168, 170..=179, 194..=205];
-    /// Comparisons of floats; conversions between floats and integers.
-    pub const COMPARISONS: &[RangeInclusive<u16>] = &[109..=112, 156..=157, 180..=191];
-    /// Negate, add, subtract, multiply, divide, vector times scalar.
-    pub const ARITHMETIC: &[u16] = &[127, 129, 131, 133, 136, 142];
+    pub const INTEGERS: &[RangeInclusive<u16>] = &[
+        126..=126,
+        128..=128,
+        130..=130,
+        132..=132,
+        134..=135,
+        137..=139,
+        149..=152,
+        154..=155,
+        164..=168,
+        170..=179,
+        194..=205,
+    ];
+    /// Comparisons of floats.
+    pub const COMPARISONS: &[RangeInclusive<u16>] = &[156..=157, 180..=191];
+    /// Which must be decorated: negate, add, subtract, multiply, divide, vector times scalar; conversions between floats
+    /// and integers.
+    pub const PROTECTED: &[u16] = &[127, 129, 131, 133, 136, 142, 109, 110, 111, 112];
 
     pub const FUNCTION: u16 = 54;
     pub const EXTENDED: u16 = 12;
@@ -141,11 +193,16 @@ fn violations(module: &[u32]) -> Vec<String> {
         .filter(|(op, words)| *op == opcode::DECORATE && words[2] == opcode::NO_CONTRACTION)
         .map(|(_, words)| words[1])
         .collect();
-    let groups =
-        [opcode::DECLARATIONS, opcode::STRUCTURE, opcode::MOVES, opcode::INTEGERS, opcode::COMPARISONS];
+    let groups = [
+        opcode::DECLARATIONS,
+        opcode::STRUCTURE,
+        opcode::MOVES,
+        opcode::INTEGERS,
+        opcode::COMPARISONS,
+    ];
     let mut problems = Vec::new();
     for (op, words) in instructions(module) {
-        if opcode::ARITHMETIC.contains(&op) {
+        if opcode::PROTECTED.contains(&op) {
             if !decorated.contains(&words[2]) {
                 problems.push(format!("%{} (opcode {op}) may be contracted", words[2]));
             }
@@ -170,7 +227,8 @@ fn only_made_integer(module: &[u32], result: u32) -> bool {
 }
 
 fn spirv(source: &Source, kernel: Kernel, packed: &Packed) -> Vec<u32> {
-    let checked = check(source).unwrap_or_else(|error| panic!("{error}\n{}", error.excerpt.clone().unwrap_or_default()));
+    let checked =
+        check(source).unwrap_or_else(|error| panic!("{error}\n{}", error.excerpt.clone().unwrap_or_default()));
     checked.exact_spirv(kernel, &packed.specialization).expect("a kernel")
 }
 
@@ -181,9 +239,15 @@ fn kernels_hold_no_operation_that_devices_may_compute_differently() {
         for kernel in [Kernel::Render, Kernel::Aov] {
             for baked in [None, Some(bake(&packed))] {
                 let module = spirv(&sources::shaders().compose(kernel, baked.as_deref()), kernel, &packed);
-                operations += instructions(&module).filter(|(op, _)| opcode::ARITHMETIC.contains(op)).count();
+                operations += instructions(&module)
+                    .filter(|(op, _)| opcode::PROTECTED.contains(op))
+                    .count();
                 let problems = violations(&module);
-                assert!(problems.is_empty(), "{name}, {kernel:?}, baked {}: {problems:?}", baked.is_some());
+                assert!(
+                    problems.is_empty(),
+                    "{name}, {kernel:?}, baked {}: {problems:?}",
+                    baked.is_some()
+                );
             }
         }
     }
@@ -201,7 +265,7 @@ fn an_operation_that_devices_may_compute_differently_is_found() {
         "    var sum = fma(environment.ambient, material.ambient, surface.normal);\n",
         "    var sum = mat3x3f(surface.normal, surface.wo, surface.start) * material.ambient;\n",
         "    var sum = environment.ambient % material.ambient;\n",
-        "    var sum = floor(material.ambient);\n",
+        "    var sum = ceil(material.ambient);\n",
         "    var sum = clamp(material.ambient, vec3f(0.0), vec3f(1.0));\n",
         "    var sum = vec3f(pow(material.shininess, 2.0));\n",
         "    var sum = vec3f(inverseSqrt(material.shininess));\n",
@@ -210,7 +274,10 @@ fn an_operation_that_devices_may_compute_differently_is_found() {
     ] {
         let mut changed = Source::default();
         changed.append("changed", &source.text.replacen(from, to, 1));
-        assert!(!violations(&spirv(&changed, Kernel::Render, &packed)).is_empty(), "{to}");
+        assert!(
+            !violations(&spirv(&changed, Kernel::Render, &packed)).is_empty(),
+            "{to}"
+        );
     }
     let module = spirv(&source, Kernel::Render, &packed);
     assert_eq!(violations(&module), Vec::<String>::new());

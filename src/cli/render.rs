@@ -51,6 +51,10 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
 
+    /// Folder that pictures named by the scene must lie in, if not the scene's own
+    #[arg(long, value_name = "DIR")]
+    asset_root: Option<PathBuf>,
+
     /// Renders the pixels of columns x0 to x1 - 1 and rows y0 to y1 - 1 only, the same as in the whole picture
     #[arg(long, value_name = "x0,y0,x1,y1", value_parser = parse_crop)]
     crop: Option<Region>,
@@ -148,6 +152,7 @@ impl Plan {
             pixel_samples: args.pixel_samples,
             light_samples: args.light_samples,
             seed: args.seed,
+            asset_root: args.asset_root,
         };
         let scene = pack(&Scene::load(&args.scene, &overrides)?);
         let (width, height) = (scene.camera.width, scene.camera.height);

@@ -29,6 +29,16 @@ pub fn positive_zero(x: f32) -> f32 {
     f32::from_bits(if bits == 0x8000_0000 { 0 } else { bits })
 }
 
+pub fn floor(x: f32) -> f32 {
+    let small = x.abs() < 8_388_608.0;
+    let whole = if small { x } else { 0.0 } as i32 as f32;
+    if small {
+        if whole > x { whole - 1.0 } else { whole }
+    } else {
+        x
+    }
+}
+
 pub fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     let mut result = 1.0;
     let mut square = x;

@@ -14,6 +14,7 @@ pub struct Surface {
     pub normal: Vec3,
     pub wo: Vec3,
     pub start: Vec3,
+    pub side: f32,
 }
 
 pub fn primitive_normal(q: &Primitive, local: Vec3) -> Vec3 {
@@ -24,17 +25,15 @@ pub fn primitive_normal(q: &Primitive, local: Vec3) -> Vec3 {
 pub fn surface_at(q: &Primitive, ray: Ray, t: f32, epsilon: f32) -> Surface {
     let position = ray.origin + ray.direction * t;
     let outward = primitive_normal(q, point_to_local(q, position));
-    let normal = if dot(outward, ray.direction) > 0.0 {
-        -outward
-    } else {
-        outward
-    };
+    let side = if dot(outward, ray.direction) > 0.0 { -1.0 } else { 1.0 };
+    let normal = outward * side;
     let size = max(max(position.x.abs(), position.y.abs()), max(position.z.abs(), t));
     Surface {
         position,
         normal,
         wo: -ray.direction,
         start: position + normal * (epsilon * size),
+        side,
     }
 }
 

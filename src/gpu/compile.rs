@@ -3,26 +3,30 @@
 use std::borrow::Cow;
 
 use naga::back::{pipeline_constants::process_overrides, spv};
-use naga::valid::{Capabilities, ValidationFlags, Validator};
+use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
+use naga::{Module, WithSpan};
 
 use super::compose::{Kernel, Source};
+use super::prune::prune;
 use super::spirv;
 use crate::error::ShaderError;
 use crate::pack::Specialization;
 
 /// A kernel that naga accepts.
 pub struct Checked {
-    module: naga::Module,
-    info: naga::valid::ModuleInfo,
+    module: Module,
+    info: ModuleInfo,
 }
 
 /// Parses and validates a kernel.
 pub fn check(source: &Source) -> Result<Checked, ShaderError> {
     let module = naga::front::wgsl::parse_str(&source.text).map_err(|error| ShaderError::parse(source, &error))?;
-    let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
-        .validate(&module)
-        .map_err(|error| ShaderError::invalid(source, &error))?;
+    let info = validate(&module).map_err(|error| ShaderError::invalid(source, &error))?;
     Ok(Checked { module, info })
+}
+
+fn validate(module: &Module) -> Result<ModuleInfo, WithSpan<ValidationError>> {
+    Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(module)
 }
 
 impl Checked {
@@ -36,13 +40,16 @@ impl Checked {
         let constants = constants
             .iter()
             .map(|(name, value)| (name.to_string(), f64::from(*value)));
-        let (module, info): (Cow<'_, _>, Cow<'_, _>) = process_overrides(
+        let (specialised, _): (Cow<'_, _>, Cow<'_, _>) = process_overrides(
             &self.module,
             &self.info,
             Some((naga::ShaderStage::Compute, entry)),
             &constants.collect(),
         )
         .map_err(|error| ShaderError::other("specialisation", &error))?;
+        let mut module = specialised.into_owned();
+        prune(&mut module);
+        let info = validate(&module).map_err(|error| ShaderError::other("specialisation", &error))?;
         // The kernels' loops all count to a bound, so that naga need not bound them again.
         let options = spv::Options {
             lang_version: (1, 3),

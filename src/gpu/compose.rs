@@ -13,13 +13,17 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "bindings.wgsl",
     "camera.wgsl",
     "constants.wgsl",
+    "differential.wgsl",
     "ellipsoid.wgsl",
+    "footprint.wgsl",
     "integrator.wgsl",
     "kernels/aov.wgsl",
     "kernels/render.wgsl",
     "layout.wgsl",
     "light.wgsl",
     "math.wgsl",
+    "path.wgsl",
+    "pattern.wgsl",
     "phong.wgsl",
     "plane.wgsl",
     "ray.wgsl",
@@ -30,7 +34,11 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "sequence.wgsl",
     "shadow.wgsl",
     "specialization.wgsl",
+    "specular.wgsl",
     "surface.wgsl",
+    "tangent.wgsl",
+    "texel.wgsl",
+    "texture.wgsl",
     "traverse.wgsl",
     "triangle.wgsl",
 ];
@@ -53,6 +61,13 @@ pub const SHARED: &[&str] = &[
     "light.wgsl",
     "shadow.wgsl",
     "phong.wgsl",
+    "differential.wgsl",
+    "specular.wgsl",
+    "path.wgsl",
+    "footprint.wgsl",
+    "pattern.wgsl",
+    "texel.wgsl",
+    "tangent.wgsl",
 ];
 
 /// What every kernel adds to [`SHARED`]: its constants, its buffers and the way through the scene.
@@ -60,6 +75,7 @@ const KERNEL: &[&str] = &[
     "specialization.wgsl",
     "bindings.wgsl",
     "traverse.wgsl",
+    "texture.wgsl",
     "integrator.wgsl",
 ];
 /// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.

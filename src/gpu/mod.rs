@@ -5,6 +5,7 @@ mod compile;
 pub mod compose;
 mod device;
 mod pipeline;
+mod prune;
 mod renderer;
 pub mod spirv;
 mod validate;

@@ -41,7 +41,7 @@ pub struct Gpu {
     render: wgpu::ComputePipeline,
     /// The kernel of first hits, once it was asked for.
     aov: Option<wgpu::ComputePipeline>,
-    scene: [wgpu::Buffer; 6],
+    scene: [wgpu::Buffer; 8],
     work: wgpu::Buffer,
     film: Option<Target>,
 }
@@ -82,6 +82,8 @@ impl Gpu {
                 device.upload(BufferUsages::STORAGE, &packed.bounds),
                 device.upload(BufferUsages::STORAGE, &packed.materials),
                 device.upload(BufferUsages::STORAGE, &packed.lights),
+                device.upload(BufferUsages::STORAGE, &packed.textures),
+                device.upload(BufferUsages::STORAGE, &packed.texels),
             ]
         })?;
         let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
@@ -109,7 +111,16 @@ impl Gpu {
         let size = region.pixels() * size_of::<T>() as u64;
         self.device.checked(|| {
             let buffer = self.device.buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-            let [camera, environment, primitives, bounds, materials, lights] = &self.scene;
+            let [
+                camera,
+                environment,
+                primitives,
+                bounds,
+                materials,
+                lights,
+                textures,
+                texels,
+            ] = &self.scene;
             let buffers = [
                 &self.work,
                 camera,
@@ -118,6 +129,8 @@ impl Gpu {
                 bounds,
                 materials,
                 lights,
+                textures,
+                texels,
                 &buffer,
             ];
             let entries: Vec<wgpu::BindGroupEntry> = (0..)
