@@ -138,7 +138,9 @@ light_samples = { pattern = 'random', count = 5 }
             pixel_samples: Some(9),
             light_samples: Some(8),
             seed: Some(3),
-            ..Overrides::default()
+            pixel_pattern: None,
+            adaptive: None,
+            asset_root: None,
         };
         let scene = Scene::parse(SCENE, "s.toml", &overrides).unwrap();
         let render = scene.render;
