@@ -325,7 +325,8 @@ fn pattern(samples: Samples) -> u32 {
     }
 }
 
-fn pack_camera(scene: &Scene) -> Camera {
+/// The camera of a scene.
+pub fn pack_camera(scene: &Scene) -> Camera {
     let camera = &scene.camera;
     let aspect = f64::from(scene.width) / f64::from(scene.height);
     let (projection, half_height) = match camera.projection {

@@ -165,6 +165,11 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
 }
 
 impl Device {
+    /// Gives the device up: whatever uses it from now on fails, as when a driver loses it.
+    pub fn destroy(&self) {
+        self.device.destroy();
+    }
+
     /// Runs calls to wgpu and returns the first error that they raise.
     pub(super) fn checked<T>(&self, calls: impl FnOnce() -> T) -> Result<T, RenderError> {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);

@@ -1,0 +1,139 @@
+//! The files that a session renders: read as they are now, whatever happened to them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use super::diagnostic::Diagnostic;
+use crate::gpu::compose::{BUILT_IN, Shaders};
+use crate::pack::{Packed, pack};
+use crate::scene::{CameraDescription, Description, Overrides, Scene};
+
+/// Where the files are.
+#[derive(Clone, Debug)]
+pub struct Sources {
+    /// The scene file.
+    pub scene: PathBuf,
+    /// Values that stand in for those of the scene file.
+    pub overrides: Overrides,
+    /// The folder of the shaders; without one the shaders in the program are used.
+    pub shaders: Option<PathBuf>,
+}
+
+/// A scene that has been read and packed.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The camera as the file describes it.
+    pub camera: CameraDescription,
+    /// Names of the materials, in the order of their numbers.
+    pub materials: Vec<String>,
+    /// The scene.
+    pub scene: Scene,
+    /// What the backends read.
+    pub packed: Packed,
+}
+
+/// What the files say at one moment.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// The scene, or what is wrong with it.
+    pub scene: Result<Arc<Loaded>, Diagnostic>,
+    /// The shaders, or what is wrong with them.
+    pub shaders: Result<Arc<Shaders>, Diagnostic>,
+    /// The scene file and the files that the scene uses, and their state: what decides whether to read again.
+    pub files: Vec<(PathBuf, Stamp)>,
+}
+
+/// What tells two states of a file apart: a scene file's content; of large files length and time of change.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Stamp {
+    /// It cannot be read.
+    Absent,
+    /// The bytes of a text.
+    Content(Vec<u8>),
+    /// Length and time of change.
+    Changed(u64, Option<SystemTime>),
+}
+
+impl Sources {
+    /// Reads everything.
+    pub fn read(&self) -> Snapshot {
+        self.read_scene(self.read_shaders())
+    }
+
+    /// Reads what has changed since a snapshot; `None` if nothing has.
+    pub fn reread(&self, last: &Snapshot) -> Option<Snapshot> {
+        let shaders = match (self.read_shaders(), &last.shaders) {
+            (Ok(new), Ok(old)) if new == *old => Ok(old.clone()), // the same pointer, which later stages compare
+            (shaders, _) => shaders,
+        };
+        let same_shaders = match (&shaders, &last.shaders) {
+            (Ok(new), Ok(old)) => Arc::ptr_eq(new, old),
+            (Err(new), Err(old)) => new == old,
+            _ => false,
+        };
+        let same_scene = last.files.iter().all(|(path, stamp)| self.stamp(path) == *stamp);
+        match (same_scene, same_shaders) {
+            (true, true) => None,
+            (true, false) => Some(Snapshot { shaders, ..last.clone() }),
+            (false, _) => {
+                let mut new = self.read_scene(shaders);
+                if new.scene.is_err() {
+                    // The files of the last good scene stay watched until there is a new one.
+                    new.files.extend(last.files.iter().skip(1).map(|(path, _)| (path.clone(), self.stamp(path))));
+                }
+                Some(new)
+            }
+        }
+    }
+
+    fn read_shaders(&self) -> Result<Arc<Shaders>, Diagnostic> {
+        let shaders = match &self.shaders {
+            Some(folder) => Shaders::read(folder).map_err(|error| Diagnostic::plain("file", error.to_string()))?,
+            None => Shaders::built_in(),
+        };
+        Ok(Arc::new(shaders))
+    }
+
+    fn read_scene(&self, shaders: Result<Arc<Shaders>, Diagnostic>) -> Snapshot {
+        // The stamps are taken first: a file that changes while it is read is read again.
+        let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
+        let scene = self.load();
+        if let Ok(loaded) = &scene {
+            files.extend(assets(&loaded.scene).into_iter().map(|path| (path.clone(), self.stamp(&path))));
+        }
+        Snapshot { scene, shaders, files }
+    }
+
+    fn load(&self) -> Result<Arc<Loaded>, Diagnostic> {
+        let text = || fs::read_to_string(&self.scene).unwrap_or_default();
+        let scene =
+            Scene::load(&self.scene, &self.overrides).map_err(|error| Diagnostic::scene(&error, &text()))?;
+        let text = text();
+        // The file may have changed in between; it is then read once more.
+        let described = Description::parse(&text, &self.scene.display().to_string())
+            .map_err(|error| Diagnostic::scene(&error, &text))?;
+        let packed = pack(&scene);
+        let materials = described.materials.keys().cloned().collect();
+        Ok(Arc::new(Loaded { camera: described.camera, materials, scene, packed }))
+    }
+
+    fn stamp(&self, path: &Path) -> Stamp {
+        if path == self.scene {
+            return fs::read(path).map_or(Stamp::Absent, Stamp::Content);
+        }
+        fs::metadata(path).map_or(Stamp::Absent, |data| Stamp::Changed(data.len(), data.modified().ok()))
+    }
+
+    /// The shader files' paths.
+    pub fn shader_files(&self) -> impl Iterator<Item = PathBuf> {
+        let folder = self.shaders.iter();
+        folder.flat_map(|folder| BUILT_IN.iter().map(move |(name, _)| folder.join(name)))
+    }
+}
+
+/// The files that a scene names: the one place to add to when scenes name more.
+fn assets(_scene: &Scene) -> Vec<PathBuf> {
+    Vec::new()
+}
