@@ -63,12 +63,15 @@ impl Film {
 
     /// The means of all pixels: linear RGB, row by row from the top.
     pub fn means(&self) -> impl Iterator<Item = [f32; 3]> {
-        self.sums.iter().map(|s| {
-            if s.w == 0.0 {
-                [0.0; 3]
-            } else {
-                [s.x / s.w, s.y / s.w, s.z / s.w]
-            }
-        })
+        self.sums.iter().copied().map(mean)
+    }
+}
+
+/// The mean of a pixel's samples: linear RGB, black if there are none.
+pub fn mean(sum: Vec4) -> [f32; 3] {
+    if sum.w == 0.0 {
+        [0.0; 3]
+    } else {
+        [sum.x / sum.w, sum.y / sum.w, sum.z / sum.w]
     }
 }

@@ -48,6 +48,36 @@ impl Default for Cut {
     }
 }
 
+/// The bands that a region is rendered in, from the top: whole rows, as many as a film has room for.
+pub fn bands(region: Region, cut: &Cut, largest_film: u64) -> impl Iterator<Item = Region> + use<> {
+    let pixels = cut.band_pixels.min(largest_film);
+    let rows = (pixels / u64::from(region.width())).clamp(1, u64::from(region.height())) as u32;
+    (region.y0..region.y1)
+        .step_by(rows as usize)
+        .map(move |y0| Region {
+            y0,
+            y1: region.y1.min(y0 + rows),
+            ..region
+        })
+}
+
+/// What the rays through the centres of a region's pixels meet first, row by row from the top; in calls of bounded size.
+pub fn first_hits(
+    backend: &mut dyn Backend,
+    region: Region,
+) -> Result<Vec<FirstHit>, RenderError> {
+    const CALL_PIXELS: u64 = 1 << 18;
+    let cut = Cut {
+        band_pixels: CALL_PIXELS,
+        ..Cut::default()
+    };
+    let mut hits = Vec::new();
+    for strip in bands(region, &cut, backend.largest_film()) {
+        hits.extend(backend.first_hits(strip)?);
+    }
+    Ok(hits)
+}
+
 /// Renders a region band by band, from the top, and hands each finished band to `output`. `progress` is told the share
 /// of the work that is done, from 0 to 1, and returns whether to go on.
 pub fn render(
@@ -58,17 +88,10 @@ pub fn render(
     progress: &mut dyn FnMut(f64) -> bool,
     output: &mut dyn FnMut(Film) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
-    let band_pixels = cut.band_pixels.min(backend.largest_film());
-    let band_rows = (band_pixels / u64::from(region.width())).clamp(1, u64::from(region.height())) as u32;
     let total = region.pixels() as f64 * f64::from(samples);
     let mut steps = Steps::new(cut, CALL);
     let mut done = 0.0;
-    for y0 in (region.y0..region.y1).step_by(band_rows as usize) {
-        let band = Region {
-            y0,
-            y1: region.y1.min(y0 + band_rows),
-            ..region
-        };
+    for band in bands(region, cut, backend.largest_film()) {
         backend.begin(band)?;
         steps.start(band, samples);
         while let Some(work) = steps.step(backend)? {

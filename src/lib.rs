@@ -6,6 +6,7 @@ pub mod dev;
 pub mod error;
 pub mod film;
 pub mod gpu;
+pub mod image;
 pub mod job;
 pub mod pack;
 pub mod scene;

@@ -6,6 +6,10 @@ use wgpu::{Backends, BufferUsages, DeviceType};
 
 use crate::error::RenderError;
 
+/// What to do where there is no adapter.
+pub const HOW_TO_GET_VULKAN: &str =
+    "on Debian, 'apt-get install mesa-vulkan-drivers' brings software Vulkan (lavapipe)";
+
 /// Which device a render asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Choice {
@@ -69,9 +73,7 @@ fn none_fits(choice: &Choice, adapters: &[wgpu::Adapter]) -> String {
         Choice::Named(name) if !found.is_empty() => {
             format!("no adapter's name, driver or type contains '{name}'; there are: {}", found.join(", "))
         }
-        _ => "no Vulkan, Metal or DX12 adapter found; on Debian, 'apt-get install mesa-vulkan-drivers' brings software \
-              Vulkan (lavapipe)"
-            .to_string(),
+        _ => format!("no Vulkan, Metal or DX12 adapter found; {HOW_TO_GET_VULKAN}"),
     }
 }
 

@@ -7,7 +7,9 @@ mod device;
 mod pipeline;
 mod renderer;
 pub mod spirv;
+mod validate;
 
 pub use compile::{Checked, check};
-pub use device::{Choice, Device, Info, adapters, choose};
+pub use device::{Choice, Device, HOW_TO_GET_VULKAN, Info, adapters, choose};
 pub use renderer::{Gpu, Options};
+pub use validate::check_kernels;

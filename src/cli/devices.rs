@@ -1,0 +1,49 @@
+//! `wgray devices`: what there is to render on.
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+use wgray::gpu::{self, Info};
+
+pub fn run() -> anyhow::Result<ExitCode> {
+    let adapters = gpu::adapters();
+    let mut out = io::stdout().lock();
+    for info in &adapters {
+        let Info {
+            name,
+            driver,
+            backend,
+            kind,
+            exact,
+            largest_binding,
+            largest_buffer,
+        } = info;
+        writeln!(out, "{name}")?;
+        writeln!(out, "    type            {kind}, by {backend}")?;
+        writeln!(out, "    driver          {driver}")?;
+        writeln!(
+            out,
+            "    arithmetic      {}",
+            if *exact {
+                "exactly as written"
+            } else {
+                "as the driver likes it"
+            }
+        )?;
+        writeln!(out, "    largest binding {}", mebibytes(*largest_binding))?;
+        writeln!(out, "    largest buffer  {}", mebibytes(*largest_buffer))?;
+    }
+    writeln!(out, "cpu")?;
+    writeln!(out, "    type            this program's own, without a driver")?;
+    writeln!(out, "    threads         {}", rayon::current_num_threads())?;
+    let chosen = adapters.first().map_or("cpu", |info| &info.name);
+    writeln!(out, "auto chooses: {chosen}")?;
+    if adapters.is_empty() {
+        writeln!(out, "{}", gpu::HOW_TO_GET_VULKAN)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn mebibytes(bytes: u64) -> String {
+    format!("{:.0} MiB", bytes as f64 / f64::from(1 << 20))
+}

@@ -1,0 +1,120 @@
+//! The command line: arguments, messages and exit codes. One file a subcommand.
+
+mod check;
+mod devices;
+mod progress;
+mod render;
+mod stats;
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::{Parser, Subcommand};
+use wgray::error::{RenderError, ShaderError};
+use wgray::scene::SceneError;
+
+#[derive(Debug, Parser)]
+#[command(name = "wgray", version, about, max_term_width = 100, after_help = EXIT_CODES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes: 0 done, 1 failed, 2 wrong command line, 3 bad scene, 4 no such device, 130 interrupted.";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Renders a scene file to a picture
+    Render(Box<render::Args>),
+    /// Validates scene files, and the shaders for them, without a device
+    Check(check::Args),
+    /// Lists the adapters that pictures can be rendered on, and which one "auto" chooses
+    Devices,
+}
+
+/// A command line that can be read but makes no sense.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Usage(String);
+
+/// Reads the command line, does what it says, and returns the exit code.
+pub fn main() -> ExitCode {
+    let start = Instant::now();
+    let cli = Cli::parse(); // leaves with exit code 2, or 0 after --help
+    let threads = match &cli.command {
+        Command::Render(args) => args.threads,
+        Command::Check(_) | Command::Devices => None,
+    };
+    prepare_environment(threads);
+    let result = match cli.command {
+        Command::Render(args) => render::run(*args, start),
+        Command::Check(args) => check::run(&args),
+        Command::Devices => devices::run(),
+    };
+    match result {
+        Ok(code) => code,
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            report(&error);
+            exit_code(&error)
+        }
+    }
+}
+
+/// What drivers learn from the environment. Nothing else runs yet.
+fn prepare_environment(threads: Option<u16>) {
+    let set = |name: &str, value: &std::ffi::OsStr| {
+        // SAFETY: the process has only this thread so far.
+        unsafe { std::env::set_var(name, value) }
+    };
+    if let Some(threads) = threads {
+        set("LP_NUM_THREADS", threads.to_string().as_ref());
+    }
+    if cfg!(target_os = "linux") && std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+        // Mesa complains on standard error where it is not set, and makes no other use of it without a window.
+        set("XDG_RUNTIME_DIR", std::env::temp_dir().as_os_str());
+    }
+}
+
+/// Says on standard error what went wrong.
+fn report(error: &anyhow::Error) {
+    let mut stderr = io::stderr().lock();
+    let _ = writeln!(stderr, "error: {error:#}"); // where this cannot be written there is nobody to tell
+    if let Some(excerpt) = shader_error(error).and_then(|shader| shader.excerpt.as_ref()) {
+        let _ = writeln!(stderr, "{excerpt}");
+    }
+}
+
+fn shader_error(error: &anyhow::Error) -> Option<&ShaderError> {
+    match error.downcast_ref() {
+        Some(RenderError::Shader(shader)) => Some(shader),
+        _ => error.downcast_ref(),
+    }
+}
+
+fn exit_code(error: &anyhow::Error) -> ExitCode {
+    let code = if error.is::<Usage>() {
+        2
+    } else if let Some(error) = error.downcast_ref::<SceneError>() {
+        match error {
+            SceneError::Option(_) => 2,
+            _ => 3,
+        }
+    } else {
+        match error.downcast_ref::<RenderError>() {
+            Some(RenderError::NoDevice(_)) => 4,
+            Some(RenderError::Cancelled) => 130, // 128 + SIGINT, as shells have it
+            _ => 1,
+        }
+    };
+    ExitCode::from(code)
+}
+
+/// Whether whoever read our standard output has gone: no failure, as with `wgray devices | head -1`.
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error
+        .downcast_ref::<io::Error>()
+        .is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+}

@@ -1,0 +1,87 @@
+//! How far a render is, on standard error.
+
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+use clap::ValueEnum;
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Mode {
+    /// A bar, if standard error is a terminal and the render takes more than a second
+    Auto,
+    /// Lines of text, at every tenth of the work and every ten seconds
+    Plain,
+    /// Nothing
+    None,
+}
+
+/// What takes no longer than this needs no bar.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// The longest time between two lines.
+const SILENCE: Duration = Duration::from_secs(10);
+/// Steps of the bar.
+const STEPS: f64 = 1000.0;
+
+/// The progress of one render. The bar goes away when this is dropped.
+pub struct Progress {
+    mode: Mode,
+    start: Instant,
+    bar: Option<ProgressBar>,
+    /// The tenths that lines have told of, and when the last one did.
+    told: (u32, Instant),
+}
+
+impl Progress {
+    pub fn new(mode: Mode) -> Progress {
+        let mode = if mode == Mode::Auto && !std::io::stderr().is_terminal() {
+            Mode::None
+        } else {
+            mode
+        };
+        let start = Instant::now();
+        Progress {
+            mode,
+            start,
+            bar: None,
+            told: (0, start),
+        }
+    }
+
+    /// Tells the share of the work that is done, from 0 to 1.
+    pub fn update(&mut self, share: f64) {
+        match self.mode {
+            Mode::Auto if self.start.elapsed() > PATIENCE => {
+                let bar = self.bar.get_or_insert_with(|| new_bar(self.start.elapsed()));
+                bar.set_position((share * STEPS) as u64);
+            }
+            Mode::Plain => {
+                let tenths = (share * 10.0) as u32;
+                if tenths > self.told.0 || self.told.1.elapsed() > SILENCE {
+                    let seconds = self.start.elapsed().as_secs_f64();
+                    eprintln!("{:3.0} % done after {seconds:.1} s", share * 100.0);
+                    self.told = (tenths, Instant::now());
+                }
+            }
+            Mode::Auto | Mode::None => {}
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn new_bar(elapsed: Duration) -> ProgressBar {
+    let bar = ProgressBar::new(STEPS as u64).with_elapsed(elapsed);
+    let style = ProgressStyle::with_template("{wide_bar} {percent:>3} %  {elapsed} of {duration}");
+    match style {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar, // the library's own style
+    }
+}

@@ -1,0 +1,373 @@
+//! `wgray render`: a scene file to a picture.
+
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::Context as _;
+use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser as _};
+use tracing::info;
+use wgray::cpu::Cpu;
+use wgray::error::RenderError;
+use wgray::film::{Film, Region, mean};
+use wgray::gpu::{self, Gpu, compose::Shaders};
+use wgray::image::{self, Aov, Band, Format, Layout};
+use wgray::job::{self, Backend, Cut};
+use wgray::pack::{Packed, pack};
+use wgray::scene::{Overrides, Scene};
+
+use super::Usage;
+use super::progress::{Mode, Progress};
+use super::stats::Stats;
+
+/// The arguments as they are written.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Scene file; docs/scene-format.md says what is in it
+    scene: PathBuf,
+
+    /// Picture to write: a .png, clamped to 0..1 and encoded by the power 1/2.2, or an .exr, linear.
+    /// If absent: the scene's name with .png, in the current folder
+    #[arg(short, long, value_name = "OUT.png|OUT.exr")]
+    output: Option<PathBuf>,
+
+    /// Size of the picture in pixels, in place of the scene's
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(u32, u32)>,
+
+    /// Samples of every pixel, in place of the scene's; a square number for some patterns
+    #[arg(long, visible_alias = "spp", value_name = "N")]
+    pixel_samples: Option<u32>,
+
+    /// Samples of every area light at every hit, in place of the scene's
+    #[arg(long, value_name = "N")]
+    light_samples: Option<u32>,
+
+    /// Seed of all random patterns, in place of the scene's
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+
+    /// Renders the pixels of columns x0 to x1 - 1 and rows y0 to y1 - 1 only, the same as in the whole picture
+    #[arg(long, value_name = "x0,y0,x1,y1", value_parser = parse_crop)]
+    crop: Option<Region>,
+
+    /// What renders. auto: a real GPU, else software Vulkan, else the CPU; gpu: any adapter; cpu: the CPU without any
+    /// driver; NAME: the adapter with this as a part of its name, driver or type ("lavapipe" for Mesa's software Vulkan)
+    #[arg(long, value_name = "auto|gpu|cpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
+    device: String,
+
+    /// Threads of the CPU and of software Vulkan, if not all
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+
+    /// What else to write, of the first hit through each pixel's centre. In an EXR these are further layers: normal.X,
+    /// .Y, .Z; depth.Z; uv.U, .V; primitive.ID. Beside a PNG they are further files, NAME.normal.png and so on: normals
+    /// moved to 0..1, depth bright where near, fractions of texture coordinates in red and green, shapes in colours
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = aov_parser())]
+    aov: Vec<Aov>,
+
+    /// Writes what the render took, as JSON
+    #[arg(long, value_name = "FILE.json")]
+    stats: Option<PathBuf>,
+
+    /// How progress is shown, on standard error
+    #[arg(long, value_enum, default_value_t = Mode::Auto)]
+    progress: Mode,
+
+    /// Says nothing but errors
+    #[arg(short, long, conflicts_with = "verbose")]
+    quiet: bool,
+
+    /// Says what takes how long, on standard error
+    #[arg(short, long)]
+    verbose: bool,
+}
+
+fn aov_parser() -> impl clap::builder::TypedValueParser<Value = Aov> {
+    PossibleValuesParser::new(Aov::ALL.map(Aov::name)).try_map(|name| {
+        let found = Aov::ALL.into_iter().find(|aov| aov.name() == name);
+        found.ok_or(format!("no such output: {name}"))
+    })
+}
+
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let numbers = text
+        .split_once('x')
+        .map(|(width, height)| (width.parse(), height.parse()));
+    match numbers {
+        Some((Ok(width), Ok(height))) => Ok((width, height)),
+        _ => Err("must be two whole numbers, such as 640x480".to_string()),
+    }
+}
+
+fn parse_crop(text: &str) -> Result<Region, String> {
+    let numbers: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
+    let Ok(&[x0, y0, x1, y1]) = numbers.as_deref() else {
+        return Err("must be four whole numbers, such as 0,0,640,480".to_string());
+    };
+    if x0 >= x1 || y0 >= y1 {
+        return Err("x0 must be less than x1, and y0 less than y1".to_string());
+    }
+    Ok(Region { x0, y0, x1, y1 })
+}
+
+/// What the arguments come to, checked against the scene.
+struct Plan {
+    scene: Packed,
+    output: PathBuf,
+    format: Format,
+    region: Region,
+    aovs: Vec<Aov>,
+    device: Device,
+    threads: Option<u16>,
+    stats: Option<PathBuf>,
+    progress: Mode,
+    quiet: bool,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Device {
+    Cpu,
+    Gpu(gpu::Choice),
+}
+
+impl Plan {
+    fn resolve(args: Args) -> anyhow::Result<Plan> {
+        let output = match args.output {
+            Some(output) => output,
+            None => PathBuf::from(args.scene.file_stem().unwrap_or_default()).with_added_extension("png"),
+        };
+        let format = Format::of(&output)
+            .ok_or_else(|| Usage(format!("--output: {}: must end in .png or .exr", output.display())))?;
+        let overrides = Overrides {
+            size: args.size,
+            pixel_samples: args.pixel_samples,
+            light_samples: args.light_samples,
+            seed: args.seed,
+        };
+        let scene = pack(&Scene::load(&args.scene, &overrides)?);
+        let (width, height) = (scene.camera.width, scene.camera.height);
+        let region = args.crop.unwrap_or(Region::whole(width, height));
+        if region.x1 > width || region.y1 > height {
+            let Region { x0, y0, x1, y1 } = region;
+            return Err(Usage(format!(
+                "--crop: {x0},{y0},{x1},{y1} must lie in the picture of {width} x {height} pixels"
+            ))
+            .into());
+        }
+        let mut aovs = Vec::new();
+        for aov in args.aov {
+            if !aovs.contains(&aov) {
+                aovs.push(aov);
+            }
+        }
+        Ok(Plan {
+            scene,
+            output,
+            format,
+            region,
+            aovs,
+            device: match args.device.as_str() {
+                "auto" => Device::Gpu(gpu::Choice::Auto),
+                "gpu" => Device::Gpu(gpu::Choice::Gpu),
+                "cpu" => Device::Cpu,
+                name => Device::Gpu(gpu::Choice::Named(name.to_string())),
+            },
+            threads: args.threads,
+            stats: args.stats,
+            progress: if args.quiet { Mode::None } else { args.progress },
+            quiet: args.quiet,
+        })
+    }
+
+    /// Makes the device ready for the scene, and says what it is.
+    fn backend(&self) -> anyhow::Result<(Box<dyn Backend + '_>, Described)> {
+        if let Some(threads) = self.threads {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads.into())
+                .build_global()
+                .context("threads")?;
+        }
+        let Device::Gpu(choice) = &self.device else {
+            return Ok(self.cpu());
+        };
+        let device = match gpu::choose(choice) {
+            Err(RenderError::NoDevice(why)) if *choice == gpu::Choice::Auto => {
+                if !self.quiet {
+                    eprintln!("warning: rendering on the CPU: {why}");
+                }
+                return Ok(self.cpu());
+            }
+            other => other?,
+        };
+        let info = &device.info;
+        info!(device = info.name, driver = info.driver, "device open");
+        let described = Described {
+            device: info.name.clone(),
+            driver: info.driver.clone(),
+            backend: info.backend.clone(),
+        };
+        let gpu = Gpu::new(&device, &self.scene, &Shaders::built_in(), gpu::Options::best(&device))?;
+        Ok((Box::new(gpu), described))
+    }
+
+    fn cpu(&self) -> (Box<dyn Backend + '_>, Described) {
+        let described = Described {
+            device: "cpu".to_string(),
+            driver: format!(
+                "wgray {}, {} threads",
+                env!("CARGO_PKG_VERSION"),
+                rayon::current_num_threads()
+            ),
+            backend: "cpu".to_string(),
+        };
+        (Box::new(Cpu::new(&self.scene)), described)
+    }
+}
+
+/// What a render runs on, as `--stats` tells it.
+struct Described {
+    device: String,
+    driver: String,
+    backend: String,
+}
+
+pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
+    if args.verbose {
+        speak();
+    }
+    let plan = Plan::resolve(args)?;
+    info!(seconds = start.elapsed().as_secs_f64(), "scene read");
+    let stopped = stop_on_signal()?;
+    let (mut backend, described) = plan.backend()?;
+    let setup = start.elapsed();
+    info!(seconds = setup.as_secs_f64(), "ready");
+    let render = write_picture(&plan, backend.as_mut(), &stopped)?;
+    let total = start.elapsed();
+    info!(
+        render = render.as_secs_f64(),
+        seconds = total.as_secs_f64(),
+        "picture written"
+    );
+    if let Some(path) = &plan.stats {
+        let (width, height) = (plan.region.width(), plan.region.height());
+        let (pixel_samples, light_samples) = (plan.scene.pixel_samples, plan.scene.light_samples());
+        let stats = Stats {
+            device: described.device,
+            driver: described.driver,
+            backend: described.backend,
+            width,
+            height,
+            pixel_samples,
+            light_samples,
+            setup_s: setup.as_secs_f64(),
+            render_s: render.as_secs_f64(),
+            total_s: total.as_secs_f64(),
+            camera_rays: Some(plan.region.pixels() * u64::from(pixel_samples)),
+            shadow_rays: None,
+            nominal_mrays_per_s: Stats::nominal(width, height, pixel_samples, light_samples, render.as_secs_f64()),
+        };
+        stats.write(path).map_err(RenderError::Output)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Renders band by band into the picture's files; returns the time it took without writing.
+fn write_picture(plan: &Plan, backend: &mut dyn Backend, stopped: &AtomicBool) -> anyhow::Result<Duration> {
+    let layout = Layout {
+        picture: (plan.scene.camera.width, plan.scene.camera.height),
+        region: plan.region,
+        aovs: plan.aovs.clone(),
+        middle_depth: middle_depth(plan, backend)?,
+    };
+    let mut progress = Progress::new(plan.progress);
+    let mut time = Duration::ZERO;
+    let mut strange = 0;
+    image::save(&plan.output, plan.format, &layout, &mut |sink| {
+        let cut = Cut::default();
+        let mut done = 0;
+        for band in job::bands(plan.region, &cut, backend.largest_film()) {
+            let start = Instant::now();
+            let mut update = |share: f64| {
+                progress.update((done as f64 + share * band.pixels() as f64) / plan.region.pixels() as f64);
+                !stopped.load(Ordering::Relaxed)
+            };
+            let mut film = Film::new(Region::whole(0, 0));
+            let mut take = |rendered| {
+                film = rendered;
+                Ok(())
+            };
+            job::render(backend, band, plan.scene.pixel_samples, &cut, &mut update, &mut take)?;
+            time += start.elapsed();
+            let hits = if plan.aovs.is_empty() {
+                Vec::new()
+            } else {
+                job::first_hits(backend, band)?
+            };
+            strange += film
+                .sums
+                .iter()
+                .filter(|sum| !mean(**sum).iter().all(|value| value.is_finite()))
+                .count();
+            sink(Band {
+                film: &film,
+                hits: &hits,
+            })?;
+            done += band.pixels();
+        }
+        Ok(())
+    })?;
+    drop(progress);
+    if strange > 0 && !plan.quiet {
+        eprintln!(
+            "warning: {}: {strange} pixels are not finite numbers",
+            plan.output.display()
+        );
+    }
+    Ok(time)
+}
+
+/// What depth looks half bright: that in the middle of the whole picture, or 1 where nothing is.
+fn middle_depth(plan: &Plan, backend: &mut dyn Backend) -> Result<f32, RenderError> {
+    if plan.format != Format::Png || !plan.aovs.contains(&Aov::Depth) {
+        return Ok(1.0);
+    }
+    let (x0, y0) = (plan.scene.camera.width / 2, plan.scene.camera.height / 2);
+    let hits = backend.first_hits(Region {
+        x0,
+        y0,
+        x1: x0 + 1,
+        y1: y0 + 1,
+    })?;
+    Ok(hits
+        .first()
+        .map(|hit| hit.depth)
+        .filter(|depth| *depth > 0.0)
+        .unwrap_or(1.0))
+}
+
+/// Set when the user wants the render to end; it then cleans up behind itself.
+fn stop_on_signal() -> anyhow::Result<Arc<AtomicBool>> {
+    let stopped = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stopped);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("signal handler")?;
+    Ok(stopped)
+}
+
+/// Events of this program on standard error, and warnings of others.
+fn speak() {
+    use tracing_subscriber::filter::{LevelFilter, Targets};
+    use tracing_subscriber::prelude::*;
+    let ours = Targets::new()
+        .with_target("wgray", LevelFilter::DEBUG)
+        .with_default(LevelFilter::WARN);
+    let lines = tracing_subscriber::fmt::layer()
+        .with_writer(std::io::stderr)
+        .with_target(false)
+        .without_time()
+        .with_ansi(std::io::stderr().is_terminal());
+    tracing_subscriber::registry().with(lines).with(ours).init();
+}

@@ -1,0 +1,90 @@
+//! How far two pictures are apart.
+
+use super::Pixels;
+
+/// The differences of all values of two pictures of the same size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Difference {
+    /// Pixels that are not the same bits, signed zeros and NaN told apart.
+    pub unequal: usize,
+    /// The largest difference of two values; NaN if any is.
+    pub largest: f32,
+    /// Pixels with a value that differs by more than the tolerance, or by no number.
+    pub beyond: usize,
+}
+
+/// Compares two pictures value by value; `None` if their sizes differ.
+pub fn difference(a: &Pixels, b: &Pixels, tolerance: f32) -> Option<Difference> {
+    if (a.width, a.height) != (b.width, b.height) {
+        return None;
+    }
+    let mut result = Difference {
+        unequal: 0,
+        largest: 0.0,
+        beyond: 0,
+    };
+    for (a, b) in a.colors.iter().zip(&b.colors) {
+        result.unequal += usize::from(a.map(f32::to_bits) != b.map(f32::to_bits));
+        let mut beyond = false;
+        for (a, b) in a.iter().zip(b) {
+            let apart = if a.to_bits() == b.to_bits() { 0.0 } else { (a - b).abs() };
+            beyond |= !(apart <= tolerance);
+            result.largest = if apart.is_nan() || result.largest.is_nan() {
+                f32::NAN
+            } else {
+                result.largest.max(apart)
+            };
+        }
+        result.beyond += usize::from(beyond);
+    }
+    Some(result)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(colors: &[[f32; 3]]) -> Pixels {
+        Pixels {
+            width: colors.len() as u32,
+            height: 1,
+            colors: colors.to_vec(),
+        }
+    }
+
+    #[test]
+    fn differences_are_counted_and_measured() {
+        let a = picture(&[[0.0, 1.0, 2.0], [3.0, 4.0, 5.0], [0.0; 3]]);
+        let same = Difference {
+            unequal: 0,
+            largest: 0.0,
+            beyond: 0,
+        };
+        assert_eq!(difference(&a, &a, 0.0), Some(same));
+        let b = picture(&[[0.0, 1.0, 2.5], [3.0, 4.0, 5.0], [-0.0, 0.0, 0.25]]);
+        let apart = Difference {
+            unequal: 2,
+            largest: 0.5,
+            beyond: 1,
+        };
+        assert_eq!(difference(&a, &b, 0.25), Some(apart));
+    }
+
+    #[test]
+    fn no_number_is_never_within_the_tolerance() {
+        let (a, b) = (picture(&[[0.0; 3]]), picture(&[[f32::NAN, 0.0, 0.0]]));
+        let found = difference(&a, &b, f32::MAX).unwrap();
+        assert_eq!((found.unequal, found.beyond), (1, 1));
+        assert!(found.largest.is_nan());
+        assert_eq!(
+            difference(&b, &b, 0.0).unwrap().beyond,
+            0,
+            "the same bits are no difference"
+        );
+    }
+
+    #[test]
+    fn pictures_of_different_sizes_are_not_compared() {
+        assert_eq!(difference(&picture(&[[0.0; 3]]), &picture(&[]), 1.0), None);
+    }
+}

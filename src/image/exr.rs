@@ -1,0 +1,196 @@
+//! OpenEXR files: scan lines of 32-bit samples, compressed without loss, written block by block.
+
+use std::io::{self, Seek, Write};
+use std::path::Path;
+
+use ::exr::block::writer::{ChunkWriter, ChunksWriter};
+use ::exr::block::{BlockIndex, UncompressedBlock, write as write_blocks};
+use ::exr::compression::Compression;
+use ::exr::error::{Error, UnitResult};
+use ::exr::math::Vec2;
+use ::exr::meta::attribute::{ChannelDescription, IntegerBounds, LineOrder, SampleType};
+use ::exr::meta::header::{Header, ImageAttributes};
+use ::exr::meta::{BlockDescription, MetaData};
+use ::exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel};
+use rayon::prelude::*;
+
+use super::aov::Channel;
+use super::{Band, Layout, Pending, Pixels, Sink};
+use crate::error::RenderError;
+use crate::film::mean;
+
+/// Rows that are compressed together; the format fixes it for [`Compression::ZIP16`].
+const BLOCK_ROWS: usize = 16;
+
+/// Writes the radiance as R, G, B and the AOVs as further channels of the same part. The display window is the whole
+/// picture, the data window the region.
+pub fn write(
+    file: &mut Pending,
+    layout: &Layout,
+    render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
+) -> Result<(), RenderError> {
+    let columns = columns(layout);
+    let header = header(layout, &columns);
+    // The library calls us back, so an error of the render goes around it.
+    let mut failed = None;
+    let written = write_blocks(file, [header].into_iter().collect(), true, |meta, writer| {
+        let mut rows = Rows {
+            columns: &columns,
+            layout,
+            meta,
+            writer,
+            lines: Vec::new(),
+            next: 0,
+        };
+        let rendered = render(&mut |band| Ok(rows.take(band).map_err(plain)?));
+        rendered.map_err(|error| {
+            failed = Some(error);
+            Error::Aborted
+        })
+    });
+    match failed {
+        Some(error) => Err(error),
+        None => Ok(written.map_err(plain)?),
+    }
+}
+
+/// Where a channel's samples come from.
+enum Column {
+    Radiance(usize),
+    FirstHit(Channel),
+}
+
+/// The channels by name, in the order of the file, which is that of the alphabet.
+fn columns(layout: &Layout) -> Vec<(&'static str, Column)> {
+    let mut columns: Vec<_> = ["R", "G", "B"].into_iter().zip((0..).map(Column::Radiance)).collect();
+    for channel in layout.aovs.iter().flat_map(|aov| aov.channels()) {
+        let (Channel::Float(name, _) | Channel::Whole(name, _)) = &channel;
+        columns.push((*name, Column::FirstHit(channel)));
+    }
+    columns.sort_by_key(|(name, _)| *name);
+    columns
+}
+
+fn header(layout: &Layout, columns: &[(&str, Column)]) -> Header {
+    let channel = |(name, column): &(&str, Column)| {
+        let sample = match column {
+            Column::FirstHit(Channel::Whole(..)) => SampleType::U32,
+            _ => SampleType::F32,
+        };
+        ChannelDescription::named(*name, sample)
+    };
+    let channels = columns.iter().map(channel).collect();
+    let (width, height) = layout.picture;
+    let region = layout.region;
+    Header::new(
+        "wgray".into(),
+        Vec2(region.width() as usize, region.height() as usize),
+        channels,
+    )
+    .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing)
+    .with_position(Vec2(region.x0 as i32, region.y0 as i32))
+    .with_shared_attributes(ImageAttributes::new(IntegerBounds::from_dimensions(Vec2(
+        width as usize,
+        height as usize,
+    ))))
+}
+
+/// Gathers rows to blocks.
+struct Rows<'a, W: Write + Seek> {
+    columns: &'a [(&'static str, Column)],
+    layout: &'a Layout,
+    meta: MetaData,
+    writer: &'a mut ChunkWriter<W>,
+    /// Rows that wait for the rest of their block.
+    lines: Vec<Vec<u8>>,
+    /// The number of the next block.
+    next: usize,
+}
+
+impl<W: Write + Seek> Rows<'_, W> {
+    fn take(&mut self, band: Band) -> UnitResult {
+        let width = self.layout.region.width() as usize;
+        let rows = band.film.region.height() as usize;
+        let lines = (0..rows)
+            .into_par_iter()
+            .map(|y| line(self.columns, band, y * width..(y + 1) * width));
+        self.lines.extend(lines.collect::<Vec<_>>());
+        let height = self.layout.region.height() as usize;
+        let last = self.next * BLOCK_ROWS + self.lines.len() == height;
+        let whole = self.lines.len() / BLOCK_ROWS * BLOCK_ROWS;
+        let ready: Vec<Vec<u8>> = self
+            .lines
+            .drain(..if last { self.lines.len() } else { whole })
+            .collect();
+        let (first, headers) = (self.next, &self.meta.headers);
+        let chunks = ready.par_chunks(BLOCK_ROWS).enumerate().map(|(i, lines)| {
+            let index = BlockIndex {
+                layer: 0,
+                pixel_position: Vec2(0, (first + i) * BLOCK_ROWS),
+                pixel_size: Vec2(width, lines.len()),
+                level: Vec2(0, 0),
+            };
+            UncompressedBlock {
+                index,
+                data: lines.concat(),
+            }
+            .compress_to_chunk(headers)
+        });
+        for chunk in chunks.collect::<Vec<_>>() {
+            self.writer.write_chunk(self.next, chunk?)?;
+            self.next += 1;
+        }
+        Ok(())
+    }
+}
+
+/// A row's bytes: all samples of the first channel, then all of the second ...
+fn line(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(4 * columns.len() * pixels.len());
+    for (_, column) in columns {
+        for i in pixels.clone() {
+            bytes.extend(match column {
+                Column::Radiance(channel) => mean(band.film.sums[i])[*channel].to_ne_bytes(),
+                Column::FirstHit(Channel::Float(_, value)) => value(&band.hits[i]).to_ne_bytes(),
+                Column::FirstHit(Channel::Whole(_, value)) => value(&band.hits[i]).to_ne_bytes(),
+            });
+        }
+    }
+    bytes
+}
+
+fn plain(error: Error) -> io::Error {
+    match error {
+        Error::Io(error) => error,
+        other => io::Error::other(other),
+    }
+}
+
+/// Reads the channels R, G and B of an EXR file's first layer.
+///
+/// # Errors
+///
+/// Files that cannot be read, are no EXR files or have no such channels.
+pub fn read_exr(path: &Path) -> io::Result<Pixels> {
+    let create = |size: Vec2<usize>, _: &_| Pixels {
+        width: size.x() as u32,
+        height: size.y() as u32,
+        colors: vec![[0.0; 3]; size.area()],
+    };
+    let set = |pixels: &mut Pixels, at: Vec2<usize>, (r, g, b): (f32, f32, f32)| {
+        pixels.colors[at.y() * pixels.width as usize + at.x()] = [r, g, b];
+    };
+    let image = ::exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .specific_channels()
+        .required("R")
+        .required("G")
+        .required("B")
+        .collect_pixels(create, set)
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(path)
+        .map_err(plain)?;
+    Ok(image.layer_data.channel_data.pixels)
+}

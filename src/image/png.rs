@@ -1,0 +1,88 @@
+//! PNG files.
+
+use std::io::{self, Write};
+
+use ::png::{BitDepth, ColorType, Encoder, EncodingError, ScaledFloat};
+use rayon::prelude::*;
+
+use super::{Aov, Band, Layout, Pending, Sink};
+use crate::error::RenderError;
+use crate::film::mean;
+
+/// The exponent of the course's display curve.
+const DISPLAY: f64 = 1.0 / 2.2;
+
+/// A linear value as 8 bits: clamped to [0, 1], raised to the power 1/2.2, times 255, rounded to the nearest whole
+/// number; 0 if it is no number.
+pub fn encode(linear: f32) -> u8 {
+    quantize(f64::from(linear.clamp(0.0, 1.0)).powf(DISPLAY))
+}
+
+/// The nearest of 256 steps from 0 to 1; halves go up.
+fn quantize(value: f64) -> u8 {
+    (value * 255.0 + 0.5) as u8 // the conversion saturates, and takes NaN to 0
+}
+
+/// Writes the radiance to the first file and the AOVs to those after it.
+pub fn write(
+    files: &mut [Pending],
+    layout: &Layout,
+    render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
+) -> Result<(), RenderError> {
+    let mut writers = Vec::new();
+    let contents = [None].into_iter().chain(layout.aovs.iter().copied().map(Some));
+    for (file, content) in files.iter_mut().zip(contents) {
+        let mut png = Encoder::new(file, layout.region.width(), layout.region.height());
+        png.set_color(ColorType::Rgb);
+        png.set_depth(BitDepth::Eight);
+        if content.is_none() {
+            png.set_source_gamma(ScaledFloat::new(DISPLAY as f32));
+        }
+        writers.push((png.write_header().map_err(plain)?, content));
+    }
+    let mut streams = Vec::new();
+    for (writer, content) in &mut writers {
+        streams.push((writer.stream_writer().map_err(plain)?, content));
+    }
+    render(&mut |band| {
+        for (stream, content) in &mut streams {
+            let bytes = match &*content {
+                None => radiance(band),
+                Some(aov) => colors(band, *aov, layout.middle_depth),
+            };
+            stream.write_all(&bytes)?;
+        }
+        Ok(())
+    })?;
+    for (stream, _) in streams {
+        stream.finish().map_err(plain)?;
+    }
+    for (writer, _) in writers {
+        writer.finish().map_err(plain)?;
+    }
+    Ok(())
+}
+
+fn radiance(band: Band) -> Vec<u8> {
+    band.film
+        .sums
+        .par_iter()
+        .flat_map_iter(|sum| mean(*sum).map(encode))
+        .collect()
+}
+
+fn colors(band: Band, aov: Aov, middle_depth: f32) -> Vec<u8> {
+    let color = |hit| {
+        aov.color(hit, middle_depth)
+            .to_array()
+            .map(|value| quantize(f64::from(value)))
+    };
+    band.hits.par_iter().flat_map_iter(color).collect()
+}
+
+fn plain(error: EncodingError) -> io::Error {
+    match error {
+        EncodingError::IoError(error) => error,
+        other => io::Error::other(other),
+    }
+}
