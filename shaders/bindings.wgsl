@@ -1,8 +1,9 @@
-// The buffers of every kernel. Binding 6 is what a kernel writes, and is declared with it.
+// The buffers of every kernel. The last binding, 7, is what a kernel writes, and is declared with it.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> camera: Camera;
 @group(0) @binding(2) var<uniform> environment: Environment;
 @group(0) @binding(3) var<storage, read> primitives: array<Primitive>;
-@group(0) @binding(4) var<storage, read> materials: array<Material>;
-@group(0) @binding(5) var<storage, read> lights: array<Light>;
+@group(0) @binding(4) var<storage, read> bounds: array<Sphere>;
+@group(0) @binding(5) var<storage, read> materials: array<Material>;
+@group(0) @binding(6) var<storage, read> lights: array<Light>;

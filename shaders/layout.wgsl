@@ -34,6 +34,12 @@ struct Primitive {
     determinant: f32,      // of the three rows
 }
 
+// A sphere around a primitive that can cast a shadow.
+struct Sphere {
+    center: vec3f,
+    radius: f32,
+}
+
 struct Material {
     ambient: vec3f,        // EMITTER: its colour
     kind: u32,             // PHONG or EMITTER

@@ -38,3 +38,34 @@ fn blocks(kind: u32, o: vec3f, d: vec3f, reach: f32) -> bool {
     }
     return plane_blocks(o, d, reach);
 }
+
+// The cone of all shadow rays from p to a light: s (towards + u a + v b) for s >= 0 and a, b in -1..=1.
+struct Cone {
+    apex: vec3f,
+    to: Segments,
+    length2: f32,          // |towards|^2
+    inverse_depth: f32,    // 1 / (the least dot product of towards with a ray), or negative if that is not positive
+}
+
+fn cone_to_light(light: Light, p: vec3f) -> Cone {
+    let to = segments_to_light(light, p);
+    let length2 = dot(to.towards, to.towards);
+    let depth = length2 - abs(dot(to.towards, to.u)) - abs(dot(to.towards, to.v));
+    return Cone(p, to, length2, select(-1.0, 1.0 / depth, depth > 0.0));
+}
+
+// Whether the sphere may reach into the cone. It does not if a plane through the apex has the cone on one side and the
+// sphere on the other: the plane with normal n = m - towards slope, where m is the part of the way to the sphere's
+// centre that is perpendicular to `towards`, and `slope` the least that keeps all rays of the cone below it.
+fn may_block(sphere: Sphere, cone: Cone) -> bool {
+    let w = sphere.center - cone.apex;
+    let along = dot(w, cone.to.towards);
+    let m = w - cone.to.towards * (along / cone.length2);
+    let m2 = dot(m, m);
+    let slope = (abs(dot(m, cone.to.u)) + abs(dot(m, cone.to.v))) * cone.inverse_depth;
+    let height = m2 - slope * along;
+    let radius2 = sphere.radius * sphere.radius;
+    let aside = (slope >= 0.0) & (height > 0.0) & (height * height > radius2 * (m2 + slope * slope * cone.length2));
+    let behind = (cone.inverse_depth > 0.0) & (along < 0.0) & (along * along > radius2 * cone.length2);
+    return !(aside | behind);
+}

@@ -1,37 +1,27 @@
-// Which primitives a ray meets, by one loop for each kind of primitive.
-
-fn closest_hit(ray: Ray) -> Hit {
-    var hit = Hit(FAR, NOTHING);
-    var i = 0u;
-    for (; i < RECTANGLES; i++) {
-        hit = closer(hit, intersect_rectangle(load_primitive(i), ray, hit.t), i);
-    }
-    for (; i < RECTANGLES + TRIANGLES; i++) {
-        hit = closer(hit, intersect_triangle(load_primitive(i), ray, hit.t), i);
-    }
-    for (; i < RECTANGLES + TRIANGLES + ELLIPSOIDS; i++) {
-        hit = closer(hit, intersect_ellipsoid(load_primitive(i), ray, hit.t), i);
-    }
-    for (; i < RECTANGLES + TRIANGLES + ELLIPSOIDS + PLANES; i++) {
-        hit = closer(hit, intersect_plane(load_primitive(i), ray, hit.t), i);
-    }
-    return hit;
-}
+// Which of a light's samples are hidden. First a cheap test finds the primitives that may hide any, then only these are
+// looked at: software Vulkan cannot skip a branch, but it leaves a loop as soon as none of its lanes goes on.
 
 // Bit i is set where any primitive hides sample i of the block from p.
 fn hidden_samples(p: vec3f, light: Light, block: Block) -> u32 {
+    let cone = cone_to_light(light, p);
+    let triangles = RECTANGLES + TRIANGLES;
+    let ellipsoids = triangles + ELLIPSOIDS;
+    return hidden_by(RECTANGLE, 0u, BLOCKING_RECTANGLES, cone, light, block)
+        | hidden_by(TRIANGLE, RECTANGLES, RECTANGLES + BLOCKING_TRIANGLES, cone, light, block)
+        | hidden_by(ELLIPSOID, triangles, ellipsoids, cone, light, block)
+        | hidden_by(PLANE, ellipsoids, ellipsoids + BLOCKING_PLANES, cone, light, block);
+}
+
+// The same for the primitives of one kind from `start` to before `end`.
+fn hidden_by(kind: u32, start: u32, end: u32, cone: Cone, light: Light, block: Block) -> u32 {
     var bits = 0u;
-    for (var i = 0u; i < BLOCKING_RECTANGLES; i++) {
-        bits |= shadow_bits(RECTANGLE, load_primitive(i), p, light, block);
-    }
-    for (var i = 0u; i < BLOCKING_TRIANGLES; i++) {
-        bits |= shadow_bits(TRIANGLE, load_primitive(RECTANGLES + i), p, light, block);
-    }
-    for (var i = 0u; i < ELLIPSOIDS; i++) {
-        bits |= shadow_bits(ELLIPSOID, load_primitive(RECTANGLES + TRIANGLES + i), p, light, block);
-    }
-    for (var i = 0u; i < BLOCKING_PLANES; i++) {
-        bits |= shadow_bits(PLANE, load_primitive(RECTANGLES + TRIANGLES + ELLIPSOIDS + i), p, light, block);
+    for (var first = start; first < end; first += 32u) {
+        var candidates = shadow_candidates(first, end, cone);
+        while candidates != 0u {
+            let q = load_primitive(first + firstTrailingBit(candidates));
+            candidates &= candidates - 1u;
+            bits |= shadow_bits(kind, q, cone.apex, light, block);
+        }
     }
     return bits;
 }

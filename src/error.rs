@@ -27,10 +27,7 @@ impl ShaderError {
         ShaderError::at(source, span, format!("{}{label}", error.message()))
     }
 
-    pub(crate) fn invalid(
-        source: &Source,
-        error: &naga::WithSpan<naga::valid::ValidationError>,
-    ) -> ShaderError {
+    pub(crate) fn invalid(source: &Source, error: &naga::WithSpan<naga::valid::ValidationError>) -> ShaderError {
         let span = error.spans().map(|(span, _)| *span).last();
         ShaderError::at(source, span, chain(error.as_inner()))
     }
@@ -45,8 +42,7 @@ impl ShaderError {
 
     fn at(source: &Source, span: Option<naga::Span>, message: String) -> ShaderError {
         let range = span.and_then(|span| span.to_range());
-        let Some((file, text, offset)) = range.clone().and_then(|range| source.locate(range.start))
-        else {
+        let Some((file, text, offset)) = range.clone().and_then(|range| source.locate(range.start)) else {
             return ShaderError {
                 place: "shader".to_string(),
                 message,

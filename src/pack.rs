@@ -3,6 +3,7 @@
 //! The structs are those of `shaders/layout.wgsl`: rows of 16 bytes, a `vec3f` followed by a scalar.
 
 mod blocking;
+mod bounds;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3, UVec2, Vec2, Vec3};
@@ -99,6 +100,16 @@ pub struct Primitive {
     pub z: Vec3,
     /// Determinant of the three rows.
     pub determinant: f32,
+}
+
+/// A sphere around a primitive that can cast a shadow.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Sphere {
+    /// The middle.
+    pub center: Vec3,
+    /// Infinite for a plane.
+    pub radius: f32,
 }
 
 /// A surface's appearance.
@@ -231,6 +242,8 @@ pub struct Packed {
     pub environment: Environment,
     /// The primitives, sorted by kind and in each kind by whether they can cast a shadow; lights' rectangles among them.
     pub primitives: Vec<Primitive>,
+    /// A sphere around each primitive.
+    pub bounds: Vec<Sphere>,
     /// The materials of the scene, then one for each area light.
     pub materials: Vec<Material>,
     /// The lights, rectangles first.
@@ -259,12 +272,7 @@ pub fn pack(scene: &Scene) -> Packed {
         let number = number as u32;
         if let scene::Light::Rectangle { rectangle, color } = light {
             let shape = scene.shapes.len() as u32 + number;
-            primitives.push(parallelogram(
-                RECTANGLE,
-                rectangle,
-                materials.len() as u32,
-                shape,
-            ));
+            primitives.push(parallelogram(RECTANGLE, rectangle, materials.len() as u32, shape));
             materials.push(Material {
                 ambient: color.as_vec3(),
                 kind: EMITTER,
@@ -302,6 +310,7 @@ pub fn pack(scene: &Scene) -> Packed {
         light_samples: light_samples.count,
         exponent_bits,
     };
+    let primitives: Vec<Primitive> = order.into_iter().map(|(primitive, _)| primitive).collect();
     Packed {
         camera: pack_camera(scene),
         environment: Environment {
@@ -310,7 +319,8 @@ pub fn pack(scene: &Scene) -> Packed {
             background: scene.render.background.as_vec3(),
             light_weight: 1.0 / light_samples.count as f32,
         },
-        primitives: order.into_iter().map(|(primitive, _)| primitive).collect(),
+        bounds: primitives.iter().map(bounds::sphere).collect(),
+        primitives,
         materials,
         lights,
         pixel_samples: pixels.count,
@@ -369,16 +379,8 @@ fn exponent_bits(described: &[scene::Material], packed: &[Material]) -> u32 {
         let scene::Material::Phong { shininess, .. } = material;
         shininess.fract() == 0.0 && *shininess <= 4096.0
     });
-    let largest = packed
-        .iter()
-        .map(|material| material.exponent)
-        .max()
-        .unwrap_or(1);
-    if whole {
-        u32::BITS - largest.leading_zeros()
-    } else {
-        0
-    }
+    let largest = packed.iter().map(|material| material.exponent).max().unwrap_or(1);
+    if whole { u32::BITS - largest.leading_zeros() } else { 0 }
 }
 
 fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {

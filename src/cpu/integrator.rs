@@ -29,9 +29,7 @@ pub fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
     let (area_lights, delta_lights) = scene.lights.split_at(s.area_lights as usize);
     for light in area_lights {
         let (pattern, side, count) = (s.light_pattern, s.light_side, s.light_samples);
-        let lobes = lobes_of_light(
-            scene, surface, material, light, pattern, side, count, pixel, sample,
-        );
+        let lobes = lobes_of_light(scene, surface, material, light, pattern, side, count, pixel, sample);
         sum += reflected(material, light, lobes, scene.environment.light_weight);
     }
     for light in delta_lights {
@@ -41,10 +39,7 @@ pub fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
     sum
 }
 
-#[expect(
-    clippy::too_many_arguments,
-    reason = "the twin of a WGSL function has its arguments"
-)]
+#[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
 pub fn lobes_of_light(
     scene: &Packed,
     surface: Surface,
@@ -96,12 +91,7 @@ pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> Vec3 {
     let s = &scene.specialization;
     let key = sample_key(pixel, scene.camera.seed, 0);
     let at = sample_square(s.pixel_pattern, s.pixel_side, sample, 0, key);
-    radiance(
-        scene,
-        camera_ray(&scene.camera, pixel.as_vec2() + at),
-        pixel,
-        sample,
-    )
+    radiance(scene, camera_ray(&scene.camera, pixel.as_vec2() + at), pixel, sample)
 }
 
 pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {

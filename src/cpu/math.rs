@@ -9,11 +9,7 @@ pub fn dot(a: Vec3, b: Vec3) -> f32 {
 }
 
 pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    Vec3::new(
-        a.y * b.z - a.z * b.y,
-        a.z * b.x - a.x * b.z,
-        a.x * b.y - a.y * b.x,
-    )
+    Vec3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 }
 
 pub fn normalize(v: Vec3) -> Vec3 {
@@ -32,22 +28,14 @@ pub fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     let mut result = 1.0;
     let mut square = x;
     for i in 0..bits {
-        result = if (n >> i) & 1 == 1 {
-            result * square
-        } else {
-            result
-        };
+        result = if (n >> i) & 1 == 1 { result * square } else { result };
         square *= square;
     }
     result
 }
 
 pub fn power(x: f32, y: f32) -> f32 {
-    if x >= f32::MIN_POSITIVE {
-        exp2(y * log2(x))
-    } else {
-        0.0
-    }
+    if x >= f32::MIN_POSITIVE { exp2(y * log2(x)) } else { 0.0 }
 }
 
 pub fn log2(x: f32) -> f32 {
@@ -56,9 +44,7 @@ pub fn log2(x: f32) -> f32 {
     let m = f32::from_bits(bits.wrapping_sub(exponent << 23) as u32);
     let s = (m - 1.0) / (m + 1.0);
     let s2 = s * s;
-    let series = 1.0
-        + s2 * (0.333_333_34
-            + s2 * (0.2 + s2 * (0.142_857_15 + s2 * (0.111_111_11 + s2 * 0.090_909_09))));
+    let series = 1.0 + s2 * (0.333_333_34 + s2 * (0.2 + s2 * (0.142_857_15 + s2 * (0.111_111_11 + s2 * 0.090_909_09))));
     exponent as f32 + s * series * (2.0 * std::f32::consts::LOG2_E)
 }
 
@@ -81,15 +67,10 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     let steep = small > 0.414_213_57 * large;
     let t = if steep { small - large } else { small } / if steep { small + large } else { large };
     let t2 = t * t;
-    let high = 0.111_111_11
-        - t2 * (0.090_909_09 - t2 * (0.076_923_08 - t2 * (0.066_666_67 - t2 * 0.058_823_53)));
+    let high = 0.111_111_11 - t2 * (0.090_909_09 - t2 * (0.076_923_08 - t2 * (0.066_666_67 - t2 * 0.058_823_53)));
     let series = 1.0 - t2 * (0.333_333_34 - t2 * (0.2 - t2 * (0.142_857_15 - t2 * high)));
     let octant = if steep { FRAC_PI_4 } else { 0.0 } + t * series;
-    let quadrant = if y.abs() > x.abs() {
-        FRAC_PI_2 - octant
-    } else {
-        octant
-    };
+    let quadrant = if y.abs() > x.abs() { FRAC_PI_2 - octant } else { octant };
     let half = if x < 0.0 { PI - quadrant } else { quadrant };
     if large > 0.0 {
         if y < 0.0 { -half } else { half }

@@ -45,12 +45,7 @@ pub fn phong_block(
 ) -> Lobes {
     let mut lobes = sum;
     for i in 0..block.count {
-        let sample = phong_lobes(
-            surface,
-            material,
-            segment(to, block_sample(block, i)),
-            exponent_bits,
-        );
+        let sample = phong_lobes(surface, material, segment(to, block_sample(block, i)), exponent_bits);
         let visible = (hidden >> i) & 1 == 0;
         lobes.diffuse += if visible { sample.diffuse } else { 0.0 };
         lobes.specular += if visible { sample.specular } else { 0.0 };

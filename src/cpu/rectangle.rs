@@ -10,11 +10,7 @@ pub fn intersect_rectangle(q: &Primitive, ray: Ray, limit: f32) -> f32 {
     let t = plane_distance(q, ray);
     let p = ray.origin + ray.direction * t - q.center;
     let inside = (dot(q.x, p).abs() <= 1.0) & (dot(q.y, p).abs() <= 1.0);
-    if (t > 0.0) & (t < limit) & inside {
-        t
-    } else {
-        limit
-    }
+    if (t > 0.0) & (t < limit) & inside { t } else { limit }
 }
 
 pub fn rectangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool {

@@ -45,19 +45,12 @@ impl Backend for Cpu<'_> {
         let (region, sums) = (self.film.region, &mut self.film.sums);
         let scene = self.scene;
         let rows = sums.chunks_mut(region.width() as usize).enumerate();
-        let rows = rows
-            .skip((tile.y0 - region.y0) as usize)
-            .take(tile.height() as usize);
+        let rows = rows.skip((tile.y0 - region.y0) as usize).take(tile.height() as usize);
         let columns = (tile.x0 - region.x0) as usize..(tile.x1 - region.x0) as usize;
         let runs: Vec<_> = rows
             .flat_map(|(y, row)| {
                 let runs = row[columns.clone()].chunks_mut(RUN).enumerate();
-                runs.map(move |(i, run)| {
-                    (
-                        UVec2::new(tile.x0 + (i * RUN) as u32, region.y0 + y as u32),
-                        run,
-                    )
-                })
+                runs.map(move |(i, run)| (UVec2::new(tile.x0 + (i * RUN) as u32, region.y0 + y as u32), run))
             })
             .collect();
         runs.into_par_iter().for_each(|(first, run)| {
@@ -71,18 +64,13 @@ impl Backend for Cpu<'_> {
     }
 
     fn film(&mut self) -> Result<Film, RenderError> {
-        Ok(std::mem::replace(
-            &mut self.film,
-            Film::new(Region::whole(0, 0)),
-        ))
+        Ok(std::mem::replace(&mut self.film, Film::new(Region::whole(0, 0))))
     }
 
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
         let rows = (region.y0..region.y1).into_par_iter();
         let pixels = rows.flat_map_iter(|y| (region.x0..region.x1).map(move |x| UVec2::new(x, y)));
-        Ok(pixels
-            .map(|pixel| pixel_first_hit(self.scene, pixel))
-            .collect())
+        Ok(pixels.map(|pixel| pixel_first_hit(self.scene, pixel)).collect())
     }
 
     fn largest_film(&self) -> u64 {

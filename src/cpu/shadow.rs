@@ -3,13 +3,14 @@
 use glam::{UVec2, Vec2, Vec3};
 
 use super::ellipsoid::ellipsoid_blocks;
-use super::light::{segment, segments_to_light, segments_to_local};
+use super::light::{Segments, segment, segments_to_light, segments_to_local};
+use super::math::dot;
 use super::plane::plane_blocks;
 use super::ray::point_to_local;
 use super::rectangle::rectangle_blocks;
 use super::sampling::sample_square;
 use super::triangle::triangle_blocks;
-use crate::pack::{ELLIPSOID, Light, Primitive, RECTANGLE, TRIANGLE};
+use crate::pack::{ELLIPSOID, Light, Primitive, RECTANGLE, Sphere, TRIANGLE};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {
@@ -28,23 +29,13 @@ pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: Bloc
     let mut bits = 0;
     for i in 0..block.count {
         let d = segment(to, block_sample(block, i));
-        bits |= if blocks(kind, o, d, light.reach) {
-            1 << i
-        } else {
-            0
-        };
+        bits |= if blocks(kind, o, d, light.reach) { 1 << i } else { 0 };
     }
     bits
 }
 
 pub fn block_sample(block: Block, i: u32) -> Vec2 {
-    sample_square(
-        block.pattern,
-        block.side,
-        block.first + i,
-        block.group,
-        block.key,
-    )
+    sample_square(block.pattern, block.side, block.first + i, block.group, block.key)
 }
 
 #[inline(always)] // compiled for each kind
@@ -59,4 +50,37 @@ pub fn blocks(kind: u32, o: Vec3, d: Vec3, reach: f32) -> bool {
         return ellipsoid_blocks(o, d, reach);
     }
     plane_blocks(o, d, reach)
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cone {
+    pub apex: Vec3,
+    pub to: Segments,
+    pub length2: f32,
+    pub inverse_depth: f32,
+}
+
+pub fn cone_to_light(light: &Light, p: Vec3) -> Cone {
+    let to = segments_to_light(light, p);
+    let length2 = dot(to.towards, to.towards);
+    let depth = length2 - dot(to.towards, to.u).abs() - dot(to.towards, to.v).abs();
+    Cone {
+        apex: p,
+        to,
+        length2,
+        inverse_depth: if depth > 0.0 { 1.0 / depth } else { -1.0 },
+    }
+}
+
+pub fn may_block(sphere: &Sphere, cone: &Cone) -> bool {
+    let w = sphere.center - cone.apex;
+    let along = dot(w, cone.to.towards);
+    let m = w - cone.to.towards * (along / cone.length2);
+    let m2 = dot(m, m);
+    let slope = (dot(m, cone.to.u).abs() + dot(m, cone.to.v).abs()) * cone.inverse_depth;
+    let height = m2 - slope * along;
+    let radius2 = sphere.radius * sphere.radius;
+    let aside = (slope >= 0.0) & (height > 0.0) & (height * height > radius2 * (m2 + slope * slope * cone.length2));
+    let behind = (cone.inverse_depth > 0.0) & (along < 0.0) & (along * along > radius2 * cone.length2);
+    !(aside | behind)
 }

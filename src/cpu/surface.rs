@@ -29,10 +29,7 @@ pub fn surface_at(q: &Primitive, ray: Ray, t: f32, epsilon: f32) -> Surface {
     } else {
         outward
     };
-    let size = max(
-        max(position.x.abs(), position.y.abs()),
-        max(position.z.abs(), t),
-    );
+    let size = max(max(position.x.abs(), position.y.abs()), max(position.z.abs(), t));
     Surface {
         position,
         normal,
@@ -48,14 +45,7 @@ pub fn primitive_uv(q: &Primitive, local: Vec3) -> Vec2 {
     if q.kind == ELLIPSOID {
         let longitude = atan2(local.y, local.x) * (0.5 * FRAC_1_PI);
         let latitude = atan2((local.x * local.x + local.y * local.y).sqrt(), -local.z) * FRAC_1_PI;
-        return Vec2::new(
-            if longitude < 0.0 {
-                longitude + 1.0
-            } else {
-                longitude
-            },
-            latitude,
-        );
+        return Vec2::new(if longitude < 0.0 { longitude + 1.0 } else { longitude }, latitude);
     }
     Vec2::new(local.x, local.y)
 }

@@ -12,11 +12,7 @@ pub fn intersect_triangle(q: &Primitive, ray: Ray, limit: f32) -> f32 {
     let x = dot(q.x, p);
     let y = dot(q.y, p);
     let inside = (x >= 0.0) & (y >= 0.0) & (x + y <= 1.0);
-    if (t > 0.0) & (t < limit) & inside {
-        t
-    } else {
-        limit
-    }
+    if (t > 0.0) & (t < limit) & inside { t } else { limit }
 }
 
 pub fn triangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool {

@@ -1,16 +1,16 @@
-//! A small scene written into its kernel as constants: the functions of `scene.wgsl` and `traverse.wgsl`, with a
-//! statement for each primitive instead of a loop. Software Vulkan reads a buffer lane by lane, constants for free.
+//! A small scene written into its kernel as constants: the functions of `scene.wgsl`, with a statement for each primitive instead of a loop. Software Vulkan reads a buffer lane by lane, constants for free.
 
 use std::fmt::Write;
+use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::pack::{ELLIPSOID, Light, Material, PLANE, Packed, Primitive, RECTANGLE, TRIANGLE};
+use crate::pack::{ELLIPSOID, Light, Material, PLANE, Packed, Primitive, RECTANGLE, Specialization, Sphere, TRIANGLE};
 
 /// Larger scenes are read from buffers: compiling grows with every primitive.
 pub const MOST_PRIMITIVES: usize = 64;
 
-/// The WGSL text of a scene's `closest_hit`, `hidden_samples`, `load_primitive`, `load_material` and `load_light`.
+/// The WGSL text of a scene's `closest_hit`, `shadow_candidates`, `load_primitive`, `load_material` and `load_light`.
 pub fn bake(packed: &Packed) -> String {
     let mut out = String::new();
     let records: Vec<String> = packed.primitives.iter().map(primitive).collect();
@@ -21,7 +21,7 @@ pub fn bake(packed: &Packed) -> String {
         "hit",
         |body| {
             for (i, (p, record)) in packed.primitives.iter().zip(&records).enumerate() {
-                let kind = kind_name(p.kind).0;
+                let kind = kind_name(p.kind);
                 let _ = writeln!(
                     body,
                     "    hit = closer(hit, intersect_{kind}({record}, ray, hit.t), {i}u);"
@@ -29,14 +29,21 @@ pub fn bake(packed: &Packed) -> String {
             }
         },
     );
-    let signature = "hidden_samples(p: vec3f, light: Light, block: Block) -> u32";
+    let signature = "shadow_candidates(first: u32, end: u32, cone: Cone) -> u32";
     write_function(&mut out, signature, "var bits = 0u;", "bits", |body| {
-        for (p, record) in blocking(packed).map(|i| (&packed.primitives[i], &records[i])) {
-            let kind = kind_name(p.kind).1;
-            let _ = writeln!(
-                body,
-                "    bits |= shadow_bits({kind}, {record}, p, light, block);"
-            );
+        for range in blocking(&packed.specialization) {
+            for first in range.clone().step_by(32) {
+                let _ = writeln!(body, "    if first == {first}u {{");
+                for i in first..range.end.min(first + 32) {
+                    let (bit, sphere) = (i - first, sphere(&packed.bounds[i]));
+                    let _ = writeln!(
+                        body,
+                        "        bits |= select(0u, {}u, may_block({sphere}, cone));",
+                        1u32 << bit
+                    );
+                }
+                let _ = writeln!(body, "    }}");
+            }
         }
     });
     write_table(&mut out, "load_primitive", "Primitive", &records);
@@ -55,35 +62,30 @@ pub fn bake(packed: &Packed) -> String {
     out
 }
 
-/// The primitives that can cast a shadow.
-fn blocking(packed: &Packed) -> impl Iterator<Item = usize> {
-    let s = &packed.specialization;
+/// The primitives of each kind that can cast a shadow.
+fn blocking(s: &Specialization) -> [Range<usize>; 4] {
     let (triangles, ellipsoids) = (s.rectangles, s.rectangles + s.triangles);
     let planes = ellipsoids + s.ellipsoids;
-    (0..s.blocking_rectangles)
-        .chain(triangles..triangles + s.blocking_triangles)
-        .chain(ellipsoids..planes)
-        .chain(planes..planes + s.blocking_planes)
-        .map(|i| i as usize)
+    [
+        0..s.blocking_rectangles,
+        triangles..triangles + s.blocking_triangles,
+        ellipsoids..planes,
+        planes..planes + s.blocking_planes,
+    ]
+    .map(|range| range.start as usize..range.end as usize)
 }
 
-fn kind_name(kind: u32) -> (&'static str, &'static str) {
+fn kind_name(kind: u32) -> &'static str {
     match kind {
-        RECTANGLE => ("rectangle", "RECTANGLE"),
-        TRIANGLE => ("triangle", "TRIANGLE"),
-        ELLIPSOID => ("ellipsoid", "ELLIPSOID"),
-        PLANE => ("plane", "PLANE"),
+        RECTANGLE => "rectangle",
+        TRIANGLE => "triangle",
+        ELLIPSOID => "ellipsoid",
+        PLANE => "plane",
         _ => unreachable!("pack makes no other kind"),
     }
 }
 
-fn write_function(
-    out: &mut String,
-    signature: &str,
-    start: &str,
-    result: &str,
-    body: impl FnOnce(&mut String),
-) {
+fn write_function(out: &mut String, signature: &str, start: &str, result: &str, body: impl FnOnce(&mut String)) {
     let _ = writeln!(out, "fn {signature} {{\n    {start}");
     body(out);
     let _ = writeln!(out, "    return {result};\n}}");
@@ -121,6 +123,10 @@ fn primitive(p: &Primitive) -> String {
         vector(p.z),
         p.determinant
     )
+}
+
+fn sphere(s: &Sphere) -> String {
+    format!("Sphere({}, {:?}f)", vector(s.center), s.radius)
 }
 
 fn material(m: &Material) -> String {

@@ -18,8 +18,7 @@ pub struct Checked {
 
 /// Parses and validates a kernel.
 pub fn check(source: &Source) -> Result<Checked, ShaderError> {
-    let module = naga::front::wgsl::parse_str(&source.text)
-        .map_err(|error| ShaderError::parse(source, &error))?;
+    let module = naga::front::wgsl::parse_str(&source.text).map_err(|error| ShaderError::parse(source, &error))?;
     let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
         .validate(&module)
         .map_err(|error| ShaderError::invalid(source, &error))?;
@@ -28,11 +27,7 @@ pub fn check(source: &Source) -> Result<Checked, ShaderError> {
 
 impl Checked {
     /// The kernel as SPIR-V for one specialisation, computed on the device exactly as it is written.
-    pub fn exact_spirv(
-        &self,
-        kernel: Kernel,
-        constants: &Specialization,
-    ) -> Result<Vec<u32>, ShaderError> {
+    pub fn exact_spirv(&self, kernel: Kernel, constants: &Specialization) -> Result<Vec<u32>, ShaderError> {
         let constants = constants
             .constants()
             .into_iter()

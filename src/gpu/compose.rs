@@ -54,9 +54,14 @@ pub const SHARED: &[&str] = &[
 ];
 
 /// What every kernel adds to [`SHARED`]: its constants, its buffers and the way through the scene.
-const KERNEL: &[&str] = &["specialization.wgsl", "bindings.wgsl", "integrator.wgsl"];
+const KERNEL: &[&str] = &[
+    "specialization.wgsl",
+    "bindings.wgsl",
+    "traverse.wgsl",
+    "integrator.wgsl",
+];
 /// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.
-const FROM_BUFFERS: &[&str] = &["scene.wgsl", "traverse.wgsl"];
+const FROM_BUFFERS: &str = "scene.wgsl";
 
 /// A compute shader's entry point and the file that it is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,16 +110,12 @@ impl Shaders {
     pub fn read(folder: &Path) -> io::Result<Shaders> {
         let read = |name: &str| {
             let path = folder.join(name);
-            let text = fs::read_to_string(&path).map_err(|error| {
-                io::Error::new(error.kind(), format!("{}: {error}", path.display()))
-            })?;
+            let text = fs::read_to_string(&path)
+                .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))?;
             Ok((name.to_string(), text))
         };
         Ok(Shaders {
-            files: BUILT_IN
-                .iter()
-                .map(|(name, _)| read(name))
-                .collect::<io::Result<_>>()?,
+            files: BUILT_IN.iter().map(|(name, _)| read(name)).collect::<io::Result<_>>()?,
         })
     }
 
@@ -127,9 +128,7 @@ impl Shaders {
         }
         match baked {
             Some(text) => source.append("(the scene as constants)", text),
-            None => FROM_BUFFERS
-                .iter()
-                .for_each(|name| source.append(name, self.text(name))),
+            None => source.append(FROM_BUFFERS, self.text(FROM_BUFFERS)),
         }
         source
     }
@@ -172,14 +171,8 @@ impl Source {
 
     /// The file that a byte of the text came from, its own text, and the byte's offset in it.
     pub fn locate(&self, offset: usize) -> Option<(&str, &str, usize)> {
-        let i = self
-            .parts
-            .partition_point(|part| part.start <= offset)
-            .checked_sub(1)?;
-        let end = self
-            .parts
-            .get(i + 1)
-            .map_or(self.text.len(), |next| next.start);
+        let i = self.parts.partition_point(|part| part.start <= offset).checked_sub(1)?;
+        let end = self.parts.get(i + 1).map_or(self.text.len(), |next| next.start);
         let part = &self.parts[i];
         Some((&part.file, &self.text[part.start..end], offset - part.start))
     }

@@ -61,25 +61,24 @@ pub fn choose(choice: &Choice) -> Result<Device, RenderError> {
         Choice::Auto | Choice::Gpu => true,
         Choice::Named(name) => matches(&info(adapter), name),
     });
-    adapter.map_or_else(
-        || Err(RenderError::NoDevice(none_fits(choice, &adapters))),
-        open,
-    )
+    adapter.map_or_else(|| Err(RenderError::NoDevice(none_fits(choice, &adapters))), open)
 }
 
 fn none_fits(choice: &Choice, adapters: &[wgpu::Adapter]) -> String {
     let found: Vec<String> = adapters.iter().map(|adapter| info(adapter).name).collect();
     match choice {
         Choice::Named(name) if !found.is_empty() => {
-            format!("no adapter's name, driver or type contains '{name}'; there are: {}", found.join(", "))
+            format!(
+                "no adapter's name, driver or type contains '{name}'; there are: {}",
+                found.join(", ")
+            )
         }
         _ => format!("no Vulkan, Metal or DX12 adapter found; {HOW_TO_GET_VULKAN}"),
     }
 }
 
 fn enumerate() -> Vec<wgpu::Adapter> {
-    let instance =
-        wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
     let mut adapters = pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY));
     adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
         DeviceType::DiscreteGpu => 0,
@@ -103,9 +102,7 @@ fn info(adapter: &wgpu::Adapter) -> Info {
             DeviceType::Cpu => "software",
             DeviceType::Other => "other",
         },
-        exact: adapter
-            .features()
-            .contains(wgpu::Features::PASSTHROUGH_SHADERS)
+        exact: adapter.features().contains(wgpu::Features::PASSTHROUGH_SHADERS)
             && info.backend == wgpu::Backend::Vulkan,
         largest_binding: limits.max_storage_buffer_binding_size,
         largest_buffer: limits.max_buffer_size,
@@ -121,14 +118,9 @@ fn matches(info: &Info, name: &str) -> bool {
     } else {
         ""
     };
-    [
-        info.name.as_str(),
-        info.driver.as_str(),
-        info.kind,
-        lavapipe,
-    ]
-    .iter()
-    .any(|known| known.to_lowercase().contains(&name))
+    [info.name.as_str(), info.driver.as_str(), info.kind, lavapipe]
+        .iter()
+        .any(|known| known.to_lowercase().contains(&name))
 }
 
 fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
@@ -139,10 +131,7 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
             wgpu::ExperimentalFeatures::enabled()
         })
     } else {
-        (
-            wgpu::Features::empty(),
-            wgpu::ExperimentalFeatures::disabled(),
-        )
+        (wgpu::Features::empty(), wgpu::ExperimentalFeatures::disabled())
     };
     let descriptor = wgpu::DeviceDescriptor {
         label: None,
@@ -153,17 +142,11 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
         trace: wgpu::Trace::Off,
     };
     let (device, queue) =
-        pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| {
-            RenderError::Device {
-                device: info.name.clone(),
-                message: error.to_string(),
-            }
+        pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| RenderError::Device {
+            device: info.name.clone(),
+            message: error.to_string(),
         })?;
-    Ok(Device {
-        device,
-        queue,
-        info,
-    })
+    Ok(Device { device, queue, info })
 }
 
 impl Device {
@@ -228,10 +211,7 @@ impl Device {
     /// What a buffer holds.
     pub(super) fn download<T: Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
         let staging = self.checked(|| {
-            let staging = self.buffer(
-                buffer.size(),
-                BufferUsages::COPY_DST | BufferUsages::MAP_READ,
-            );
+            let staging = self.buffer(buffer.size(), BufferUsages::COPY_DST | BufferUsages::MAP_READ);
             let mut encoder = self.device.create_command_encoder(&Default::default());
             encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
             self.queue.submit([encoder.finish()]);
@@ -246,9 +226,7 @@ impl Device {
             .recv()
             .map_err(|error| self.error(error))?
             .map_err(|error| self.error(error))?;
-        let view = staging
-            .get_mapped_range(..)
-            .map_err(|error| self.error(error))?;
+        let view = staging.get_mapped_range(..).map_err(|error| self.error(error))?;
         Ok(bytemuck::pod_collect_to_vec(&view))
     }
 }

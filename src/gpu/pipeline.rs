@@ -13,13 +13,13 @@ use crate::pack::Specialization;
 /// Side of a workgroup, as the kernels declare it.
 pub const WORKGROUP: u32 = 8;
 
-/// How the buffers of `shaders/bindings.wgsl` are bound, binding 6 being what the kernel writes.
+/// How the buffers of `shaders/bindings.wgsl` are bound, the last being what the kernel writes.
 pub fn bind_group_layout(device: &Device) -> wgpu::BindGroupLayout {
     let uniform = BufferBindingType::Uniform;
     let read = BufferBindingType::Storage { read_only: true };
     let write = BufferBindingType::Storage { read_only: false };
     let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
-        .zip([uniform, uniform, uniform, read, read, read, write])
+        .zip([uniform, uniform, uniform, read, read, read, read, write])
         .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: wgpu::ShaderStages::COMPUTE,
@@ -50,14 +50,9 @@ pub fn pipeline(
     exact: bool,
 ) -> Result<wgpu::ComputePipeline, RenderError> {
     let checked = check(source)?;
-    let exact = exact
-        .then(|| checked.exact_spirv(kernel, constants))
-        .transpose()?;
+    let exact = exact.then(|| checked.exact_spirv(kernel, constants)).transpose()?;
     let constants = constants.constants();
-    let mut constants: Vec<(&str, f64)> = constants
-        .iter()
-        .map(|(name, v)| (*name, f64::from(*v)))
-        .collect();
+    let mut constants: Vec<(&str, f64)> = constants.iter().map(|(name, v)| (*name, f64::from(*v))).collect();
     device.checked(|| {
         let module = match exact {
             Some(spirv) => {
@@ -73,33 +68,26 @@ pub fn pipeline(
                 // SAFETY: naga wrote this SPIR-V, with bounds checks, from a module that it validated.
                 unsafe { device.device.create_shader_module_passthrough(descriptor) }
             }
-            None => device
-                .device
-                .create_shader_module(wgpu::ShaderModuleDescriptor {
-                    label: None,
-                    source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(&source.text)),
-                }),
-        };
-        let pipeline_layout =
-            device
-                .device
-                .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                    label: None,
-                    bind_group_layouts: &[Some(layout)],
-                    immediate_size: 0,
-                });
-        device
-            .device
-            .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            None => device.device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: None,
-                layout: Some(&pipeline_layout),
-                module: &module,
-                entry_point: Some(kernel.entry_point()),
-                compilation_options: wgpu::PipelineCompilationOptions {
-                    constants: &constants,
-                    zero_initialize_workgroup_memory: false,
-                },
-                cache: None,
-            })
+                source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(&source.text)),
+            }),
+        };
+        let pipeline_layout = device.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: None,
+            bind_group_layouts: &[Some(layout)],
+            immediate_size: 0,
+        });
+        device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: None,
+            layout: Some(&pipeline_layout),
+            module: &module,
+            entry_point: Some(kernel.entry_point()),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &constants,
+                zero_initialize_workgroup_memory: false,
+            },
+            cache: None,
+        })
     })
 }

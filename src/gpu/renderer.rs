@@ -41,7 +41,7 @@ pub struct Gpu {
     render: wgpu::ComputePipeline,
     /// Compiled when it is first needed.
     aov: Option<wgpu::ComputePipeline>,
-    scene: [wgpu::Buffer; 5],
+    scene: [wgpu::Buffer; 6],
     work: wgpu::Buffer,
     film: Option<Target>,
 }
@@ -65,16 +65,10 @@ struct Target {
 impl Gpu {
     /// Compiles the kernel for a scene and uploads it. The device has run the kernel once, on nothing, when this
     /// returns: drivers compile at the first dispatch.
-    pub fn new(
-        device: &Device,
-        packed: &Packed,
-        shaders: &Shaders,
-        options: Options,
-    ) -> Result<Gpu, RenderError> {
+    pub fn new(device: &Device, packed: &Packed, shaders: &Shaders, options: Options) -> Result<Gpu, RenderError> {
         let kernels = Kernels {
             shaders: shaders.clone(),
-            baked: (options.baked && packed.primitives.len() <= MOST_PRIMITIVES)
-                .then(|| bake(packed)),
+            baked: (options.baked && packed.primitives.len() <= MOST_PRIMITIVES).then(|| bake(packed)),
             constants: packed.specialization,
             layout: bind_group_layout(device),
             exact: options.exact,
@@ -129,15 +123,14 @@ impl Gpu {
     fn target<T: Pod>(&self, region: Region) -> Result<Target, RenderError> {
         let size = region.pixels() * size_of::<T>() as u64;
         self.device.checked(|| {
-            let buffer = self
-                .device
-                .buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-            let [camera, environment, primitives, materials, lights] = &self.scene;
+            let buffer = self.device.buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+            let [camera, environment, primitives, bounds, materials, lights] = &self.scene;
             let buffers = [
                 &self.work,
                 camera,
                 environment,
                 primitives,
+                bounds,
                 materials,
                 lights,
                 &buffer,
@@ -149,19 +142,12 @@ impl Gpu {
                     resource: buffer.as_entire_binding(),
                 })
                 .collect();
-            let group = self
-                .device
-                .device
-                .create_bind_group(&wgpu::BindGroupDescriptor {
-                    label: None,
-                    layout: &self.kernels.layout,
-                    entries: &entries,
-                });
-            Target {
-                region,
-                buffer,
-                group,
-            }
+            let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &self.kernels.layout,
+                entries: &entries,
+            });
+            Target { region, buffer, group }
         })
     }
 
@@ -187,11 +173,7 @@ impl Gpu {
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &target.group, &[]);
-            pass.dispatch_workgroups(
-                tile.width().div_ceil(WORKGROUP),
-                tile.height().div_ceil(WORKGROUP),
-                1,
-            );
+            pass.dispatch_workgroups(tile.width().div_ceil(WORKGROUP), tile.height().div_ceil(WORKGROUP), 1);
             drop(pass);
             queue.submit([encoder.finish()]);
         })?;
@@ -241,12 +223,13 @@ impl Backend for Gpu {
 }
 
 /// The buffers of a scene, in the order of their bindings.
-fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 5], RenderError> {
+fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 6], RenderError> {
     device.checked(|| {
         [
             device.upload(BufferUsages::UNIFORM | BufferUsages::COPY_DST, &[packed.camera]),
             device.upload(BufferUsages::UNIFORM, &[packed.environment]),
             device.upload(BufferUsages::STORAGE, &packed.primitives),
+            device.upload(BufferUsages::STORAGE, &packed.bounds),
             device.upload(BufferUsages::STORAGE, &packed.materials),
             device.upload(BufferUsages::STORAGE, &packed.lights),
         ]
@@ -254,19 +237,8 @@ fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 5], RenderE
 }
 
 impl Kernels {
-    fn compile(
-        &self,
-        device: &Device,
-        kernel: Kernel,
-    ) -> Result<wgpu::ComputePipeline, RenderError> {
+    fn compile(&self, device: &Device, kernel: Kernel) -> Result<wgpu::ComputePipeline, RenderError> {
         let source = self.shaders.compose(kernel, self.baked.as_deref());
-        pipeline(
-            device,
-            &self.layout,
-            kernel,
-            &source,
-            &self.constants,
-            self.exact,
-        )
+        pipeline(device, &self.layout, kernel, &source, &self.constants, self.exact)
     }
 }

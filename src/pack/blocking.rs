@@ -42,9 +42,7 @@ fn blocks(scene: &Scene, primitive: &Primitive) -> bool {
                 range.point(center + normal * half);
                 range.point(center - normal * half);
             }
-            Geometry::Triangles(triangles) => {
-                triangles.iter().flatten().for_each(|v| range.point(*v))
-            }
+            Geometry::Triangles(triangles) => triangles.iter().flatten().for_each(|v| range.point(*v)),
             Geometry::Plane {
                 point,
                 tangent,

@@ -64,12 +64,7 @@ impl Scene {
             Err(error) => {
                 let text = String::from_utf8_lossy(&bytes);
                 // Up to there the lossy text is the file's.
-                Err(syntax_error(
-                    &text,
-                    &origin,
-                    error.valid_up_to(),
-                    "not valid UTF-8",
-                ))
+                Err(syntax_error(&text, &origin, error.valid_up_to(), "not valid UTF-8"))
             }
         }
     }
@@ -81,9 +76,7 @@ impl Scene {
     /// The errors of [`Description::parse`] and of [`Description::validate`], and bad overrides.
     pub fn parse(text: &str, origin: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
         let mut description = Description::parse(text, origin)?;
-        overrides
-            .apply(&mut description)
-            .map_err(SceneError::Option)?;
+        overrides.apply(&mut description).map_err(SceneError::Option)?;
         let scene = description.validate();
         scene.map_err(|problem| invalid(text, origin, problem))
     }
@@ -91,14 +84,9 @@ impl Scene {
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path)?
-        .take(LARGEST_FILE + 1)
-        .read_to_end(&mut bytes)?;
+    File::open(path)?.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > LARGEST_FILE {
-        return Err(io::Error::new(
-            io::ErrorKind::FileTooLarge,
-            "it is larger than 64 MiB",
-        ));
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, "it is larger than 64 MiB"));
     }
     Ok(bytes)
 }
@@ -125,17 +113,11 @@ light_samples = { pattern = 'random', count = 5 }
         let scene = Scene::parse(SCENE, "s.toml", &overrides).unwrap();
         let render = scene.render;
         assert_eq!((scene.width, scene.height, render.seed), (50, 40, 3));
-        assert_eq!(
-            (render.pixel_samples.count, render.light_samples.count),
-            (9, 8)
-        );
+        assert_eq!((render.pixel_samples.count, render.light_samples.count), (9, 8));
         let scene = Scene::parse(SCENE, "s.toml", &Overrides::default()).unwrap();
         let render = scene.render;
         assert_eq!((scene.width, scene.height, render.seed), (4, 3, 0));
-        assert_eq!(
-            (render.pixel_samples.count, render.light_samples.count),
-            (16, 5)
-        );
+        assert_eq!((render.pixel_samples.count, render.light_samples.count), (16, 5));
     }
 
     #[test]
@@ -183,8 +165,7 @@ light_samples = { pattern = 'random', count = 5 }
         let load = |name: &str| Scene::load(&folder.path().join(name), &Overrides::default());
         let told = |name: &str| load(name).unwrap_err().to_string();
         let path = |name: &str| folder.path().join(name).display().to_string();
-        let write =
-            |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+        let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
         write("good.toml", SCENE.as_bytes());
         assert_eq!(load("good.toml").unwrap().width, 4);
         write("latin.toml", b"# \xc3\xa9t\xc3\xa9\n# \xc3\xa9t\xe9");
@@ -199,10 +180,7 @@ light_samples = { pattern = 'random', count = 5 }
             .unwrap();
         assert_eq!(
             told("huge.toml"),
-            format!(
-                "{}: cannot be read: it is larger than 64 MiB",
-                path("huge.toml")
-            )
+            format!("{}: cannot be read: it is larger than 64 MiB", path("huge.toml"))
         );
     }
 }

@@ -1,0 +1,286 @@
+//! What is told of bad text, and the page that describes the format.
+
+use super::super::{
+    CameraDescription, LightDescription, MaterialDescription, Overrides, RenderDescription, Scene, ShapeDescription,
+};
+use super::*;
+
+const PAGE: &str = include_str!("../../../docs/scene-format.md");
+
+/// A text that is one of a scene but for what stands at its end.
+const START: &str = "\
+[image]
+width = 4
+height = 4
+[camera]
+position = [0, -3, 1]
+look_at = [0, 0, 1]
+fov = 45
+";
+
+fn message(text: &str) -> String {
+    Scene::parse(text, "s.toml", &Overrides::default())
+        .unwrap_err()
+        .to_string()
+}
+
+#[test]
+fn bad_text_is_told_with_its_line() {
+    Scene::parse(START, "s.toml", &Overrides::default()).unwrap();
+    // What is added, the line in it, and what is told.
+    for (added, line, told) in [
+        (
+            "far = 3",
+            1,
+            "camera.far: unknown key; the keys here are \"type\", \"position\", \"look_at\", \"up\", \"fov\", \"focal_length\"",
+        ),
+        (
+            "[film]\n",
+            1,
+            "film: unknown key; the keys here are \"image\", \"camera\", \"render\", \"materials\", \"lights\", \"shapes\"",
+        ),
+        (
+            "type = 'fisheye'",
+            1,
+            "camera.type: \"fisheye\" must be one of \"perspective\", \"orthographic\"",
+        ),
+        (
+            "type = 3",
+            1,
+            "camera.type: 3 must be one of \"perspective\", \"orthographic\"",
+        ),
+        ("focal_length = '1'", 1, "camera.focal_length: \"1\" must be a number"),
+        (
+            "focal_length = 'a, expected b'",
+            1,
+            "camera.focal_length: \"a, expected b\" must be a number",
+        ),
+        ("up = [0, 1]", 1, "camera.up: [0, 1] must be a list of 3 numbers"),
+        ("up = [0, 0, 1, 0]", 1, "camera.up: [0, 0, 1, 0] must be a shorter list"),
+        ("up = [0, 0, true]", 1, "camera.up[2]: true must be a number"),
+        ("up = { z = 1 }", 1, "camera.up: { z = 1 } must be a list of 3 numbers"),
+        (
+            "[render]\nseed = -1",
+            2,
+            "render.seed: -1 must be a whole number from 0 to 4294967295",
+        ),
+        (
+            "[render]\nseed = 1.5",
+            2,
+            "render.seed: 1.5 must be a whole number from 0 to 4294967295",
+        ),
+        (
+            "[render]\nintegrator = 'path'",
+            2,
+            "render.integrator: \"path\" must be \"phong\"",
+        ),
+        (
+            "[render]\n\npixel_samples = { pattern = 'hex', count = 4 }",
+            3,
+            "render.pixel_samples.pattern: \"hex\" must be \"grid\" or \"random\"",
+        ),
+        (
+            "[render]\npixel_samples = { pattern = 'grid' }",
+            2,
+            "render.pixel_samples.count: is missing",
+        ),
+        (
+            "[render.light_samples]\ncount = 4\nn = 2",
+            3,
+            "render.light_samples.n: unknown key; the keys here are \"pattern\", \"count\"",
+        ),
+        ("[materials]\nred = 3", 2, "materials.red: 3 must be a table"),
+        (
+            "[materials.red]\ncolor = [1, 0, 0]",
+            1,
+            "materials.red.type: is missing; it is one of \"phong\"",
+        ),
+        (
+            "[materials.\"a b\"]\ntype = 'phong'\nshininess = 'x'",
+            3,
+            "materials.\"a b\".shininess: \"x\" must be a number",
+        ),
+        (
+            "[lights]\ntype = 'point'",
+            1,
+            "lights: { type = \"point\" } must be a list of tables, each under its own [[header]]",
+        ),
+        (
+            "[[shapes]]\ntype = 'sphere'\nmaterial = 'a'\ncenter = [0, 0, 0]\n",
+            1,
+            "shapes[0].radius: is missing",
+        ),
+        (
+            "[[shapes]]\n[[shapes]]",
+            1,
+            "shapes[0].type: is missing; it is one of \"rectangle\", \"ellipsoid\", \"sphere\", \"triangle\", \"tetrahedron\", \"plane\"",
+        ),
+        (
+            "[[lights]]\ntype = 'directional'\ndirection = [0, 0, 1]\ncolor = [1, 1, 1]\n[[lights]]\ntype = 'point'\nvertex = 3",
+            7,
+            "lights[1].vertex: unknown key; the keys here are \"type\", \"position\", \"color\"",
+        ),
+        (
+            "[[shapes]]\ntype = 'triangle'\nmaterial = 'a'\nvertices = [\n[0, 0, 0],\n[1, 'x', 0],\n[0, 1, 0]]",
+            6,
+            "shapes[0].vertices[1][1]: \"x\" must be a number",
+        ),
+        (
+            "[[shapes]]\ntype = 'triangle'\nmaterial = 'a'\nvertices = [[0, 0, 0], [1, 0, 0]]",
+            4,
+            "shapes[0].vertices: [[0, 0, 0], [1, 0, 0]] must be a list of 3 points",
+        ),
+    ] {
+        let line = START.lines().count() + line;
+        assert_eq!(message(&format!("{START}{added}")), format!("s.toml:{line}: {told}"));
+    }
+}
+
+#[test]
+fn a_missing_section_or_key_is_told_at_the_table_it_belongs_to() {
+    assert_eq!(message(""), "s.toml:1: image: is missing");
+    assert_eq!(
+        message(&START.replace("fov = 45", "")),
+        "s.toml:4: camera.fov: is missing"
+    );
+    assert_eq!(message("image = 3"), "s.toml:1: image: 3 must be a table");
+}
+
+#[test]
+fn text_that_is_no_toml_is_told_with_line_and_column() {
+    for (added, told) in [
+        ("é = 3", "8:1: "),
+        ("up = [0, 1", "8:11: "),
+        ("fov = 46", "8:1: duplicate key"),
+        ("focal_length = ", "8:16: "),
+        ("focal_length = 1e999", "8:16: "),
+    ] {
+        let message = message(&format!("{START}{added}"));
+        assert!(message.starts_with(&format!("s.toml:{told}")), "{message}");
+        assert_eq!(message.lines().count(), 1, "{message}");
+    }
+}
+
+#[test]
+fn every_prefix_of_a_scene_is_read_or_refused_without_panic() {
+    let text = include_str!("../../../scenes/cornell.toml");
+    let good = |end: usize| Scene::parse(&text[..end], "s.toml", &Overrides::default()).is_ok();
+    let count = (0..text.len())
+        .filter(|&end| text.is_char_boundary(end) && good(end))
+        .count();
+    assert!(count > 0 && count < text.len());
+}
+
+#[test]
+fn a_scene_written_and_read_back_is_the_same() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes");
+    let mut count = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).unwrap();
+        let description = Description::parse(&text, "s.toml").unwrap();
+        let written = toml::to_string(&description).unwrap();
+        assert_eq!(
+            Description::parse(&written, "s.toml").unwrap(),
+            description,
+            "{}",
+            path.display()
+        );
+        description.validate().unwrap();
+        assert!(text.starts_with("# "), "{} does not say what it shows", path.display());
+        count += 1;
+    }
+    assert!(count >= 4);
+}
+
+#[test]
+fn the_example_of_the_page_is_a_scene() {
+    let example = PAGE.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let scene = Scene::parse(example, "scene-format.md", &Overrides::default()).unwrap();
+    assert_eq!(scene.shapes.len(), 1);
+}
+
+/// The part of the page under a heading, without its subsections.
+fn section(heading: &str) -> &'static str {
+    let (_, rest) = PAGE
+        .split_once(&format!("\n{heading}\n"))
+        .unwrap_or_else(|| panic!("no {heading}"));
+    rest.split("\n#").next().unwrap()
+}
+
+/// The names, with their quotes, that the first column of a section's tables has.
+fn rows(heading: &str) -> Vec<&'static str> {
+    let lines = section(heading).lines();
+    let names = lines.filter_map(|line| Some(line.strip_prefix("| `")?.split_once('`')?.0));
+    names.collect()
+}
+
+/// Whether the page has a row for every key that is allowed at the end of the text, and for no other: an
+/// unknown key there makes the reader list them.
+fn check_keys(text: &str, heading: &str) {
+    let message = message(&format!("{text}\n'?' = 1"));
+    let (_, keys) = message
+        .split_once("the keys here are ")
+        .unwrap_or_else(|| panic!("{message}"));
+    let mut keys: Vec<_> = keys.split(", ").map(|key| key.trim_matches('"')).collect();
+    let mut rows = rows(heading);
+    rows.retain(|name| !name.starts_with('"'));
+    keys.sort_unstable();
+    rows.sort_unstable();
+    assert_eq!(rows, keys, "under {heading}");
+}
+
+fn check_types<T: Tagged>(before: &str, header: &str, title: &str) {
+    for tag in T::TYPES {
+        let text = format!("{before}\n{header}\ntype = '{tag}'");
+        check_keys(&text, &format!("### `{title}` of type `\"{tag}\"`"));
+    }
+}
+
+#[test]
+fn the_page_has_every_key() {
+    let image = "[image]\nwidth = 1\nheight = 1";
+    check_keys("[camera]\n[image]", "## `[image]`");
+    check_keys(&format!("{START}[render]"), "## `[render]`");
+    check_keys(&format!("{START}[render.pixel_samples]"), "### Samples");
+    check_types::<CameraDescription>(image, "[camera]", "[camera]");
+    check_types::<MaterialDescription>(START, "[materials.a]", "[materials.NAME]");
+    check_types::<LightDescription>(START, "[[lights]]", "[[lights]]");
+    check_types::<ShapeDescription>(START, "[[shapes]]", "[[shapes]]");
+}
+
+#[test]
+fn the_page_has_the_defaults_of_a_render() {
+    let lines = section("## `[render]`").lines();
+    let cells = lines.filter_map(|line| Some(line.strip_prefix("| `")?.split('|')));
+    let text: String = cells
+        .map(|mut cells| {
+            let mut next = || cells.next().unwrap().replace('`', "");
+            format!("{} = {}\n", next(), next())
+        })
+        .collect();
+    let written: RenderDescription = toml::from_str(&text).unwrap();
+    assert_eq!(written, RenderDescription::default());
+}
+
+#[test]
+fn the_page_has_every_pattern() {
+    let message = message(&format!(
+        "{START}[render]\nlight_samples = {{ count = 1, pattern = '?' }}"
+    ));
+    let (_, names) = message.split_once("must be ").unwrap();
+    let names: Vec<_> = names.split('"').skip(1).step_by(2).collect();
+    let mut rows = rows("### Samples");
+    rows.retain(|name| name.starts_with('"'));
+    let rows: Vec<_> = rows.into_iter().map(|name| name.trim_matches('"')).collect();
+    assert_eq!(rows, names);
+}
+
+#[test]
+#[should_panic(expected = "under ## `[image]`")]
+fn a_key_that_is_not_in_the_page_is_noticed() {
+    check_keys(&format!("{START}[render]"), "## `[image]`");
+}
