@@ -52,20 +52,15 @@ impl Default for Cut {
 pub fn bands(region: Region, cut: &Cut, largest_film: u64) -> impl Iterator<Item = Region> + use<> {
     let pixels = cut.band_pixels.min(largest_film);
     let rows = (pixels / u64::from(region.width())).clamp(1, u64::from(region.height())) as u32;
-    (region.y0..region.y1)
-        .step_by(rows as usize)
-        .map(move |y0| Region {
-            y0,
-            y1: region.y1.min(y0 + rows),
-            ..region
-        })
+    (region.y0..region.y1).step_by(rows as usize).map(move |y0| Region {
+        y0,
+        y1: region.y1.min(y0 + rows),
+        ..region
+    })
 }
 
 /// What the rays through the centres of a region's pixels meet first, row by row from the top; in calls of bounded size.
-pub fn first_hits(
-    backend: &mut dyn Backend,
-    region: Region,
-) -> Result<Vec<FirstHit>, RenderError> {
+pub fn first_hits(backend: &mut dyn Backend, region: Region) -> Result<Vec<FirstHit>, RenderError> {
     const CALL_PIXELS: u64 = 1 << 18;
     let cut = Cut {
         band_pixels: CALL_PIXELS,
@@ -149,7 +144,10 @@ impl Steps {
             return Ok(None);
         }
         let count = self.pass.len() as u32;
-        let rows = self.cut.rows_per_call.unwrap_or_else(|| self.pace.rows(self.region, count));
+        let rows = self
+            .cut
+            .rows_per_call
+            .unwrap_or_else(|| self.pace.rows(self.region, count));
         let tile = Region {
             y0: self.y,
             y1: self.y + rows.min(self.region.y1 - self.y),
@@ -182,7 +180,10 @@ impl Steps {
     }
 
     fn begin_pass(&mut self, first: u32) {
-        let count = self.cut.samples_per_call.unwrap_or_else(|| self.pace.samples(self.region));
+        let count = self
+            .cut
+            .samples_per_call
+            .unwrap_or_else(|| self.pace.samples(self.region));
         self.pass = first..first + count.min(self.samples - first);
         self.y = self.region.y0;
     }

@@ -38,16 +38,24 @@ fn view(camera: &CameraDescription) -> View {
             up: c.up,
             span: 2.0 * (c.fov.to_radians() / 2.0).tan() * c.position.distance(c.look_at),
         },
-        CameraDescription::Orthographic(c) => {
-            View { position: c.position, look_at: c.look_at, up: c.up, span: c.height }
-        }
+        CameraDescription::Orthographic(c) => View {
+            position: c.position,
+            look_at: c.look_at,
+            up: c.up,
+            span: c.height,
+        },
     }
 }
 
 /// A camera after a move, or the same if the move would make it invalid.
 pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
     let mut new = camera.clone();
-    let View { mut position, mut look_at, up, span } = view(camera);
+    let View {
+        mut position,
+        mut look_at,
+        up,
+        span,
+    } = view(camera);
     let up = up.normalize();
     let offset = position - look_at;
     let right = (-offset).cross(up).normalize();
@@ -175,10 +183,16 @@ mod tests {
         assert!(above.z > 1.3, "{above}");
         let panned = view(&moved(&perspective(), Move::Pan(0.5, 0.25)));
         let height = 8.0 * 22.5f64.to_radians().tan();
-        assert!(panned.look_at.abs_diff_eq(DVec3::new(-0.5 * height, 0.0, 1.0 - 0.25 * height), 1e-4));
+        assert!(
+            panned
+                .look_at
+                .abs_diff_eq(DVec3::new(-0.5 * height, 0.0, 1.0 - 0.25 * height), 1e-4)
+        );
         let near = view(&moved(&perspective(), Move::Dolly(2f64.ln()))).position;
         assert!(near.abs_diff_eq(DVec3::new(0.0, -2.0, 1.0), 1e-4), "{near}");
-        let CameraDescription::Orthographic(near) = moved(&orthographic(), Move::Dolly(2f64.ln())) else { panic!() };
+        let CameraDescription::Orthographic(near) = moved(&orthographic(), Move::Dolly(2f64.ln())) else {
+            panic!()
+        };
         assert_eq!(near.height, 1.0);
     }
 
@@ -194,7 +208,10 @@ mod tests {
             moved(&camera, by).validate().unwrap();
         }
         let text = text(&moved(&perspective(), Move::Orbit(0.3, 0.2)));
-        assert_eq!(text, "[camera]\nposition = [-1.15853, -3.74518, 1.79468]\nlook_at = [0, 0, 1]\nup = [0, 0, 1]\nfov = 45\n");
+        assert_eq!(
+            text,
+            "[camera]\nposition = [-1.15853, -3.74518, 1.79468]\nlook_at = [0, 0, 1]\nup = [0, 0, 1]\nfov = 45\n"
+        );
     }
 
     #[test]

@@ -21,13 +21,20 @@ pub struct Diagnostic {
 impl Diagnostic {
     /// Something that has no place in a file.
     pub fn plain(kind: &'static str, message: impl Into<String>) -> Diagnostic {
-        Diagnostic { kind, place: None, message: message.into(), excerpt: None }
+        Diagnostic {
+            kind,
+            place: None,
+            message: message.into(),
+            excerpt: None,
+        }
     }
 
     /// A scene that cannot be read, with the line of its text.
     pub fn scene(error: &SceneError, text: &str) -> Diagnostic {
         let (origin, line, column) = match error {
-            SceneError::Syntax { origin, line, column, .. } => (origin, *line, Some(*column)),
+            SceneError::Syntax {
+                origin, line, column, ..
+            } => (origin, *line, Some(*column)),
             SceneError::Invalid { origin, line, .. } => (origin, *line, None),
             SceneError::Read { .. } => return Diagnostic::plain("file", error.to_string()),
             _ => return Diagnostic::plain("scene", error.to_string()),
@@ -38,7 +45,12 @@ impl Diagnostic {
         };
         let whole = error.to_string();
         let message = whole.strip_prefix(&format!("{place}: ")).unwrap_or(&whole).to_string();
-        Diagnostic { kind: "scene", excerpt: excerpt(text, line, column), place: Some(place), message }
+        Diagnostic {
+            kind: "scene",
+            excerpt: excerpt(text, line, column),
+            place: Some(place),
+            message,
+        }
     }
 }
 
@@ -50,7 +62,11 @@ fn excerpt(text: &str, line: usize, column: Option<usize>) -> Option<String> {
         Some(column) => (column.saturating_sub(1), 1),
         None => (indent, content.trim().chars().count().max(1)),
     };
-    Some(format!("{line:>5} | {content}\n      | {}{}", " ".repeat(start), "^".repeat(length)))
+    Some(format!(
+        "{line:>5} | {content}\n      | {}{}",
+        " ".repeat(start),
+        "^".repeat(length)
+    ))
 }
 
 impl From<&ShaderError> for Diagnostic {

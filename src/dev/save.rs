@@ -28,7 +28,10 @@ pub fn save_camera(path: &Path, camera: &CameraDescription) -> Result<(), String
 
 /// Replaces a file in one step: whoever reads it sees the old content or the new.
 pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     let permissions = fs::metadata(path).map(|data| data.permissions()).ok();
     let mut builder = tempfile::Builder::new();
     builder.prefix(".wgray-");
@@ -74,7 +77,10 @@ fn set(table: &mut dyn TableLike, key: &str, entry: Entry) {
         (Some(old), Entry::Number(x)) => put(old, number(x)),
         (_, Entry::Number(x)) => drop(table.insert(key, Item::Value(number(x)))),
         (_, Entry::Point(point)) => {
-            drop(table.insert(key, Item::Value(Value::Array(point.to_array().map(number).into_iter().collect()))));
+            drop(table.insert(
+                key,
+                Item::Value(Value::Array(point.to_array().map(number).into_iter().collect())),
+            ));
         }
     }
 }
@@ -91,7 +97,11 @@ fn put(old: &mut Value, new: Value) {
 
 /// Whole numbers without a point, as people write them.
 fn number(x: f64) -> Value {
-    if x.fract() == 0.0 && x.abs() < 1e15 { Value::from(x as i64) } else { Value::from(x) }
+    if x.fract() == 0.0 && x.abs() < 1e15 {
+        Value::from(x as i64)
+    } else {
+        Value::from(x)
+    }
 }
 
 #[cfg(test)]
@@ -102,7 +112,9 @@ mod tests {
         position = [ 0,  -3.0, # back\n 1.3 ]\nlook_at = [0, 0, 1]\n\n# the end\n";
 
     fn camera(text: &str) -> CameraDescription {
-        Description::parse(&format!("image = {{ width = 4, height = 4 }}\n[camera]\n{text}"), "c").unwrap().camera
+        Description::parse(&format!("image = {{ width = 4, height = 4 }}\n[camera]\n{text}"), "c")
+            .unwrap()
+            .camera
     }
 
     #[test]
@@ -124,7 +136,8 @@ mod tests {
 
     #[test]
     fn inline_tables_and_absent_keys_are_written_too() {
-        let text = "image = { width = 4, height = 4 }\ncamera = { position = [0, 1, 0], look_at = [0, 0, 0], fov = 40 } # c\n";
+        let text =
+            "image = { width = 4, height = 4 }\ncamera = { position = [0, 1, 0], look_at = [0, 0, 0], fov = 40 } # c\n";
         let new = camera("position = [0, 1, 2]\nlook_at = [0, 0, 0]\nup = [0, 1, 0]\nfov = 40");
         let saved = with_camera(text, "s.toml", &new).unwrap();
         assert_eq!(Description::parse(&saved, "s.toml").unwrap().camera, new);
@@ -135,7 +148,11 @@ mod tests {
     fn a_broken_file_and_another_camera_are_refused() {
         let new = camera("type = 'orthographic'\nposition = [0, 1, 2]\nlook_at = [0, 0, 0]\nheight = 2");
         assert!(with_camera(SCENE, "s.toml", &new).unwrap_err().contains("another type"));
-        assert!(with_camera("[image", "s.toml", &new).unwrap_err().starts_with("mend the file first: s.toml:1:"));
+        assert!(
+            with_camera("[image", "s.toml", &new)
+                .unwrap_err()
+                .starts_with("mend the file first: s.toml:1:")
+        );
     }
 
     #[cfg(unix)]
@@ -152,6 +169,10 @@ mod tests {
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_ne!(fs::read_to_string(&file).unwrap(), SCENE);
         assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o640);
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "nothing is left behind");
+        assert_eq!(
+            fs::read_dir(folder.path()).unwrap().count(),
+            2,
+            "nothing is left behind"
+        );
     }
 }

@@ -76,12 +76,20 @@ impl Sources {
         let same_scene = last.files.iter().all(|(path, stamp)| self.stamp(path) == *stamp);
         match (same_scene, same_shaders) {
             (true, true) => None,
-            (true, false) => Some(Snapshot { shaders, ..last.clone() }),
+            (true, false) => Some(Snapshot {
+                shaders,
+                ..last.clone()
+            }),
             (false, _) => {
                 let mut new = self.read_scene(shaders);
                 if new.scene.is_err() {
                     // The files of the last good scene stay watched until there is a new one.
-                    new.files.extend(last.files.iter().skip(1).map(|(path, _)| (path.clone(), self.stamp(path))));
+                    new.files.extend(
+                        last.files
+                            .iter()
+                            .skip(1)
+                            .map(|(path, _)| (path.clone(), self.stamp(path))),
+                    );
                 }
                 Some(new)
             }
@@ -101,22 +109,30 @@ impl Sources {
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
         let scene = self.load();
         if let Ok(loaded) = &scene {
-            files.extend(assets(&loaded.scene).into_iter().map(|path| (path.clone(), self.stamp(&path))));
+            files.extend(
+                assets(&loaded.scene)
+                    .into_iter()
+                    .map(|path| (path.clone(), self.stamp(&path))),
+            );
         }
         Snapshot { scene, shaders, files }
     }
 
     fn load(&self) -> Result<Arc<Loaded>, Diagnostic> {
         let text = || fs::read_to_string(&self.scene).unwrap_or_default();
-        let scene =
-            Scene::load(&self.scene, &self.overrides).map_err(|error| Diagnostic::scene(&error, &text()))?;
+        let scene = Scene::load(&self.scene, &self.overrides).map_err(|error| Diagnostic::scene(&error, &text()))?;
         let text = text();
         // The file may have changed in between; it is then read once more.
         let described = Description::parse(&text, &self.scene.display().to_string())
             .map_err(|error| Diagnostic::scene(&error, &text))?;
         let packed = pack(&scene);
         let materials = described.materials.keys().cloned().collect();
-        Ok(Arc::new(Loaded { camera: described.camera, materials, scene, packed }))
+        Ok(Arc::new(Loaded {
+            camera: described.camera,
+            materials,
+            scene,
+            packed,
+        }))
     }
 
     fn stamp(&self, path: &Path) -> Stamp {

@@ -60,13 +60,19 @@ impl Watch {
                 let _ = sender.send(wake); // nobody listens once the watch has ended
             }
         })?;
-        let mut folders = Folders { watcher, watched: BTreeMap::new() };
+        let mut folders = Folders {
+            watcher,
+            watched: BTreeMap::new(),
+        };
         folders.follow(&sources, &first);
         let thread = std::thread::Builder::new()
             .name("watch".to_string())
             .spawn(move || run(&receiver, &mut folders, &sources, first, changed))
             .map_err(notify::Error::io)?;
-        Ok(Watch { stop, thread: Some(thread) })
+        Ok(Watch {
+            stop,
+            thread: Some(thread),
+        })
     }
 }
 
@@ -156,13 +162,25 @@ impl Folders {
 /// The folders to watch, by their real names: that of the shaders with all below it, those of all files, and of what
 /// links lead to. Of the scene's folder nothing below is watched: it may be a home folder.
 fn wanted(sources: &Sources, snapshot: &Snapshot) -> BTreeMap<PathBuf, RecursiveMode> {
-    let files = snapshot.files.iter().map(|(path, _)| path.clone()).chain(sources.shader_files());
+    let files = snapshot
+        .files
+        .iter()
+        .map(|(path, _)| path.clone())
+        .chain(sources.shader_files());
     // The shaders' folder may itself be renamed: its parent says so.
     let paths = files.chain(sources.shaders.clone());
-    let paths = paths.flat_map(|path| [fs::canonicalize(&path).ok(), Some(path)]).flatten();
-    let mut folders: BTreeMap<_, _> =
-        paths.filter_map(existing_parent).map(|folder| (folder, RecursiveMode::NonRecursive)).collect();
-    if let Some(shaders) = sources.shaders.as_ref().and_then(|folder| fs::canonicalize(folder).ok()) {
+    let paths = paths
+        .flat_map(|path| [fs::canonicalize(&path).ok(), Some(path)])
+        .flatten();
+    let mut folders: BTreeMap<_, _> = paths
+        .filter_map(existing_parent)
+        .map(|folder| (folder, RecursiveMode::NonRecursive))
+        .collect();
+    if let Some(shaders) = sources
+        .shaders
+        .as_ref()
+        .and_then(|folder| fs::canonicalize(folder).ok())
+    {
         folders.retain(|folder, _| !folder.starts_with(&shaders));
         folders.insert(shaders, RecursiveMode::Recursive);
     }
@@ -172,7 +190,11 @@ fn wanted(sources: &Sources, snapshot: &Snapshot) -> BTreeMap<PathBuf, Recursive
 /// The nearest folder above a path that there is.
 fn existing_parent(mut path: PathBuf) -> Option<PathBuf> {
     while path.pop() {
-        let folder = if path.as_os_str().is_empty() { fs::canonicalize(".") } else { fs::canonicalize(&path) };
+        let folder = if path.as_os_str().is_empty() {
+            fs::canonicalize(".")
+        } else {
+            fs::canonicalize(&path)
+        };
         if let Ok(folder) = folder {
             return Some(folder);
         }

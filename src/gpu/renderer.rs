@@ -75,10 +75,7 @@ impl Gpu {
         };
         let render = kernels.compile(device, Kernel::Render)?;
         let scene = upload(device, packed)?;
-        let work = device.buffer(
-            size_of::<Work>() as u64,
-            BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-        );
+        let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         let mut gpu = Gpu {
             device: device.clone(),
             kernels,
@@ -117,7 +114,8 @@ impl Gpu {
 
     /// Changes the camera. Whoever does so starts a new film.
     pub fn set_camera(&mut self, camera: &Camera) -> Result<(), RenderError> {
-        self.device.checked(|| self.device.queue.write_buffer(&self.scene[0], 0, bytes_of(camera)))
+        self.device
+            .checked(|| self.device.queue.write_buffer(&self.scene[0], 0, bytes_of(camera)))
     }
 
     fn target<T: Pod>(&self, region: Region) -> Result<Target, RenderError> {
