@@ -1,4 +1,4 @@
-// The buffers of every kernel. The last binding, 7, is what a kernel writes, and is declared with it.
+// The buffers of every kernel. The last binding, 9, is what a kernel writes, and is declared with it.
 
 @group(0) @binding(0) var<uniform> work: Work;
 @group(0) @binding(1) var<uniform> camera: Camera;
@@ -7,3 +7,5 @@
 @group(0) @binding(4) var<storage, read> bounds: array<Sphere>;
 @group(0) @binding(5) var<storage, read> materials: array<Material>;
 @group(0) @binding(6) var<storage, read> lights: array<Light>;
+@group(0) @binding(7) var<storage, read> textures: array<Texture>;
+@group(0) @binding(8) var<storage, read> texels: array<u32>;

@@ -1,16 +1,89 @@
-// Radiance along a ray: direct light by Phong's model.
+// Radiance along a path: direct light by Phong's model, seen directly or through mirrors and glass.
 
-fn radiance(ray: Ray, pixel: vec2u, sample: u32) -> vec3f {
-    let hit = closest_hit(ray);
+// The radiance that comes along a camera's path. The paths through glass form a tree; it is walked depth first, each
+// path as far as its end, and the branches that wait are fewer than LEAVES. A path that meets a mirror or glass after
+// BOUNCES bounces is cut off: there it sees the background.
+fn radiance(camera_path: Path, pixel: vec2u, sample: u32) -> vec3f {
+    var path = camera_path;
+    if BOUNCES == 0u {
+        return radiance_from(closest_hit(path.ray), path, pixel, sample);
+    }
+    var sum = vec3f(0.0);
+    var pending: array<Path, SPLITS>;
+    var waiting = 0u;
+    for (var leaf = 0u; leaf < LEAVES; leaf++) {
+        var hit = Hit(FAR, NOTHING);
+        while path.depth <= BOUNCES {
+            hit = closest_hit(path.ray);
+            if !is_specular(hit) {
+                break;
+            }
+            if path.depth == BOUNCES {
+                hit.primitive = NOTHING;
+                break;
+            }
+            let scattered = scatter(hit, path, pixel, sample);
+            path = scattered.onward;
+            if scattered.splits {
+                pending[waiting] = scattered.other;
+                waiting++;
+            }
+        }
+        sum += path.throughput * radiance_from(hit, path, pixel, sample);
+        if waiting == 0u {
+            break;
+        }
+        waiting--;
+        path = pending[waiting];
+    }
+    return sum;
+}
+
+// Whether light is mirrored or refracted there.
+fn is_specular(hit: Hit) -> bool {
+    if hit.primitive == NOTHING {
+        return false;
+    }
+    let kind = load_material(load_primitive(hit.primitive).material).kind;
+    return (kind == MIRROR) | (kind == GLASS);
+}
+
+fn scatter(hit: Hit, path: Path, pixel: vec2u, sample: u32) -> Scattered {
+    let q = load_primitive(hit.primitive);
+    var surface = surface_at(q, path.ray, hit.t, environment.shadow_epsilon);
+    let at = arrival_of(q, path, hit.t, surface);
+    let look = appearance(q, load_material(q.material), surface, at, SPECULAR_LOOKUPS);
+    let material = look.material;
+    surface.normal = usable_normal(surface, look.normal);
+    if material.kind == MIRROR {
+        return mirrored_path(path, surface, at, material);
+    }
+    let key = sample_key(pixel, camera.seed, NOTHING);
+    let random = unit_float(hash4(vec4u(key, sample, path.depth * LEAVES + path.branch)).x);
+    return glass_path(path, surface, at, material, random);
+}
+
+fn arrival_of(q: Primitive, path: Path, t: f32, surface: Surface) -> Arrival {
+    if DIFFERENTIALS == 0u {
+        return Arrival();
+    }
+    return arrival(q, path.differential, path.ray, t, surface);
+}
+
+// The radiance of what a path ends at.
+fn radiance_from(hit: Hit, path: Path, pixel: vec2u, sample: u32) -> vec3f {
     if hit.primitive == NOTHING {
         return environment.background;
     }
     let q = load_primitive(hit.primitive);
-    let material = load_material(q.material);
-    if material.kind == EMITTER {
-        return material.ambient;
+    let plain = load_material(q.material);
+    if plain.kind == EMITTER {
+        return plain.ambient;
     }
-    let surface = surface_at(q, ray, hit.t, environment.shadow_epsilon);
+    var surface = surface_at(q, path.ray, hit.t, environment.shadow_epsilon);
+    let look = appearance(q, plain, surface, arrival_of(q, path, hit.t, surface), LOOKUPS);
+    let material = look.material;
+    surface.normal = look.normal;
     var sum = environment.ambient * material.ambient;
     for (var i = 0u; i < AREA_LIGHTS; i++) {
         let light = load_light(i);
@@ -47,7 +120,12 @@ fn reflected(material: Material, light: Light, lobes: Lobes, weight: f32) -> vec
 // The radiance of one sample of a pixel.
 fn pixel_radiance(pixel: vec2u, sample: u32) -> vec3f {
     let at = sample_square(PIXEL_PATTERN, PIXEL_SIDE, sample, 0u, sample_key(pixel, camera.seed, 0u));
-    return radiance(camera_ray(camera, vec2f(pixel) + at), pixel, sample);
+    let place = vec2f(pixel) + at;
+    var differential = Differential();
+    if DIFFERENTIALS == 1u {
+        differential = camera_differential(camera, place, 1.0 / sqrt(f32(PIXEL_SAMPLES)));
+    }
+    return radiance(Path(camera_ray(camera, place), differential, vec3f(1.0), 0u, 0u), pixel, sample);
 }
 
 // What the ray through a pixel's centre meets.

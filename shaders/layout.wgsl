@@ -42,11 +42,28 @@ struct Sphere {
 
 struct Material {
     ambient: vec3f,        // EMITTER: its colour
-    kind: u32,             // PHONG or EMITTER
+    kind: u32,             // PHONG, EMITTER, MIRROR or GLASS
     diffuse: vec3f,
-    shininess: f32,
-    specular: vec3f,
+    shininess: f32,        // GLASS: the index of refraction
+    specular: vec3f,       // MIRROR: factor of reflected light; GLASS: of light that passes the surface
     exponent: u32,         // the shininess, where it is a whole number
+    lookups: vec4u,        // in textures: number and purposes, 0 for none
+}
+
+// A texture: first + (second - first) x, where x is what the pattern or the image gives.
+struct Texture {
+    first: vec3f,
+    kind: u32,             // CHECKER, LINES, NEAREST, BILINEAR, TRILINEAR or EWA
+    second: vec3f,
+    parameter: f32,        // LINES: their width; EWA: the largest ratio of an ellipse's axes
+    u: vec3f,              // rows of the map from a surface's (u, v, 1) to the texture's (u, v)
+    format: u32,           // SRGB8, LINEAR8 or FLOAT
+    v: vec3f,
+    wrap: u32,             // REPEAT, CLAMP or MIRRORED
+    texels: u32,           // where the table of its levels' places starts
+    width: u32,            // of its finest level, in texels
+    height: u32,
+    levels: u32,
 }
 
 // A light: the points center + a u + b v for a, b in -1..=1. A point light has no u and v; a directional one has the

@@ -1,10 +1,23 @@
 // Sample positions on the unit square.
 
-// Position `index` of group `group`. A group has side x side positions where the pattern needs squares. `key` tells sets of
+// Position `index` of the set `group`: sets of a pixel, or of a light as seen from a pixel's samples, are numbered in
+// the order of use. `side` is the side of a set's grid for patterns of cells, else the size of a set. `key` tells
 // different pixels, lights and seeds apart.
 fn sample_square(pattern: u32, side: u32, index: u32, group: u32, key: vec2u) -> vec2f {
     if pattern == GRID {
         return grid_sample(side, index);
+    }
+    if pattern == ROTATED_GRID {
+        return rotated_grid_sample(side, index);
+    }
+    if pattern == JITTERED {
+        return jittered_sample(side, index, group, key);
+    }
+    if pattern == HALTON {
+        return halton_sample(group * side + index, key);
+    }
+    if pattern == SOBOL {
+        return sobol_sample(group * side + index, key);
     }
     return random_sample(index, group, key);
 }
@@ -15,12 +28,35 @@ fn grid_sample(side: u32, index: u32) -> vec2f {
     return vec2f((f32(index % side) + 0.5) * cell, (f32(index / side) + 0.5) * cell);
 }
 
+// The same, turned by atan(1/2) around the middle of the square. What leaves the square enters on its other side.
+fn rotated_grid_sample(side: u32, index: u32) -> vec2f {
+    let p = grid_sample(side, index) - 0.5;
+    let x = 0.8944272 * p.x - 0.4472136 * p.y;
+    let y = 0.4472136 * p.x + 0.8944272 * p.y;
+    return vec2f(wrap(x + 0.5), wrap(y + 0.5));
+}
+
+fn wrap(x: f32) -> f32 {
+    let above = select(x, x + 1.0, x < 0.0);
+    return select(above, above - 1.0, above >= 1.0);
+}
+
+// A uniform position in each cell of a regular grid, row by row. The division is one of integers: rounding can not
+// bring a position to the next cell. `side` is at most 256.
+fn jittered_sample(side: u32, index: u32, group: u32, key: vec2u) -> vec2f {
+    let bits = hash4(vec4u(key.x, key.y, group, index));
+    let x = (((index % side) << 24u) | (bits.x >> 8u)) / side;
+    let y = (((index / side) << 24u) | (bits.y >> 8u)) / side;
+    return vec2f(f32(x), f32(y)) * 5.9604644775390625e-8;
+}
+
 fn random_sample(index: u32, group: u32, key: vec2u) -> vec2f {
     let bits = hash4(vec4u(key.x, key.y, group, index));
     return vec2f(unit_float(bits.x), unit_float(bits.y));
 }
 
-// The key of one purpose of random numbers: 0 is the pixel's area, 1 + n the light n.
+// The key of one purpose of random numbers: 0 is the pixel's area, 1 + n the light n, NOTHING the
+// choice of branches.
 fn sample_key(pixel: vec2u, seed: u32, purpose: u32) -> vec2u {
     let bits = hash4(vec4u(pixel.x, pixel.y, seed, purpose));
     return bits.xy;

@@ -4,12 +4,21 @@ fn load_primitive(i: u32) -> Primitive {
     return primitives[i];
 }
 
+// A primitive of a kind that is known when compiled, one of those that can cast a shadow.
+fn load_blocker(kind: u32, i: u32) -> Primitive {
+    return primitives[i];
+}
+
 fn load_material(i: u32) -> Material {
     return materials[i];
 }
 
 fn load_light(i: u32) -> Light {
     return lights[i];
+}
+
+fn load_texture(i: u32) -> Texture {
+    return textures[i];
 }
 
 // The nearest primitive that a ray meets, by one loop for each kind of primitive.

@@ -65,7 +65,6 @@ fn may_block(sphere: Sphere, cone: Cone) -> bool {
     let slope = (abs(dot(m, cone.to.u)) + abs(dot(m, cone.to.v))) * cone.inverse_depth;
     let height = m2 - slope * along;
     let radius2 = sphere.radius * sphere.radius;
-    let aside = (slope >= 0.0) & (height > 0.0) & (height * height > radius2 * (m2 + slope * slope * cone.length2));
-    let behind = (cone.inverse_depth > 0.0) & (along < 0.0) & (along * along > radius2 * cone.length2);
-    return !(aside | behind);
+    return (slope < 0.0) | (height <= 0.0)
+        | (height * height <= radius2 * (m2 + slope * slope * cone.length2));
 }

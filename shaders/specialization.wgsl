@@ -7,6 +7,7 @@ override BLOCKING_RECTANGLES: u32;
 override TRIANGLES: u32;
 override BLOCKING_TRIANGLES: u32;
 override ELLIPSOIDS: u32;
+override BLOCKING_ELLIPSOIDS: u32;
 override PLANES: u32;
 override BLOCKING_PLANES: u32;
 
@@ -14,11 +15,25 @@ override BLOCKING_PLANES: u32;
 override AREA_LIGHTS: u32;
 override DELTA_LIGHTS: u32;
 
+// The samples of a pixel and of an area light. A side is that of a grid of cells, or the number of samples.
 override PIXEL_PATTERN: u32;
 override PIXEL_SIDE: u32;
+override PIXEL_SAMPLES: u32;
 override LIGHT_PATTERN: u32;
 override LIGHT_SIDE: u32;
 override LIGHT_SAMPLES: u32;
 
 // Bits of the largest shininess if all are whole numbers, else 0.
 override EXPONENT_BITS: u32;
+
+// Most bounces of a path, 0 where nothing mirrors or refracts.
+override BOUNCES: u32;
+// 1 where rays carry differentials, else 0.
+override DIFFERENTIALS: u32;
+// Most lookups in textures of a material, and of one of mirrors or glass; 1 if any texture gives a normal, else 0.
+override LOOKUPS: u32;
+override SPECULAR_LOOKUPS: u32;
+override NORMAL_MAPS: u32;
+// Bit i is set if a texture is of kind or format i.
+override TEXTURE_KINDS: u32;
+override TEXEL_FORMATS: u32;

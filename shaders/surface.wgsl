@@ -5,6 +5,7 @@ struct Surface {
     normal: vec3f,         // unit length, towards the viewer
     wo: vec3f,             // unit vector to the viewer
     start: vec3f,          // where rays that leave it begin: a little above it
+    side: f32,             // 1 where the normal is the outward one, -1 where it is the opposite
 }
 
 // The unit normal of a primitive at a point of its local space: the gradient of z, or of x^2 + y^2 + z^2.
@@ -16,9 +17,10 @@ fn primitive_normal(q: Primitive, local: vec3f) -> vec3f {
 fn surface_at(q: Primitive, ray: Ray, t: f32, epsilon: f32) -> Surface {
     let position = ray.origin + ray.direction * t;
     let outward = primitive_normal(q, point_to_local(q, position));
-    let normal = select(outward, -outward, dot(outward, ray.direction) > 0.0);
+    let side = select(1.0, -1.0, dot(outward, ray.direction) > 0.0);
+    let normal = outward * side;
     let size = max(max(abs(position.x), abs(position.y)), max(abs(position.z), t));
-    return Surface(position, normal, -ray.direction, position + normal * (epsilon * size));
+    return Surface(position, normal, -ray.direction, position + normal * (epsilon * size), side);
 }
 
 // Texture coordinates of a point of local space. Rectangle: 0 to 1 along tangent and bitangent. Triangle: barycentric
@@ -38,5 +40,8 @@ fn primitive_uv(q: Primitive, local: vec3f) -> vec2f {
 
 fn first_hit(q: Primitive, ray: Ray, t: f32) -> FirstHit {
     let local = point_to_local(q, ray.origin + ray.direction * t);
-    return FirstHit(primitive_normal(q, local), t, primitive_uv(q, local), q.shape, q.material);
+    let n = primitive_normal(q, local);
+    let normal = vec3f(positive_zero(n.x), positive_zero(n.y), positive_zero(n.z));
+    let uv = primitive_uv(q, local);
+    return FirstHit(normal, t, vec2f(positive_zero(uv.x), positive_zero(uv.y)), q.shape, q.material);
 }

@@ -8,7 +8,7 @@ fn hidden_samples(p: vec3f, light: Light, block: Block) -> u32 {
     let ellipsoids = triangles + ELLIPSOIDS;
     return hidden_by(RECTANGLE, 0u, BLOCKING_RECTANGLES, cone, light, block)
         | hidden_by(TRIANGLE, RECTANGLES, RECTANGLES + BLOCKING_TRIANGLES, cone, light, block)
-        | hidden_by(ELLIPSOID, triangles, ellipsoids, cone, light, block)
+        | hidden_by(ELLIPSOID, triangles, triangles + BLOCKING_ELLIPSOIDS, cone, light, block)
         | hidden_by(PLANE, ellipsoids, ellipsoids + BLOCKING_PLANES, cone, light, block);
 }
 
@@ -18,7 +18,7 @@ fn hidden_by(kind: u32, start: u32, end: u32, cone: Cone, light: Light, block: B
     for (var first = start; first < end; first += 32u) {
         var candidates = shadow_candidates(first, end, cone);
         while candidates != 0u {
-            let q = load_primitive(first + firstTrailingBit(candidates));
+            let q = load_blocker(kind, first + firstTrailingBit(candidates));
             candidates &= candidates - 1u;
             bits |= shadow_bits(kind, q, cone.apex, light, block);
         }

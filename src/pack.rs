@@ -2,12 +2,15 @@
 //!
 //! The structs are those of `shaders/layout.wgsl`: rows of 16 bytes, a `vec3f` followed by a scalar.
 
+mod appearance;
 mod blocking;
 mod bounds;
+mod pyramid;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat3, DVec3, UVec2, Vec2, Vec3};
+use glam::{DMat3, DVec3, UVec2, UVec4, Vec2, Vec3};
 
+use self::appearance::Appearances;
 use crate::scene::{self, Geometry, Parallelogram, Pattern, Projection, Samples, Scene};
 
 /// [`Camera::projection`] of a camera whose rays start at one point.
@@ -28,11 +31,66 @@ pub const PLANE: u32 = 3;
 pub const PHONG: u32 = 0;
 /// [`Material::kind`]: a light's surface, of one colour.
 pub const EMITTER: u32 = 1;
+/// [`Material::kind`]: a mirror.
+pub const MIRROR: u32 = 2;
+/// [`Material::kind`]: clear glass.
+pub const GLASS: u32 = 3;
+
+/// Glass splits a path at the first so many bounces.
+pub const SPLITS: u32 = 2;
+/// A path so has at most so many ends.
+pub const LEAVES: u32 = 4;
+
+/// [`Texture::kind`]: two colours that alternate.
+pub const CHECKER: u32 = 0;
+/// [`Texture::kind`]: lines.
+pub const LINES: u32 = 1;
+/// [`Texture::kind`]: an image, by its nearest texel.
+pub const NEAREST: u32 = 2;
+/// [`Texture::kind`]: an image, between its texels.
+pub const BILINEAR: u32 = 3;
+/// [`Texture::kind`]: an image, between its texels and levels.
+pub const TRILINEAR: u32 = 4;
+/// [`Texture::kind`]: an image, by the elliptical weighted average.
+pub const EWA: u32 = 5;
+
+/// [`Texture::format`]: 8 bits by the sRGB curve.
+pub const SRGB8: u32 = 0;
+/// [`Texture::format`]: 8 bits.
+pub const LINEAR8: u32 = 1;
+/// [`Texture::format`]: 32-bit floats.
+pub const FLOAT: u32 = 2;
+
+/// [`Texture::wrap`]: the image again and again.
+pub const REPEAT: u32 = 0;
+/// [`Texture::wrap`]: the colour of the nearest edge.
+pub const CLAMP: u32 = 1;
+/// [`Texture::wrap`]: the image again and again, every other one mirrored.
+pub const MIRRORED: u32 = 2;
+
+/// The bits of [`Material::lookups`] that are the texture's number.
+pub const TEXTURE_NUMBER: u32 = 0xff_ffff;
+/// In [`Material::lookups`]: gives [`Material::ambient`].
+pub const FOR_AMBIENT: u32 = 0x100_0000;
+/// In [`Material::lookups`]: gives [`Material::diffuse`].
+pub const FOR_DIFFUSE: u32 = 0x200_0000;
+/// In [`Material::lookups`]: gives [`Material::specular`].
+pub const FOR_SPECULAR: u32 = 0x400_0000;
+/// In [`Material::lookups`]: gives the normal.
+pub const FOR_NORMAL: u32 = 0x800_0000;
 
 /// [`Pattern::Grid`].
 pub const GRID: u32 = 0;
 /// [`Pattern::Random`].
 pub const RANDOM: u32 = 1;
+/// [`Pattern::RotatedGrid`].
+pub const ROTATED_GRID: u32 = 2;
+/// [`Pattern::Jittered`].
+pub const JITTERED: u32 = 3;
+/// [`Pattern::Halton`].
+pub const HALTON: u32 = 4;
+/// [`Pattern::Sobol`].
+pub const SOBOL: u32 = 5;
 
 /// No distance of a hit is larger.
 pub const FAR: f32 = f32::MAX;
@@ -118,16 +176,48 @@ pub struct Sphere {
 pub struct Material {
     /// Factor of the ambient light; the colour of an emitter.
     pub ambient: Vec3,
-    /// [`PHONG`] or [`EMITTER`].
+    /// [`PHONG`], [`EMITTER`], [`MIRROR`] or [`GLASS`].
     pub kind: u32,
     /// Factor of the diffuse term.
     pub diffuse: Vec3,
-    /// Exponent of the specular term.
+    /// Exponent of the specular term; the index of refraction of glass.
     pub shininess: f32,
-    /// Factor of the specular term.
+    /// Factor of the specular term; of what a mirror reflects; of what passes the surface of glass.
     pub specular: Vec3,
     /// The exponent, where it is a whole number.
     pub exponent: u32,
+    /// Lookups in textures: a texture's number and the bits of what it is for, 0 for none.
+    pub lookups: UVec4,
+}
+
+/// A texture: first + (second - first) x, where x is what the pattern or the image gives.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Texture {
+    /// The colour where x is 0.
+    pub first: Vec3,
+    /// [`CHECKER`], [`LINES`], [`NEAREST`], [`BILINEAR`], [`TRILINEAR`] or [`EWA`].
+    pub kind: u32,
+    /// The colour where x is 1.
+    pub second: Vec3,
+    /// The width of [`LINES`]; for [`EWA`] the largest ratio of an ellipse's axes.
+    pub parameter: f32,
+    /// First row of the map from a surface's (u, v, 1) to the texture's (u, v).
+    pub u: Vec3,
+    /// [`SRGB8`], [`LINEAR8`] or [`FLOAT`].
+    pub format: u32,
+    /// Second row of the map.
+    pub v: Vec3,
+    /// [`REPEAT`], [`CLAMP`] or [`MIRRORED`].
+    pub wrap: u32,
+    /// Where, in the scene's texels, the table of its levels' places starts.
+    pub texels: u32,
+    /// Width of its finest level in texels.
+    pub width: u32,
+    /// Height of its finest level in texels.
+    pub height: u32,
+    /// How many levels it has.
+    pub levels: u32,
 }
 
 /// A light: the points center + a u + b v for a, b in -1..=1.
@@ -209,8 +299,10 @@ specialization! {
     triangles = "TRIANGLES",
     /// The first of them, which can cast a shadow.
     blocking_triangles = "BLOCKING_TRIANGLES",
-    /// Ellipsoids, which all can cast a shadow.
+    /// Ellipsoids.
     ellipsoids = "ELLIPSOIDS",
+    /// The first of them, which can cast a shadow.
+    blocking_ellipsoids = "BLOCKING_ELLIPSOIDS",
     /// Infinite planes.
     planes = "PLANES",
     /// The first of them, which can cast a shadow.
@@ -221,16 +313,32 @@ specialization! {
     delta_lights = "DELTA_LIGHTS",
     /// How the samples of a pixel are laid out.
     pixel_pattern = "PIXEL_PATTERN",
-    /// Side of their grid.
+    /// Side of their grid of cells; how many there are in patterns without cells.
     pixel_side = "PIXEL_SIDE",
+    /// How many samples a pixel has.
+    pixel_samples = "PIXEL_SAMPLES",
     /// How the samples of an area light are laid out.
     light_pattern = "LIGHT_PATTERN",
-    /// Side of their grid.
+    /// Side of their grid of cells; how many there are in patterns without cells.
     light_side = "LIGHT_SIDE",
     /// How many there are.
     light_samples = "LIGHT_SAMPLES",
     /// Bits of the largest shininess if all are whole numbers, else 0.
     exponent_bits = "EXPONENT_BITS",
+    /// Most bounces of a path, 0 where nothing mirrors or refracts.
+    bounces = "BOUNCES",
+    /// 1 where rays carry differentials, else 0.
+    differentials = "DIFFERENTIALS",
+    /// Most lookups in textures of a material that neither mirrors nor refracts.
+    lookups = "LOOKUPS",
+    /// Most lookups of one that does.
+    specular_lookups = "SPECULAR_LOOKUPS",
+    /// 1 if any texture gives a normal, else 0.
+    normal_maps = "NORMAL_MAPS",
+    /// Bit i is set if a texture is of kind i.
+    texture_kinds = "TEXTURE_KINDS",
+    /// Bit i is set if texels are of format i.
+    texel_formats = "TEXEL_FORMATS",
 }
 
 /// A scene as both backends read it.
@@ -248,6 +356,10 @@ pub struct Packed {
     pub materials: Vec<Material>,
     /// The lights, rectangles first.
     pub lights: Vec<Light>,
+    /// The textures that materials look up.
+    pub textures: Vec<Texture>,
+    /// Their images: tables of places, and texels.
+    pub texels: Vec<u32>,
     /// Samples of every pixel.
     pub pixel_samples: u32,
     /// The constants.
@@ -264,7 +376,8 @@ impl Packed {
 
 /// Packs a scene.
 pub fn pack(scene: &Scene) -> Packed {
-    let mut materials: Vec<Material> = scene.materials.iter().map(pack_material).collect();
+    let appearances = Appearances::of(scene);
+    let mut materials = appearances.materials.clone();
     let exponent_bits = exponent_bits(&scene.materials, &materials);
     let mut primitives = pack_shapes(scene);
     let mut lights = Vec::new();
@@ -299,16 +412,29 @@ pub fn pack(scene: &Scene) -> Packed {
         triangles: count(TRIANGLE, false),
         blocking_triangles: count(TRIANGLE, true),
         ellipsoids: count(ELLIPSOID, false),
+        blocking_ellipsoids: count(ELLIPSOID, true),
         planes: count(PLANE, false),
         blocking_planes: count(PLANE, true),
         area_lights,
         delta_lights: lights.len() as u32 - area_lights,
         pixel_pattern: pattern(pixels),
-        pixel_side: pixels.count.isqrt(),
+        pixel_side: side(pixels),
+        pixel_samples: pixels.count,
         light_pattern: pattern(light_samples),
-        light_side: light_samples.count.isqrt(),
+        light_side: side(light_samples),
         light_samples: light_samples.count,
         exponent_bits,
+        bounces: if scene.materials.iter().any(is_specular) {
+            scene.render.max_depth
+        } else {
+            0
+        },
+        differentials: (scene.render.ray_differentials && appearances.needs_footprints()).into(),
+        lookups: appearances.lookups().0,
+        specular_lookups: appearances.lookups().1,
+        normal_maps: appearances.has_normal_maps().into(),
+        texture_kinds: appearances.kinds(),
+        texel_formats: appearances.formats(),
     };
     let primitives: Vec<Primitive> = order.into_iter().map(|(primitive, _)| primitive).collect();
     Packed {
@@ -323,6 +449,8 @@ pub fn pack(scene: &Scene) -> Packed {
         primitives,
         materials,
         lights,
+        textures: appearances.textures,
+        texels: appearances.texels,
         pixel_samples: pixels.count,
         specialization,
     }
@@ -332,6 +460,19 @@ fn pattern(samples: Samples) -> u32 {
     match samples.pattern {
         Pattern::Grid => GRID,
         Pattern::Random => RANDOM,
+        Pattern::RotatedGrid => ROTATED_GRID,
+        Pattern::Jittered => JITTERED,
+        Pattern::Halton => HALTON,
+        Pattern::Sobol => SOBOL,
+    }
+}
+
+/// The side of a pattern's grid of cells, or else the number of its samples.
+fn side(samples: Samples) -> u32 {
+    if samples.pattern.needs_square() {
+        samples.count.isqrt()
+    } else {
+        samples.count
     }
 }
 
@@ -354,29 +495,17 @@ pub fn pack_camera(camera: &scene::Camera, width: u32, height: u32, seed: u32) -
     }
 }
 
-fn pack_material(material: &scene::Material) -> Material {
-    match *material {
-        scene::Material::Phong {
-            ambient,
-            diffuse,
-            specular,
-            shininess,
-        } => Material {
-            ambient: ambient.as_vec3(),
-            kind: PHONG,
-            diffuse: diffuse.as_vec3(),
-            shininess: shininess as f32,
-            specular: specular.as_vec3(),
-            exponent: shininess as u32,
-        },
-    }
+fn is_specular(material: &scene::Material) -> bool {
+    matches!(material, scene::Material::Mirror { .. } | scene::Material::Glass { .. })
 }
 
 /// Bits of the largest shininess, if all are whole numbers so small that squaring beats the general power.
 fn exponent_bits(described: &[scene::Material], packed: &[Material]) -> u32 {
     let whole = described.iter().all(|material| {
-        let scene::Material::Phong { shininess, .. } = material;
-        shininess.fract() == 0.0 && *shininess <= 4096.0
+        if let scene::Material::Phong { shininess, .. } = material {
+            return shininess.fract() == 0.0 && *shininess <= 4096.0;
+        }
+        true
     });
     let largest = packed.iter().map(|material| material.exponent).max().unwrap_or(1);
     if whole { u32::BITS - largest.leading_zeros() } else { 0 }
@@ -463,7 +592,7 @@ fn parallelogram(kind: u32, p: &Parallelogram, material: u32, shape: u32) -> Pri
 }
 
 /// The primitive whose local space is mapped to the world by `columns` and then `center`.
-fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
+pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
     let rows = columns.inverse().transpose();
     Primitive {
         center: center.as_vec3(),

@@ -66,6 +66,11 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 ";
 
+/// A shader whose picture depends on every line.
+const KERNEL: &str = "shaders/kernels/render.wgsl";
+/// What it adds up.
+const RADIANCE: &str = "pixel_radiance(pixel, sample)";
+
 /// A scene and shaders in a folder of their own.
 struct Files {
     folder: TempDir,
@@ -106,6 +111,13 @@ impl Files {
         let text = self.read(name);
         assert!(text.contains(old), "{name} has no '{old}'");
         self.write(name, &text.replacen(old, new, 1));
+    }
+
+    /// Saves a kernel that multiplies the picture.
+    fn tint(&self, factor: f64) {
+        let kernel = Shaders::built_in().text("kernels/render.wgsl").to_string();
+        assert!(kernel.contains(RADIANCE));
+        self.write(KERNEL, &kernel.replace(RADIANCE, &format!("({RADIANCE} * {factor:?})")));
     }
 
     fn sources(&self) -> Sources {
@@ -295,16 +307,20 @@ fn a_broken_shader_is_told_and_the_picture_stays() {
     let running = files.start();
     running.wait_rendered(&files);
     let (good, revision) = (running.colors(), running.revision());
-    files.edit("shaders/integrator.wgsl", "return sum;", "return sun;");
+    files.edit(KERNEL, "= sum;", "= sun;");
     let problem = running.wait_problem();
     assert_eq!(problem.kind, "shader");
-    let text = files.read("shaders/integrator.wgsl");
-    let line = 1 + text[..text.find("return sun;").unwrap()].matches('\n').count();
-    let place = files.path("shaders/integrator.wgsl").display().to_string();
-    assert_eq!(problem.place, Some(format!("{place}:{line}:12")));
+    let text = files.read(KERNEL);
+    let before = &text[..text.find("sun;").unwrap()];
+    let (line, column) = (
+        before.matches('\n').count() + 1,
+        before.len() - before.rfind('\n').unwrap(),
+    );
+    let place = format!("{}:{line}:{column}", files.path(KERNEL).display());
+    assert_eq!(problem.place, Some(place));
     assert!(problem.message.contains("sun"), "{}", problem.message);
     let excerpt = problem.excerpt.unwrap();
-    assert!(excerpt.contains("return sun;") && excerpt.contains("^^^"), "{excerpt}");
+    assert!(excerpt.contains("= sun;") && excerpt.contains("^^^"), "{excerpt}");
     std::thread::sleep(SETTLED);
     assert_eq!((running.colors(), running.revision()), (good, revision));
     // What does not need the broken shaders goes on.
@@ -327,7 +343,7 @@ fn a_broken_shader_is_told_and_the_picture_stays() {
         (running.colors() == scene_changed).then_some(())
     });
     assert_eq!(running.wait_problem().kind, "shader");
-    files.edit("shaders/integrator.wgsl", "return sun;", "return sum * 0.5;");
+    files.tint(0.5);
     running.wait_rendered(&files);
 }
 
@@ -362,7 +378,7 @@ fn a_broken_scene_is_told_and_the_picture_stays() {
     let good = running.colors();
     for (old, new, line, said) in [
         ("radius = 0.5", "radius = -1", 33, "must be"),
-        ("radius = -1", "radius = = 1", 33, ""),
+        ("radius = -1", "radius = = 1", 33, "expected"),
         ("radius = = 1", "radius = 1\nradios = 2", 34, "radios"),
     ] {
         files.edit("scene.toml", old, new);
@@ -387,10 +403,7 @@ fn of_a_burst_of_saves_the_last_one_counts() {
     for i in 1..=40 {
         files.write("scene.toml", &SCENE.replace("fov = 40", &format!("fov = {}", 40 + i)));
         if i % 4 == 0 {
-            let text = Shaders::built_in()
-                .text("integrator.wgsl")
-                .replace("return sum;", &format!("return sum * 1.{i};"));
-            files.write("shaders/integrator.wgsl", &text);
+            files.tint(1.0 + i as f64 / 100.0);
         }
         if i % 7 == 0 {
             files.write("shaders/phong.wgsl", "half written");
@@ -408,10 +421,8 @@ fn saves_by_rename_and_links_are_seen() {
     running.wait_rendered(&files);
     files.save_by_rename("scene.toml", &SCENE.replace("fov = 40", "fov = 50"));
     running.wait_rendered(&files);
-    let shader = files
-        .read("shaders/integrator.wgsl")
-        .replace("return sum;", "return sum * 0.25;");
-    files.save_by_rename("shaders/integrator.wgsl", &shader);
+    let kernel = files.read(KERNEL).replace(RADIANCE, &format!("({RADIANCE} * 0.25)"));
+    files.save_by_rename(KERNEL, &kernel);
     running.wait_rendered(&files);
     #[cfg(unix)]
     {
@@ -468,7 +479,7 @@ fn deleted_files_are_told_and_seen_again() {
     for (name, text) in BUILT_IN {
         files.write(&format!("shaders/{name}"), text);
     }
-    files.edit("shaders/integrator.wgsl", "return sum;", "return sum * 0.125;");
+    files.tint(0.125);
     running.wait_rendered(&files);
     files.edit(
         "shaders/kernels/render.wgsl",
@@ -476,6 +487,36 @@ fn deleted_files_are_told_and_seen_again() {
         "film[index] = sum * vec4f(2.0, 1.0, 1.0, 1.0);",
     );
     running.wait_rendered(&files);
+}
+
+#[test]
+fn an_edited_texture_is_seen() {
+    let textured = SCENE.replacen("color = [0.8, 0.1, 0.1]", "color = { texture = 'picture' }", 1)
+        + "\n[textures.picture]\ntype = 'image'\nfile = 'textures/picture.png'\n";
+    let files = Files::new(&textured);
+    let paint = |color: [u8; 3]| {
+        fs::create_dir_all(files.path("textures")).unwrap();
+        image::RgbImage::from_pixel(4, 4, image::Rgb(color))
+            .save(files.path("textures/picture.png"))
+            .unwrap();
+    };
+    paint([200, 30, 30]);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let red = running.colors();
+    paint([30, 30, 200]);
+    running.wait_rendered(&files);
+    assert_ne!(running.colors(), red);
+    fs::remove_dir_all(files.path("textures")).unwrap();
+    assert!(running.wait_problem().message.contains("textures/picture.png"));
+    paint([30, 200, 30]);
+    running.wait_rendered(&files);
+    fs::write(files.path("textures/picture.png"), "no picture").unwrap();
+    assert!(running.wait_problem().message.contains("textures/picture.png"));
+    paint([200, 30, 30]);
+    running.wait("the first picture again", |running| {
+        (running.colors() == red).then_some(())
+    });
 }
 
 #[test]
@@ -570,11 +611,7 @@ fn the_cpu_agrees_until_a_shader_is_changed() {
             .and_then(|frame| frame.header.differing)
     };
     assert_eq!(running.wait("a comparison", compared), (0, 0.0));
-    files.edit(
-        "shaders/integrator.wgsl",
-        "return sum;",
-        "return sum + vec3f(0.25, 0.0, 0.0);",
-    );
+    files.edit(KERNEL, RADIANCE, &format!("({RADIANCE} + vec3f(0.25, 0.0, 0.0))"));
     let (pixels, largest) = running.wait("a difference", |running| {
         compared(running).filter(|(pixels, _)| *pixels > 0)
     });
@@ -687,7 +724,9 @@ fn is_whole(answer: &str) -> bool {
     let Some((head, body)) = answer.split_once("\r\n\r\n") else {
         return false;
     };
-    let length = head.lines().find_map(|line| line.to_lowercase().strip_prefix("content-length: ")?.parse().ok());
+    let length = head
+        .lines()
+        .find_map(|line| line.to_lowercase().strip_prefix("content-length: ")?.parse().ok());
     head.starts_with("HTTP/1.1 101") || body.len() >= length.unwrap_or(usize::MAX)
 }
 

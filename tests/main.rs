@@ -1,4 +1,24 @@
-//! All tests that see the library and the program from outside, in one binary: one file a subject.
+//! All tests of the program, of whole pictures, and of the promise that GPU and CPU agree (`docs/agreement.md`). One
+//! binary: a test build links once.
 
+mod adapter;
+mod against_oracle;
+mod backends;
+mod bounds;
+mod cli;
 #[cfg(feature = "dev")]
 mod dev;
+mod inputs;
+mod kernel;
+mod layout;
+mod oracle;
+mod pictures;
+mod probes;
+mod radiance;
+mod random;
+mod render;
+mod robust;
+mod scenes;
+mod sources;
+mod twins;
+mod words;

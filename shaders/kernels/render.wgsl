@@ -1,7 +1,7 @@
 // Renders a range of samples of a rectangle of pixels into the film: rgb the sum of radiances, a the number of them.
 // The sum goes on from the film's own value, one sample after the other, so that every cut of the work gives the same.
 
-@group(0) @binding(7) var<storage, read_write> film: array<vec4f>;
+@group(0) @binding(9) var<storage, read_write> film: array<vec4f>;
 
 @compute @workgroup_size(8, 8)
 fn render(@builtin(global_invocation_id) id: vec3u) {

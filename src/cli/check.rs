@@ -13,14 +13,22 @@ pub struct Args {
     /// Scene files
     #[arg(value_name = "SCENE", required = true)]
     scenes: Vec<PathBuf>,
+
+    /// Folder that files named by the scenes, their textures, must lie in, in place of the scenes' own
+    #[arg(long, value_name = "DIR")]
+    asset_root: Option<PathBuf>,
 }
 
 /// Checks all files, whatever is wrong with some; the exit code is that of the first bad one.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let shaders = Shaders::built_in();
+    let overrides = Overrides {
+        asset_root: args.asset_root.clone(),
+        ..Overrides::default()
+    };
     let mut code = None;
     for path in &args.scenes {
-        match check(path, &shaders) {
+        match check(path, &overrides, &shaders) {
             Ok(summary) => writeln!(io::stdout().lock(), "{}: {summary}", path.display())?,
             Err(error) => {
                 super::report(&error);
@@ -31,8 +39,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(code.unwrap_or(ExitCode::SUCCESS))
 }
 
-fn check(path: &Path, shaders: &Shaders) -> anyhow::Result<String> {
-    let scene = Scene::load(path, &Overrides::default())?;
+fn check(path: &Path, overrides: &Overrides, shaders: &Shaders) -> anyhow::Result<String> {
+    let scene = Scene::load(path, overrides)?;
     let packed = pack(&scene);
     check_kernels(&packed, shaders)?;
     Ok(format!(

@@ -25,6 +25,7 @@ use super::stats::Stats;
 
 /// The arguments as they are written.
 #[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)] // so that a number out of range is told as such
 pub struct Args {
     /// Scene file; docs/scene-format.md says what is in it
     scene: PathBuf,
@@ -50,6 +51,10 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
 
+    /// Folder that pictures named by the scene must lie in, if not the scene's own
+    #[arg(long, value_name = "DIR")]
+    asset_root: Option<PathBuf>,
+
     /// Renders the pixels of columns x0 to x1 - 1 and rows y0 to y1 - 1 only, the same as in the whole picture
     #[arg(long, value_name = "x0,y0,x1,y1", value_parser = parse_crop)]
     crop: Option<Region>,
@@ -65,7 +70,7 @@ pub struct Args {
 
     /// What else to write, of the first hit through each pixel's centre. In an EXR these are further layers: normal.X,
     /// .Y, .Z; depth.Z; uv.U, .V; primitive.ID. Beside a PNG they are further files, NAME.normal.png and so on: normals
-    /// moved to 0..1, depth bright where near, fractions of texture coordinates in red and green, shapes in colours
+    /// moved to 0..1, depth bright where near (half bright at the picture's middle), fractions of texture coordinates in red and green, shapes in colours
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = aov_parser())]
     aov: Vec<Aov>,
 
@@ -147,6 +152,7 @@ impl Plan {
             pixel_samples: args.pixel_samples,
             light_samples: args.light_samples,
             seed: args.seed,
+            asset_root: args.asset_root,
         };
         let scene = pack(&Scene::load(&args.scene, &overrides)?);
         let (width, height) = (scene.camera.width, scene.camera.height);
@@ -195,7 +201,7 @@ impl Plan {
             return Ok(self.cpu());
         };
         let device = match gpu::choose(choice) {
-            Err(RenderError::NoDevice(why)) if *choice == gpu::Choice::Auto => {
+            Err(why) if *choice == gpu::Choice::Auto => {
                 if !self.quiet {
                     eprintln!("warning: rendering on the CPU: {why}");
                 }

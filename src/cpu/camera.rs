@@ -1,15 +1,14 @@
-//! Twin of `shaders/camera.wgsl`: camera rays.
+//! Twin of `shaders/camera.wgsl`: camera rays and their differentials.
 
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 
-use super::math::normalize;
+use super::differential::{Derivative, Differential};
+use super::math::{dot, normalize};
 use super::ray::Ray;
 use crate::pack::{Camera, ORTHOGRAPHIC};
 
 pub fn camera_ray(camera: &Camera, at: Vec2) -> Ray {
-    let x = at.x * (2.0 / camera.width as f32) - 1.0;
-    let y = 1.0 - at.y * (2.0 / camera.height as f32);
-    let offset = camera.right * x + camera.up * y;
+    let offset = image_plane_offset(camera, at);
     if camera.projection == ORTHOGRAPHIC {
         return Ray {
             origin: camera.position + offset,
@@ -19,5 +18,86 @@ pub fn camera_ray(camera: &Camera, at: Vec2) -> Ray {
     Ray {
         origin: camera.position,
         direction: normalize(camera.forward + offset),
+    }
+}
+
+pub fn camera_differential(camera: &Camera, at: Vec2, spacing: f32) -> Differential {
+    Differential {
+        x: camera_derivative(camera, at, camera.right * (2.0 / camera.width as f32 * spacing)),
+        y: camera_derivative(camera, at, camera.up * (-2.0 / camera.height as f32 * spacing)),
+    }
+}
+
+pub fn camera_derivative(camera: &Camera, at: Vec2, step: Vec3) -> Derivative {
+    if camera.projection == ORTHOGRAPHIC {
+        return Derivative {
+            position: step,
+            direction: Vec3::ZERO,
+        };
+    }
+    let d = camera.forward + image_plane_offset(camera, at);
+    let dd = dot(d, d);
+    Derivative {
+        position: Vec3::ZERO,
+        direction: (step * dd - d * dot(d, step)) / (dd * dd.sqrt()),
+    }
+}
+
+pub fn image_plane_offset(camera: &Camera, at: Vec2) -> Vec3 {
+    let x = at.x * (2.0 / camera.width as f32) - 1.0;
+    let y = 1.0 - at.y * (2.0 / camera.height as f32);
+    camera.right * x + camera.up * y
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::pack::PERSPECTIVE;
+
+    /// Looks along +y, right is +x, up is +z; the image plane is 4 x 2, one unit ahead.
+    fn camera(projection: u32) -> Camera {
+        Camera {
+            position: Vec3::new(1.0, 2.0, 3.0),
+            projection,
+            right: Vec3::X * 2.0,
+            width: 8,
+            up: Vec3::Z,
+            height: 4,
+            forward: Vec3::Y,
+            seed: 0,
+        }
+    }
+
+    #[test]
+    fn perspective_rays_leave_one_point() {
+        let camera = camera(PERSPECTIVE);
+        for (at, direction) in [
+            ((4.0, 2.0), (0.0, 1.0, 0.0)),
+            ((0.0, 0.0), (-2.0, 1.0, 1.0)),
+            ((8.0, 4.0), (2.0, 1.0, -1.0)),
+        ] {
+            let ray = camera_ray(&camera, at.into());
+            assert_eq!(ray.origin, camera.position);
+            assert!(
+                (ray.direction - Vec3::from(direction).normalize()).length() < 1e-6,
+                "{at:?}: {}",
+                ray.direction
+            );
+        }
+    }
+
+    #[test]
+    fn orthographic_rays_are_parallel() {
+        let camera = camera(ORTHOGRAPHIC);
+        for (at, origin) in [
+            ((4.0, 2.0), (1.0, 2.0, 3.0)),
+            ((0.0, 0.0), (-1.0, 2.0, 4.0)),
+            ((8.0, 4.0), (3.0, 2.0, 2.0)),
+        ] {
+            let ray = camera_ray(&camera, at.into());
+            assert_eq!((ray.origin, ray.direction), (origin.into(), Vec3::Y), "{at:?}");
+        }
     }
 }

@@ -35,3 +35,106 @@ pub fn ellipsoid_blocks(o: Vec3, d: Vec3, reach: f32) -> bool {
     let passes = (b < 0.0) & (-b < reach * a) & (dot(moment, moment) <= a);
     ((start < 0.0) & (end > 0.0)) | ((start > 0.0) & ((end < 0.0) | passes))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f32::consts::FRAC_1_SQRT_2;
+
+    use glam::{DMat3, DVec3};
+
+    use super::*;
+    use crate::cpu::math::normalize;
+    use crate::cpu::surface::primitive_normal;
+    use crate::pack::{ELLIPSOID, FAR, primitive};
+
+    fn ellipsoid(center: DVec3, axes: DMat3) -> Primitive {
+        primitive(ELLIPSOID, center, axes, 0, 0)
+    }
+
+    fn unit_sphere() -> Primitive {
+        ellipsoid(DVec3::ZERO, DMat3::IDENTITY)
+    }
+
+    fn ray(origin: [f32; 3], direction: [f32; 3]) -> Ray {
+        Ray {
+            origin: origin.into(),
+            direction: normalize(direction.into()),
+        }
+    }
+
+    #[test]
+    fn the_unit_sphere_is_hit_at_45_degrees() {
+        let q = unit_sphere();
+        let ray = ray([-3.0, 0.0, FRAC_1_SQRT_2], [1.0, 0.0, 0.0]);
+        let t = intersect_ellipsoid(&q, ray, FAR);
+        assert!((t - (3.0 - FRAC_1_SQRT_2)).abs() < 1e-6, "{t}");
+        let normal = primitive_normal(&q, point_to_local(&q, ray.origin + ray.direction * t));
+        assert!(
+            (normal - Vec3::new(-FRAC_1_SQRT_2, 0.0, FRAC_1_SQRT_2)).length() < 1e-6,
+            "{normal}"
+        );
+    }
+
+    /// The hit of the assignment's ellipsoid lies on the quadric |M (p - c)|^2 = 1, and its normal is the gradient there.
+    #[test]
+    fn an_ellipsoid_is_its_quadric() {
+        let center = DVec3::new(0.5, 0.4, 0.4);
+        let axes = DMat3::from_cols_array(&[0.3, 0.1, 0.0, -0.1, 0.3, 0.0, 0.0, 0.0, 0.4]);
+        let q = ellipsoid(center, axes);
+        let quadric = |p: DVec3| (axes.inverse() * (p - center)).length_squared() - 1.0;
+        for target in [[0.5, 0.4, 0.4], [0.6, 0.3, 0.55], [0.3, 0.5, 0.2], [0.65, 0.5, 0.6]] {
+            let origin = Vec3::new(0.0, -3.0, 1.3);
+            let ray = ray(origin.into(), (Vec3::from(target) - origin).into());
+            let t = intersect_ellipsoid(&q, ray, FAR);
+            assert!(t < FAR, "{target:?} is inside, and missed");
+            let p = ray.origin + ray.direction * t;
+            assert!(quadric(p.as_dvec3()).abs() < 1e-5, "{}", quadric(p.as_dvec3()));
+            let step = 1e-4;
+            let slope = |e: DVec3| quadric(p.as_dvec3() + e * step) - quadric(p.as_dvec3() - e * step);
+            let gradient = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize();
+            let normal = primitive_normal(&q, point_to_local(&q, p)).as_dvec3();
+            assert!(gradient.distance(normal) < 1e-4, "{gradient} {normal}");
+        }
+    }
+
+    #[test]
+    fn from_inside_the_far_side_is_hit() {
+        let t = intersect_ellipsoid(&unit_sphere(), ray([0.25, 0.0, 0.0], [1.0, 0.0, 0.0]), FAR);
+        assert_eq!(t, 0.75);
+        let t = intersect_ellipsoid(&unit_sphere(), ray([0.25, 0.0, 0.0], [-1.0, 0.0, 0.0]), FAR);
+        assert_eq!(t, 1.25);
+    }
+
+    #[test]
+    fn a_grazing_ray_decides_by_the_last_digits() {
+        let at = |z: f32| intersect_ellipsoid(&unit_sphere(), ray([-1000.0, 0.0, z], [1.0, 0.0, 0.0]), FAR);
+        assert!((at(0.999_999) - 1000.0).abs() < 0.01, "{}", at(0.999_999));
+        assert_eq!(at(1.000_001), FAR);
+    }
+
+    #[test]
+    fn what_is_behind_or_beyond_the_limit_is_no_hit() {
+        let q = unit_sphere();
+        assert_eq!(intersect_ellipsoid(&q, ray([3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), FAR), FAR);
+        assert_eq!(
+            intersect_ellipsoid(&q, ray([3.0, 0.0, 0.0], [-1.0, 0.0, 0.0]), 1.5),
+            1.5
+        );
+        assert_eq!(
+            intersect_ellipsoid(&q, ray([3.0, 0.0, 0.0], [-1.0, 0.0, 0.0]), 2.5),
+            2.0
+        );
+    }
+
+    #[test]
+    fn segments_are_blocked_by_the_surface_they_cut() {
+        let blocks = |o: [f32; 3], d: [f32; 3], reach| ellipsoid_blocks(o.into(), d.into(), reach);
+        assert!(blocks([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 1.0), "through");
+        assert!(blocks([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.5), "into");
+        assert!(blocks([0.0, 0.0, 0.0], [4.0, 0.0, 0.0], 1.0), "out of");
+        assert!(!blocks([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.24), "ends before");
+        assert!(!blocks([0.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.24), "stays inside");
+        assert!(!blocks([-2.0, 0.0, 1.001], [4.0, 0.0, 0.0], 1.0), "passes by");
+        assert!(!blocks([2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 1.0), "leads away");
+    }
+}

@@ -1,30 +1,110 @@
-//! Twin of `shaders/integrator.wgsl`: radiance along a ray.
+//! Twin of `shaders/integrator.wgsl`: radiance along a path.
 
 use bytemuck::Zeroable;
-use glam::{UVec2, Vec3};
+use glam::{UVec2, UVec4, Vec3};
 
-use super::camera::camera_ray;
+use super::camera::{camera_differential, camera_ray};
+use super::differential::{Arrival, Differential, arrival};
 use super::light::segments_to_light;
+use super::path::{Path, Scattered, glass_path, mirrored_path, usable_normal};
 use super::phong::{Lobes, phong_block};
-use super::ray::Ray;
+use super::ray::Hit;
+use super::rng::{hash4, unit_float};
 use super::sampling::{sample_key, sample_square};
 use super::shadow::Block;
 use super::surface::{Surface, first_hit, surface_at};
+use super::texture::appearance;
 use super::traverse::{closest_hit, hidden_samples};
-use crate::pack::{BLOCK, EMITTER, FirstHit, GRID, Light, Material, NOTHING, Packed};
+use crate::pack::{
+    BLOCK, EMITTER, FAR, FirstHit, GLASS, GRID, LEAVES, Light, MIRROR, Material, NOTHING, Packed, Primitive, SPLITS,
+};
 
-pub fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
+pub fn radiance(scene: &Packed, camera_path: Path, pixel: UVec2, sample: u32) -> Vec3 {
+    let bounces = scene.specialization.bounces;
+    let mut path = camera_path;
+    if bounces == 0 {
+        return radiance_from(scene, closest_hit(scene, path.ray), path, pixel, sample);
+    }
+    let mut sum = Vec3::ZERO;
+    let mut pending = [path; SPLITS as usize];
+    let mut waiting = 0;
+    for _ in 0..LEAVES {
+        let mut hit = Hit {
+            t: FAR,
+            primitive: NOTHING,
+        };
+        while path.depth <= bounces {
+            hit = closest_hit(scene, path.ray);
+            if !is_specular(scene, hit) {
+                break;
+            }
+            if path.depth == bounces {
+                hit.primitive = NOTHING;
+                break;
+            }
+            let scattered = scatter(scene, hit, path, pixel, sample);
+            path = scattered.onward;
+            if scattered.splits {
+                pending[waiting] = scattered.other;
+                waiting += 1;
+            }
+        }
+        sum += path.throughput * radiance_from(scene, hit, path, pixel, sample);
+        if waiting == 0 {
+            break;
+        }
+        waiting -= 1;
+        path = pending[waiting];
+    }
+    sum
+}
+
+pub fn is_specular(scene: &Packed, hit: Hit) -> bool {
+    if hit.primitive == NOTHING {
+        return false;
+    }
+    let kind = scene.materials[scene.primitives[hit.primitive as usize].material as usize].kind;
+    (kind == MIRROR) | (kind == GLASS)
+}
+
+pub fn scatter(scene: &Packed, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Scattered {
+    let q = &scene.primitives[hit.primitive as usize];
+    let mut surface = surface_at(q, path.ray, hit.t, scene.environment.shadow_epsilon);
+    let at = arrival_of(scene, q, path, hit.t, surface);
+    let lookups = scene.specialization.specular_lookups;
+    let look = appearance(scene, q, &scene.materials[q.material as usize], surface, at, lookups);
+    let material = &look.material;
+    surface.normal = usable_normal(surface, look.normal);
+    if material.kind == MIRROR {
+        return mirrored_path(path, surface, at, material);
+    }
+    let key = sample_key(pixel, scene.camera.seed, NOTHING);
+    let random = unit_float(hash4(UVec4::new(key.x, key.y, sample, path.depth * LEAVES + path.branch)).x);
+    glass_path(path, surface, at, material, random)
+}
+
+pub fn arrival_of(scene: &Packed, q: &Primitive, path: Path, t: f32, surface: Surface) -> Arrival {
+    if scene.specialization.differentials == 0 {
+        return Arrival::default();
+    }
+    arrival(q, path.differential, path.ray, t, surface)
+}
+
+pub fn radiance_from(scene: &Packed, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Vec3 {
     let s = &scene.specialization;
-    let hit = closest_hit(scene, ray);
     if hit.primitive == NOTHING {
         return scene.environment.background;
     }
     let q = &scene.primitives[hit.primitive as usize];
-    let material = &scene.materials[q.material as usize];
-    if material.kind == EMITTER {
-        return material.ambient;
+    let plain = &scene.materials[q.material as usize];
+    if plain.kind == EMITTER {
+        return plain.ambient;
     }
-    let surface = surface_at(q, ray, hit.t, scene.environment.shadow_epsilon);
+    let mut surface = surface_at(q, path.ray, hit.t, scene.environment.shadow_epsilon);
+    let at = arrival_of(scene, q, path, hit.t, surface);
+    let look = appearance(scene, q, plain, surface, at, s.lookups);
+    let material = &look.material;
+    surface.normal = look.normal;
     let mut sum = scene.environment.ambient * material.ambient;
     let (area_lights, delta_lights) = scene.lights.split_at(s.area_lights as usize);
     for light in area_lights {
@@ -91,7 +171,20 @@ pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> Vec3 {
     let s = &scene.specialization;
     let key = sample_key(pixel, scene.camera.seed, 0);
     let at = sample_square(s.pixel_pattern, s.pixel_side, sample, 0, key);
-    radiance(scene, camera_ray(&scene.camera, pixel.as_vec2() + at), pixel, sample)
+    let place = pixel.as_vec2() + at;
+    let mut differential = Differential::default();
+    if s.differentials == 1 {
+        differential = camera_differential(&scene.camera, place, 1.0 / (s.pixel_samples as f32).sqrt());
+    }
+    let ray = camera_ray(&scene.camera, place);
+    let path = Path {
+        ray,
+        differential,
+        throughput: Vec3::ONE,
+        depth: 0,
+        branch: 0,
+    };
+    radiance(scene, path, pixel, sample)
 }
 
 pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {

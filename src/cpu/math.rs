@@ -24,6 +24,21 @@ pub fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
+pub fn positive_zero(x: f32) -> f32 {
+    let bits = x.to_bits();
+    f32::from_bits(if bits == 0x8000_0000 { 0 } else { bits })
+}
+
+pub fn floor(x: f32) -> f32 {
+    let small = x.abs() < 8_388_608.0;
+    let whole = if small { x } else { 0.0 } as i32 as f32;
+    if small {
+        if whole > x { whole - 1.0 } else { whole }
+    } else {
+        x
+    }
+}
+
 pub fn power_whole(x: f32, n: u32, bits: u32) -> f32 {
     let mut result = 1.0;
     let mut square = x;
@@ -44,12 +59,12 @@ pub fn log2(x: f32) -> f32 {
     let m = f32::from_bits(bits.wrapping_sub(exponent << 23) as u32);
     let s = (m - 1.0) / (m + 1.0);
     let s2 = s * s;
-    let series = 1.0 + s2 * (0.333_333_34 + s2 * (0.2 + s2 * (0.142_857_15 + s2 * (0.111_111_11 + s2 * 0.090_909_09))));
+    let series = 1.0 + s2 * (0.333_333_34 + s2 * (0.2 + s2 * (0.142_857_15 + s2 * 0.111_111_11)));
     exponent as f32 + s * series * (2.0 * std::f32::consts::LOG2_E)
 }
 
 pub fn exp2(x: f32) -> f32 {
-    let p = max(x, -126.5);
+    let p = min(max(x, -126.5), 128.0);
     let whole = (p + if p < 0.0 { -0.5 } else { 0.5 }) as i32;
     let f = (p - whole as f32) * std::f32::consts::LN_2;
     let high = 0.008_333_334 + f * (0.001_388_888_9 + f * 0.000_198_412_7);

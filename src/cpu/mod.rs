@@ -5,10 +5,14 @@
 #![allow(missing_docs, reason = "documented in the WGSL files")]
 
 pub mod camera;
+pub mod differential;
 pub mod ellipsoid;
+pub mod footprint;
 pub mod integrator;
 pub mod light;
 pub mod math;
+pub mod path;
+pub mod pattern;
 pub mod phong;
 pub mod plane;
 pub mod ray;
@@ -16,8 +20,13 @@ pub mod rectangle;
 mod renderer;
 pub mod rng;
 pub mod sampling;
+pub mod sequence;
 pub mod shadow;
+pub mod specular;
 pub mod surface;
+pub mod tangent;
+pub mod texel;
+pub mod texture;
 pub mod traverse;
 pub mod triangle;
 

@@ -13,3 +13,42 @@ pub fn intersect_plane(q: &Primitive, ray: Ray, limit: f32) -> f32 {
 pub fn plane_blocks(o: Vec3, d: Vec3, reach: f32) -> bool {
     crosses_plane(o, d, reach)
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DMat3, DVec3};
+
+    use super::*;
+    use crate::pack::{FAR, PLANE, primitive};
+
+    /// z = 1.
+    fn hit(origin: [f32; 3], direction: [f32; 3]) -> f32 {
+        let plane = primitive(PLANE, DVec3::new(7.0, -3.0, 1.0), DMat3::IDENTITY, 0, 0);
+        let ray = Ray {
+            origin: origin.into(),
+            direction: Vec3::from(direction).normalize(),
+        };
+        intersect_plane(&plane, ray, FAR)
+    }
+
+    #[test]
+    fn it_is_hit_from_both_sides_however_far() {
+        assert_eq!(hit([1e6, 0.0, 3.0], [0.0, 0.0, -1.0]), 2.0);
+        assert_eq!(hit([0.0, 0.0, -1.0], [0.0, 0.0, 1.0]), 2.0);
+        assert!((hit([0.0, 0.0, 2.0], [1000.0, 0.0, -1.0]) - 1000.0005).abs() < 0.01);
+    }
+
+    #[test]
+    fn it_is_not_hit_along_it_nor_behind() {
+        assert_eq!(hit([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]), FAR);
+        assert_eq!(hit([0.0, 0.0, 3.0], [1.0, 0.0, 0.0]), FAR);
+        assert_eq!(hit([0.0, 0.0, 3.0], [0.0, 0.0, 1.0]), FAR);
+    }
+
+    #[test]
+    fn segments_are_blocked_where_they_cross() {
+        let down = Vec3::new(5.0, 0.0, -2.0);
+        assert!(plane_blocks(Vec3::Z, down, 1.0) && plane_blocks(-Vec3::Z, -down, 1.0));
+        assert!(!plane_blocks(Vec3::Z, down, 0.5) && !plane_blocks(Vec3::Z, -down, 1.0));
+    }
+}

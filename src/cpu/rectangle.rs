@@ -17,3 +17,65 @@ pub fn rectangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool {
     let p = scaled_crossing(o, d);
     crosses_plane(o, d, reach) & (p.x.abs() <= d.z.abs()) & (p.y.abs() <= d.z.abs())
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DMat3, DVec3};
+
+    use super::*;
+    use crate::pack::{FAR, RECTANGLE, primitive};
+
+    /// Half edges (2, 0, 0) and (0, 0, 1), in the plane y = 1.
+    fn rectangle() -> Primitive {
+        let columns = DMat3::from_cols(DVec3::X * 2.0, DVec3::Z, -DVec3::Y);
+        primitive(RECTANGLE, DVec3::new(0.0, 1.0, 0.0), columns, 0, 0)
+    }
+
+    fn hit(origin: [f32; 3], direction: [f32; 3]) -> f32 {
+        let ray = Ray {
+            origin: origin.into(),
+            direction: Vec3::from(direction).normalize(),
+        };
+        intersect_rectangle(&rectangle(), ray, FAR)
+    }
+
+    #[test]
+    fn hits_are_inside_the_edges() {
+        assert_eq!(hit([1.9, -2.0, 0.9], [0.0, 1.0, 0.0]), 3.0);
+        assert_eq!(hit([2.1, -2.0, 0.9], [0.0, 1.0, 0.0]), FAR, "beside the first edge");
+        assert_eq!(hit([1.9, -2.0, 1.1], [0.0, 1.0, 0.0]), FAR, "beside the second edge");
+        assert_eq!(hit([1.9, 4.0, 0.9], [0.0, -1.0, 0.0]), 3.0, "from the other side");
+        assert_eq!(hit([1.9, 4.0, 0.9], [0.0, 1.0, 0.0]), FAR, "behind");
+        let slanted = hit([-1.0, 0.0, 0.0], [1.0, 1.0, 0.0]);
+        assert!((slanted - 2.0f32.sqrt()).abs() < 1e-6, "{slanted}");
+    }
+
+    #[test]
+    fn a_ray_in_its_plane_hits_nothing() {
+        assert_eq!(hit([-5.0, 1.0, 0.0], [1.0, 0.0, 0.0]), FAR);
+        assert_eq!(hit([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]), FAR, "from within");
+        assert_eq!(hit([-5.0, 1.5, 0.0], [1.0, 0.0, 0.0]), FAR, "beside the plane");
+    }
+
+    #[test]
+    fn a_grazing_ray_hits_where_it_reaches_the_plane() {
+        let found = hit([-1000.0, 0.0, 0.0], [1000.0, 1.0, 0.0]);
+        assert!((f64::from(found) - 1_000_001f64.sqrt()).abs() < 0.01, "{found}");
+        assert_eq!(
+            hit([-1000.0, 0.0, 0.0], [1000.0, 0.99, 0.0]),
+            FAR,
+            "10 units behind the far edge"
+        );
+    }
+
+    #[test]
+    fn segments_are_blocked_where_they_cross() {
+        let blocks = |o: [f32; 3], d: [f32; 3], reach| rectangle_blocks(o.into(), d.into(), reach);
+        assert!(blocks([0.9, 0.9, 1.0], [0.0, 0.0, -2.0], 1.0));
+        assert!(blocks([-0.9, -0.9, -1.0], [0.0, 0.0, 2.0], 1.0), "from below");
+        assert!(!blocks([1.1, 0.9, 1.0], [0.0, 0.0, -2.0], 1.0), "beside");
+        assert!(!blocks([0.9, 0.9, 1.0], [0.0, 0.0, -2.0], 0.4), "ends before");
+        assert!(!blocks([0.9, 0.9, 1.0], [0.0, 0.0, 2.0], 1.0), "leads away");
+        assert!(!blocks([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 1.0), "in its plane");
+    }
+}

@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::{Vec2, Vec3};
 
-use super::math::{atan2, dot, max, normalize};
+use super::math::{atan2, dot, max, normalize, positive_zero};
 use super::ray::{Ray, point_to_local};
 use crate::pack::{ELLIPSOID, FirstHit, Primitive, RECTANGLE};
 
@@ -14,6 +14,7 @@ pub struct Surface {
     pub normal: Vec3,
     pub wo: Vec3,
     pub start: Vec3,
+    pub side: f32,
 }
 
 pub fn primitive_normal(q: &Primitive, local: Vec3) -> Vec3 {
@@ -24,17 +25,15 @@ pub fn primitive_normal(q: &Primitive, local: Vec3) -> Vec3 {
 pub fn surface_at(q: &Primitive, ray: Ray, t: f32, epsilon: f32) -> Surface {
     let position = ray.origin + ray.direction * t;
     let outward = primitive_normal(q, point_to_local(q, position));
-    let normal = if dot(outward, ray.direction) > 0.0 {
-        -outward
-    } else {
-        outward
-    };
+    let side = if dot(outward, ray.direction) > 0.0 { -1.0 } else { 1.0 };
+    let normal = outward * side;
     let size = max(max(position.x.abs(), position.y.abs()), max(position.z.abs(), t));
     Surface {
         position,
         normal,
         wo: -ray.direction,
         start: position + normal * (epsilon * size),
+        side,
     }
 }
 
@@ -52,11 +51,13 @@ pub fn primitive_uv(q: &Primitive, local: Vec3) -> Vec2 {
 
 pub fn first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit {
     let local = point_to_local(q, ray.origin + ray.direction * t);
-    let (normal, uv) = (primitive_normal(q, local), primitive_uv(q, local));
+    let n = primitive_normal(q, local);
+    let normal = Vec3::new(positive_zero(n.x), positive_zero(n.y), positive_zero(n.z));
+    let uv = primitive_uv(q, local);
     FirstHit {
         normal,
         depth: t,
-        uv,
+        uv: Vec2::new(positive_zero(uv.x), positive_zero(uv.y)),
         shape: q.shape,
         material: q.material,
     }

@@ -46,7 +46,14 @@ pub fn hidden_samples(scene: &Packed, p: Vec3, light: &Light, block: Block) -> u
             light,
             block,
         )
-        | hidden_by(scene, ELLIPSOID, triangles..ellipsoids, &cone, light, block)
+        | hidden_by(
+            scene,
+            ELLIPSOID,
+            triangles..triangles + s.blocking_ellipsoids,
+            &cone,
+            light,
+            block,
+        )
         | hidden_by(
             scene,
             PLANE,

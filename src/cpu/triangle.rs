@@ -19,3 +19,59 @@ pub fn triangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool {
     let p = scaled_crossing(o, d);
     crosses_plane(o, d, reach) & (p.x >= 0.0) & (p.y >= 0.0) & (p.x + p.y <= d.z.abs())
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DMat3, DVec3};
+
+    use super::*;
+    use crate::cpu::surface::primitive_normal;
+    use crate::pack::{FAR, TRIANGLE, primitive};
+
+    const CORNERS: [DVec3; 3] = [
+        DVec3::new(1.0, 1.0, 2.0),
+        DVec3::new(3.0, 1.0, 2.0),
+        DVec3::new(1.0, 4.0, 2.0),
+    ];
+
+    fn triangle() -> Primitive {
+        let [v0, v1, v2] = CORNERS;
+        let normal = (v1 - v0).cross(v2 - v1).normalize();
+        primitive(TRIANGLE, v0, DMat3::from_cols(v1 - v0, v2 - v0, normal), 0, 0)
+    }
+
+    fn from_above(x: f32, y: f32) -> f32 {
+        let ray = Ray {
+            origin: Vec3::new(x, y, 5.0),
+            direction: Vec3::NEG_Z,
+        };
+        intersect_triangle(&triangle(), ray, FAR)
+    }
+
+    #[test]
+    fn hits_are_between_the_corners() {
+        for inside in [(1.01, 1.01), (2.9, 1.01), (1.01, 3.9), (1.9, 2.4), (1.5, 2.0)] {
+            let found = from_above(inside.0, inside.1);
+            assert!((found - 3.0).abs() < 1e-6, "{inside:?}: {found}");
+        }
+        for outside in [(0.99, 2.0), (2.0, 0.99), (2.1, 2.6), (3.0, 4.0)] {
+            assert_eq!(from_above(outside.0, outside.1), FAR, "{outside:?}");
+        }
+    }
+
+    #[test]
+    fn counter_clockwise_corners_face_the_viewer() {
+        assert_eq!(primitive_normal(&triangle(), Vec3::ZERO), Vec3::Z);
+    }
+
+    #[test]
+    fn segments_are_blocked_where_they_cross() {
+        let blocks = |x: f32, y: f32| triangle_blocks(Vec3::new(x, y, 1.0), Vec3::new(0.0, 0.0, -3.0), 1.0);
+        assert!(blocks(0.01, 0.01) && blocks(0.45, 0.5) && blocks(0.9, 0.05));
+        assert!(!blocks(-0.01, 0.5) && !blocks(0.5, -0.01) && !blocks(0.55, 0.5));
+        assert!(
+            !triangle_blocks(Vec3::new(0.2, 0.2, 1.0), Vec3::new(0.0, 0.0, -3.0), 0.3),
+            "ends before"
+        );
+    }
+}

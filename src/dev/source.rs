@@ -8,7 +8,7 @@ use std::time::SystemTime;
 use super::diagnostic::Diagnostic;
 use crate::gpu::compose::{BUILT_IN, Shaders};
 use crate::pack::{Packed, pack};
-use crate::scene::{CameraDescription, Description, Overrides, Scene};
+use crate::scene::{CameraDescription, Description, Overrides, Scene, TextureDescription};
 
 /// Where the files are.
 #[derive(Clone, Debug)]
@@ -82,8 +82,8 @@ impl Sources {
             }),
             (false, _) => {
                 let mut new = self.read_scene(shaders);
-                if new.scene.is_err() {
-                    // The files of the last good scene stay watched until there is a new one.
+                if new.files.len() == 1 {
+                    // It may be half a scene: what the last whole one named stays watched.
                     new.files.extend(
                         last.files
                             .iter()
@@ -107,32 +107,34 @@ impl Sources {
     fn read_scene(&self, shaders: Result<Arc<Shaders>, Diagnostic>) -> Snapshot {
         // The stamps are taken first: a file that changes while it is read is read again.
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
-        let scene = self.load();
-        if let Ok(loaded) = &scene {
-            files.extend(
-                assets(&loaded.scene)
-                    .into_iter()
-                    .map(|path| (path.clone(), self.stamp(&path))),
-            );
+        let text = fs::read_to_string(&self.scene).unwrap_or_default();
+        let described = Description::parse(&text, &self.scene.display().to_string());
+        if let Ok(described) = &described {
+            files.extend(self.assets(described).map(|path| (path.clone(), self.stamp(&path))));
         }
+        let scene = Scene::load(&self.scene, &self.overrides).and_then(|scene| Ok((scene, described?)));
+        let scene = scene
+            .map_err(|error| Diagnostic::scene(&error, &text))
+            .map(|(scene, described)| {
+                let packed = pack(&scene);
+                let materials = described.materials.into_keys().collect();
+                Arc::new(Loaded {
+                    camera: described.camera,
+                    materials,
+                    scene,
+                    packed,
+                })
+            });
         Snapshot { scene, shaders, files }
     }
 
-    fn load(&self) -> Result<Arc<Loaded>, Diagnostic> {
-        let text = || fs::read_to_string(&self.scene).unwrap_or_default();
-        let scene = Scene::load(&self.scene, &self.overrides).map_err(|error| Diagnostic::scene(&error, &text()))?;
-        let text = text();
-        // The file may have changed in between; it is then read once more.
-        let described = Description::parse(&text, &self.scene.display().to_string())
-            .map_err(|error| Diagnostic::scene(&error, &text))?;
-        let packed = pack(&scene);
-        let materials = described.materials.keys().cloned().collect();
-        Ok(Arc::new(Loaded {
-            camera: described.camera,
-            materials,
-            scene,
-            packed,
-        }))
+    /// The files that a scene names: the one place to add to when scenes name more.
+    fn assets(&self, described: &Description) -> impl Iterator<Item = PathBuf> {
+        let folder = self.scene.parent().unwrap_or(Path::new(""));
+        described.textures.values().filter_map(move |texture| match texture {
+            TextureDescription::Image(image) => Some(folder.join(&image.file)),
+            _ => None,
+        })
     }
 
     fn stamp(&self, path: &Path) -> Stamp {
@@ -147,9 +149,4 @@ impl Sources {
         let folder = self.shaders.iter();
         folder.flat_map(|folder| BUILT_IN.iter().map(move |(name, _)| folder.join(name)))
     }
-}
-
-/// The files that a scene names: the one place to add to when scenes name more.
-fn assets(_scene: &Scene) -> Vec<PathBuf> {
-    Vec::new()
 }

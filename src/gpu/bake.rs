@@ -5,12 +5,15 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::pack::{ELLIPSOID, Light, Material, PLANE, Packed, Primitive, RECTANGLE, Specialization, Sphere, TRIANGLE};
+use crate::pack::{
+    ELLIPSOID, Light, Material, PLANE, Packed, Primitive, RECTANGLE, Specialization, Sphere, TRIANGLE, Texture,
+};
 
 /// Larger scenes are read from buffers: compiling grows with every primitive.
 pub const MOST_PRIMITIVES: usize = 64;
 
-/// The WGSL text of a scene's `closest_hit`, `shadow_candidates`, `load_primitive`, `load_material` and `load_light`.
+/// The WGSL text of a scene's `closest_hit`, `shadow_candidates`, `load_primitive`, `load_blocker`, `load_material`,
+/// `load_light` and `load_texture`.
 pub fn bake(packed: &Packed) -> String {
     let mut out = String::new();
     let records: Vec<String> = packed.primitives.iter().map(primitive).collect();
@@ -47,6 +50,25 @@ pub fn bake(packed: &Packed) -> String {
         }
     });
     write_table(&mut out, "load_primitive", "Primitive", &records);
+    write_function(
+        &mut out,
+        "load_blocker(kind: u32, i: u32) -> Primitive",
+        "var r = Primitive();",
+        "r",
+        |body| {
+            for range in blocking(&packed.specialization) {
+                for (k, i) in range.clone().enumerate() {
+                    let kind = packed.primitives[i].kind;
+                    let test = if k == 0 {
+                        String::new()
+                    } else {
+                        format!(" & (i == {i}u)")
+                    };
+                    let _ = writeln!(body, "    if (kind == {kind}u){test} {{ r = {}; }}", records[i]);
+                }
+            }
+        },
+    );
     write_table(
         &mut out,
         "load_material",
@@ -59,6 +81,12 @@ pub fn bake(packed: &Packed) -> String {
         "Light",
         &packed.lights.iter().map(light).collect::<Vec<_>>(),
     );
+    write_table(
+        &mut out,
+        "load_texture",
+        "Texture",
+        &packed.textures.iter().map(texture).collect::<Vec<_>>(),
+    );
     out
 }
 
@@ -69,7 +97,7 @@ fn blocking(s: &Specialization) -> [Range<usize>; 4] {
     [
         0..s.blocking_rectangles,
         triangles..triangles + s.blocking_triangles,
-        ellipsoids..planes,
+        ellipsoids..ellipsoids + s.blocking_ellipsoids,
         planes..planes + s.blocking_planes,
     ]
     .map(|range| range.start as usize..range.end as usize)
@@ -131,13 +159,35 @@ fn sphere(s: &Sphere) -> String {
 
 fn material(m: &Material) -> String {
     format!(
-        "Material({}, {}u, {}, {:?}f, {}, {}u)",
+        "Material({}, {}u, {}, {:?}f, {}, {}u, vec4u({}u, {}u, {}u, {}u))",
         vector(m.ambient),
         m.kind,
         vector(m.diffuse),
         m.shininess,
         vector(m.specular),
-        m.exponent
+        m.exponent,
+        m.lookups.x,
+        m.lookups.y,
+        m.lookups.z,
+        m.lookups.w
+    )
+}
+
+fn texture(t: &Texture) -> String {
+    format!(
+        "Texture({}, {}u, {}, {:?}f, {}, {}u, {}, {}u, {}u, {}u, {}u, {}u)",
+        vector(t.first),
+        t.kind,
+        vector(t.second),
+        t.parameter,
+        vector(t.u),
+        t.format,
+        vector(t.v),
+        t.wrap,
+        t.texels,
+        t.width,
+        t.height,
+        t.levels
     )
 }
 

@@ -3,43 +3,53 @@
 use std::borrow::Cow;
 
 use naga::back::{pipeline_constants::process_overrides, spv};
-use naga::valid::{Capabilities, ValidationFlags, Validator};
+use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
+use naga::{Module, WithSpan};
 
 use super::compose::{Kernel, Source};
+use super::prune::prune;
 use super::spirv;
 use crate::error::ShaderError;
 use crate::pack::Specialization;
 
 /// A kernel that naga accepts.
 pub struct Checked {
-    module: naga::Module,
-    info: naga::valid::ModuleInfo,
+    module: Module,
+    info: ModuleInfo,
 }
 
 /// Parses and validates a kernel.
 pub fn check(source: &Source) -> Result<Checked, ShaderError> {
     let module = naga::front::wgsl::parse_str(&source.text).map_err(|error| ShaderError::parse(source, &error))?;
-    let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
-        .validate(&module)
-        .map_err(|error| ShaderError::invalid(source, &error))?;
+    let info = validate(&module).map_err(|error| ShaderError::invalid(source, &error))?;
     Ok(Checked { module, info })
+}
+
+fn validate(module: &Module) -> Result<ModuleInfo, WithSpan<ValidationError>> {
+    Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(module)
 }
 
 impl Checked {
     /// The kernel as SPIR-V for one specialisation, computed on the device exactly as it is written.
     pub fn exact_spirv(&self, kernel: Kernel, constants: &Specialization) -> Result<Vec<u32>, ShaderError> {
+        self.exact_entry(kernel.entry_point(), &constants.constants())
+    }
+
+    /// The same for any compute entry point, with the values of its overrides.
+    pub fn exact_entry(&self, entry: &str, constants: &[(&str, u32)]) -> Result<Vec<u32>, ShaderError> {
         let constants = constants
-            .constants()
-            .into_iter()
-            .map(|(name, value)| (name.to_string(), f64::from(value)));
-        let entry = kernel.entry_point();
-        let (module, info): (Cow<'_, _>, Cow<'_, _>) = process_overrides(
+            .iter()
+            .map(|(name, value)| (name.to_string(), f64::from(*value)));
+        let (specialised, _): (Cow<'_, _>, Cow<'_, _>) = process_overrides(
             &self.module,
             &self.info,
             Some((naga::ShaderStage::Compute, entry)),
             &constants.collect(),
         )
         .map_err(|error| ShaderError::other("specialisation", &error))?;
+        let mut module = specialised.into_owned();
+        prune(&mut module);
+        let info = validate(&module).map_err(|error| ShaderError::other("specialisation", &error))?;
         // The kernels' loops all count to a bound, so that naga need not bound them again.
         let options = spv::Options {
             lang_version: (1, 3),

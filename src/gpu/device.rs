@@ -54,14 +54,25 @@ pub fn adapters() -> Vec<Info> {
     enumerate().iter().map(info).collect()
 }
 
-/// Opens the adapter that fits a choice best.
+/// Opens the adapter that fits a choice best, of those that can be opened.
+///
+/// # Errors
+///
+/// [`RenderError::NoDevice`] if no adapter fits, and that of the last one if none that fits can be opened.
 pub fn choose(choice: &Choice) -> Result<Device, RenderError> {
     let adapters = enumerate();
-    let adapter = adapters.iter().find(|adapter| match choice {
+    let fitting = adapters.iter().filter(|adapter| match choice {
         Choice::Auto | Choice::Gpu => true,
         Choice::Named(name) => matches(&info(adapter), name),
     });
-    adapter.map_or_else(|| Err(RenderError::NoDevice(none_fits(choice, &adapters))), open)
+    let mut failure = None;
+    for adapter in fitting {
+        match open(adapter) {
+            Ok(device) => return Ok(device),
+            Err(error) => failure = Some(error),
+        }
+    }
+    Err(failure.unwrap_or_else(|| RenderError::NoDevice(none_fits(choice, &adapters))))
 }
 
 fn none_fits(choice: &Choice, adapters: &[wgpu::Adapter]) -> String {
@@ -153,6 +164,11 @@ impl Device {
     /// Gives the device up: whatever uses it from now on fails, as when a driver loses it.
     pub fn destroy(&self) {
         self.device.destroy();
+    }
+
+    /// What wgpu calls it, for kernels other than the renderer's.
+    pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
+        (&self.device, &self.queue)
     }
 
     /// Runs calls to wgpu and returns the first error that they raise.

@@ -5,10 +5,12 @@ mod compile;
 pub mod compose;
 mod device;
 mod pipeline;
+mod prune;
 mod renderer;
 pub mod spirv;
 mod validate;
 
+pub use bake::bake;
 pub use compile::{Checked, check};
 pub use device::{Choice, Device, HOW_TO_GET_VULKAN, Info, adapters, choose};
 pub use renderer::{Gpu, Options};

@@ -39,9 +39,9 @@ pub struct Gpu {
     device: Device,
     kernels: Kernels,
     render: wgpu::ComputePipeline,
-    /// Compiled when it is first needed.
+    /// The kernel of first hits, once it was asked for.
     aov: Option<wgpu::ComputePipeline>,
-    scene: [wgpu::Buffer; 6],
+    scene: [wgpu::Buffer; 8],
     work: wgpu::Buffer,
     film: Option<Target>,
 }
@@ -122,7 +122,16 @@ impl Gpu {
         let size = region.pixels() * size_of::<T>() as u64;
         self.device.checked(|| {
             let buffer = self.device.buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-            let [camera, environment, primitives, bounds, materials, lights] = &self.scene;
+            let [
+                camera,
+                environment,
+                primitives,
+                bounds,
+                materials,
+                lights,
+                textures,
+                texels,
+            ] = &self.scene;
             let buffers = [
                 &self.work,
                 camera,
@@ -131,6 +140,8 @@ impl Gpu {
                 bounds,
                 materials,
                 lights,
+                textures,
+                texels,
                 &buffer,
             ];
             let entries: Vec<wgpu::BindGroupEntry> = (0..)
@@ -221,7 +232,7 @@ impl Backend for Gpu {
 }
 
 /// The buffers of a scene, in the order of their bindings.
-fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 6], RenderError> {
+fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 8], RenderError> {
     device.checked(|| {
         [
             device.upload(BufferUsages::UNIFORM | BufferUsages::COPY_DST, &[packed.camera]),
@@ -230,6 +241,8 @@ fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 6], RenderE
             device.upload(BufferUsages::STORAGE, &packed.bounds),
             device.upload(BufferUsages::STORAGE, &packed.materials),
             device.upload(BufferUsages::STORAGE, &packed.lights),
+            device.upload(BufferUsages::STORAGE, &packed.textures),
+            device.upload(BufferUsages::STORAGE, &packed.texels),
         ]
     })
 }

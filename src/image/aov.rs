@@ -58,7 +58,7 @@ impl Aov {
     }
 
     /// The colour in a PNG, before rounding to 8 bits; black where nothing is hit. The normal is moved from [-1, 1] to
-    /// [0, 1]; the depth is `middle / (middle + depth)`, near is bright; of texture coordinates the fraction is shown in
+    /// [0, 1]; the depth d is `1 / (1 + (d / middle)^4)`, near is bright; of texture coordinates the fraction is shown in
     /// red and green; a shape has a colour that its number is hashed to.
     pub fn color(self, hit: &FirstHit, middle_depth: f32) -> Vec3 {
         if hit.shape == NOTHING {
@@ -66,7 +66,7 @@ impl Aov {
         }
         match self {
             Aov::Normal => hit.normal * 0.5 + 0.5,
-            Aov::Depth => Vec3::splat(middle_depth / (middle_depth + hit.depth)),
+            Aov::Depth => Vec3::splat(1.0 / (1.0 + (hit.depth / middle_depth).powi(4))),
             Aov::Uv => (hit.uv - hit.uv.floor()).extend(0.0),
             Aov::Primitive => {
                 let bits = hash4(UVec4::new(hit.shape, 0, 0, 0)).truncate();

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use super::{ELLIPSOID, Primitive};
-use crate::scene::{Geometry, Light, Parallelogram, Scene};
+use crate::scene::{Geometry, Light, Material, Parallelogram, Scene, Shadows};
 
 /// How far beyond a plane a point counts as on it, relative to the coordinates: the rounding of its record.
 const TOLERANCE: f64 = 1e-6;
@@ -13,8 +13,16 @@ const TOLERANCE: f64 = 1e-6;
 pub fn can_cast_shadow(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
     primitives
         .iter()
-        .map(|p| p.shape < scene.shapes.len() as u32 && blocks(scene, p))
+        .map(|p| match scene.shapes.get(p.shape as usize) {
+            Some(shape) => casts_shadow(scene, shape.material) && blocks(scene, p),
+            None => false, // a light
+        })
         .collect()
+}
+
+fn casts_shadow(scene: &Scene, material: usize) -> bool {
+    let is_glass = matches!(scene.materials[material], Material::Glass { .. });
+    scene.render.shadows == Shadows::Opaque || !is_glass
 }
 
 fn blocks(scene: &Scene, primitive: &Primitive) -> bool {

@@ -9,6 +9,8 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
+pub use super::describe_texture::*;
+
 /// A whole scene file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Description {
@@ -18,6 +20,8 @@ pub struct Description {
     pub camera: CameraDescription,
     /// `[render]`
     pub render: RenderDescription,
+    /// `[textures.NAME]`
+    pub textures: BTreeMap<String, TextureDescription>,
     /// `[materials.NAME]`
     pub materials: BTreeMap<String, MaterialDescription>,
     /// `[[lights]]`
@@ -48,6 +52,12 @@ pub struct RenderDescription {
     pub background: DVec3,
     /// Relative offset of shadow rays.
     pub shadow_epsilon: f64,
+    /// Whether glass casts shadows.
+    pub shadows: super::Shadows,
+    /// Most bounces of a path by mirrors and glass.
+    pub max_depth: u32,
+    /// Whether textures are filtered over the footprint of each ray.
+    pub ray_differentials: bool,
     /// Seed of all random patterns.
     pub seed: u32,
     /// Samples of every pixel.
@@ -67,6 +77,9 @@ impl Default for RenderDescription {
             ambient: DVec3::ZERO,
             background: DVec3::ZERO,
             shadow_epsilon: 1e-5,
+            shadows: super::Shadows::Opaque,
+            max_depth: 8,
+            ray_differentials: true,
             seed: 0,
             pixel_samples: samples.clone(),
             light_samples: samples,
@@ -95,12 +108,20 @@ pub enum Pattern {
     Grid,
     /// Independent and uniform.
     Random,
+    /// The grid, turned by atan(1/2).
+    RotatedGrid,
+    /// A uniform position in each of n x n cells.
+    Jittered,
+    /// Halton's sequence in bases 2 and 3, randomly rotated.
+    Halton,
+    /// Sobol's sequence, Owen-scrambled.
+    Sobol,
 }
 
 impl Pattern {
     /// Whether the pattern is made of n x n cells, so that its count must be a square number.
     pub const fn needs_square(self) -> bool {
-        matches!(self, Pattern::Grid)
+        matches!(self, Pattern::Grid | Pattern::RotatedGrid | Pattern::Jittered)
     }
 }
 
@@ -142,6 +163,8 @@ macro_rules! tagged {
         }
     };
 }
+
+pub(super) use tagged;
 
 tagged! {
     /// `[camera]`
@@ -191,6 +214,10 @@ tagged! {
     MaterialDescription {
         /// Phong's reflection model.
         "phong" => Phong(PhongDescription),
+        /// A mirror.
+        "mirror" => Mirror(MirrorDescription),
+        /// Clear glass.
+        "glass" => Glass(GlassDescription),
     }
 }
 
@@ -199,16 +226,42 @@ tagged! {
 #[serde(deny_unknown_fields)]
 pub struct PhongDescription {
     /// Short for the three factors.
-    pub color: Option<DVec3>,
+    pub color: Option<ColorDescription>,
     /// Factor of the ambient light.
-    pub ambient: Option<DVec3>,
+    pub ambient: Option<ColorDescription>,
     /// Factor of the diffuse term.
-    pub diffuse: Option<DVec3>,
+    pub diffuse: Option<ColorDescription>,
     /// Factor of the specular term.
-    pub specular: Option<DVec3>,
+    pub specular: Option<ColorDescription>,
     /// Exponent of the specular term.
     #[serde(default = "sixteen")]
     pub shininess: f64,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
+}
+
+/// A mirror.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct MirrorDescription {
+    /// Factor of the reflected light.
+    #[serde(default)]
+    pub tint: ColorDescription,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
+}
+
+/// Clear glass.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct GlassDescription {
+    /// Index of refraction.
+    pub ior: f64,
+    /// Factor of the light that passes the surface.
+    #[serde(default)]
+    pub tint: ColorDescription,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
 }
 
 tagged! {

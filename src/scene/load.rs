@@ -2,12 +2,12 @@
 
 use std::fs::File;
 use std::io::{self, Read as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::error::{At, Problem, SceneError};
 use super::parse::{invalid, syntax_error};
 use super::validate::{sample_count, side};
-use super::{Description, SamplesDescription, Scene};
+use super::{Assets, Description, SamplesDescription, Scene};
 
 /// The largest scene file in bytes: far above what anyone writes, far below what fills the memory.
 const LARGEST_FILE: u64 = 64 << 20;
@@ -24,6 +24,8 @@ pub struct Overrides {
     pub light_samples: Option<u32>,
     /// `--seed`
     pub seed: Option<u32>,
+    /// `--asset-root`: the folder that files named by the scene must lie in, instead of the scene's own.
+    pub asset_root: Option<PathBuf>,
 }
 
 impl Overrides {
@@ -60,7 +62,7 @@ impl Scene {
         })?;
         let origin = path.display().to_string();
         match std::str::from_utf8(&bytes) {
-            Ok(text) => Scene::parse(text, &origin, overrides),
+            Ok(text) => parse_beside(text, &origin, folder_of(path), overrides),
             Err(error) => {
                 let text = String::from_utf8_lossy(&bytes);
                 // Up to there the lossy text is the file's.
@@ -69,17 +71,30 @@ impl Scene {
         }
     }
 
-    /// Reads and checks the text of a scene file; `origin` is the file's name in messages.
+    /// Reads and checks the text of a scene file; `origin` is the file's name in messages, and files that the scene
+    /// names are beside it.
     ///
     /// # Errors
     ///
     /// The errors of [`Description::parse`] and of [`Description::validate`], and bad overrides.
     pub fn parse(text: &str, origin: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
-        let mut description = Description::parse(text, origin)?;
-        overrides.apply(&mut description).map_err(SceneError::Option)?;
-        let scene = description.validate();
-        scene.map_err(|problem| invalid(text, origin, problem))
+        parse_beside(text, origin, folder_of(Path::new(origin)), overrides)
     }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().unwrap_or(Path::new("."))
+}
+
+fn parse_beside(text: &str, origin: &str, folder: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
+    let mut description = Description::parse(text, origin)?;
+    overrides.apply(&mut description).map_err(SceneError::Option)?;
+    let mut assets = Assets::beside(folder);
+    if let Some(root) = &overrides.asset_root {
+        assets.root.clone_from(root);
+    }
+    let scene = description.validate_with(&assets);
+    scene.map_err(|problem| invalid(text, origin, problem))
 }
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
@@ -109,6 +124,7 @@ light_samples = { pattern = 'random', count = 5 }
             pixel_samples: Some(9),
             light_samples: Some(8),
             seed: Some(3),
+            asset_root: None,
         };
         let scene = Scene::parse(SCENE, "s.toml", &overrides).unwrap();
         let render = scene.render;

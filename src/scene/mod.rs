@@ -3,10 +3,13 @@
 //! The way from the file: text → [`Description`] (what it says, field for field) → [`Scene`] (by
 //! [`Description::validate`] alone). Nothing behind a `Scene` checks again.
 
+mod describe_texture;
 mod description;
 mod error;
+pub(crate) mod image_file;
 mod load;
 mod parse;
+mod texture;
 mod validate;
 
 use glam::DVec3;
@@ -14,7 +17,9 @@ use serde::{Deserialize, Serialize};
 
 pub use description::*;
 pub use error::{KeyPath, Problem, SceneError};
+pub use image_file::Assets;
 pub use load::Overrides;
+pub use texture::{Color, Encoding, Filter, Image, NormalMap, Texels, Texture, TexturePattern, Wrap};
 
 /// A checked scene. Lengths have no unit; colours are linear RGB; angles are radians.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +33,8 @@ pub struct Scene {
     pub camera: Camera,
     /// How it is rendered.
     pub render: Render,
+    /// The textures that materials name by index, in the order of their names.
+    pub textures: Vec<Texture>,
     /// The materials that shapes name by index, in the order of their names.
     pub materials: Vec<Material>,
     /// The lights, in file order.
@@ -79,6 +86,12 @@ pub struct Render {
     pub background: DVec3,
     /// Offset of shadow rays, relative to the largest coordinate of their start.
     pub shadow_epsilon: f64,
+    /// Whether glass casts shadows.
+    pub shadows: Shadows,
+    /// Most bounces of a path by mirrors and glass.
+    pub max_depth: u32,
+    /// Whether textures are filtered over the footprint of each ray, or at its point alone.
+    pub ray_differentials: bool,
     /// Seed of all random patterns.
     pub seed: u32,
     /// Samples of every pixel's area.
@@ -95,13 +108,24 @@ pub enum Integrator {
     Phong,
 }
 
+/// Whether glass casts shadows. In a file the names are in snake case: `"opaque"`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shadows {
+    /// Like everything else.
+    #[default]
+    Opaque,
+    /// Not at all: light passes it straight on, with its full strength.
+    Transparent,
+}
+
 /// A set of sample positions on the unit square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Samples {
     /// How they are laid out.
     pub pattern: Pattern,
-    /// How many, 1 to 65,536; a square for [`Pattern::Grid`].
+    /// How many, 1 to 65,536; a square for patterns of n x n cells.
     pub count: u32,
 }
 
@@ -112,14 +136,43 @@ pub enum Material {
     /// Phong's reflection model.
     Phong {
         /// Factor of the ambient light.
-        ambient: DVec3,
+        ambient: Color,
         /// Factor of the diffuse term.
-        diffuse: DVec3,
+        diffuse: Color,
         /// Factor of the specular term.
-        specular: DVec3,
+        specular: Color,
         /// Exponent of the specular term, greater than 0.
         shininess: f64,
+        /// What bends its normals.
+        normal_map: Option<NormalMap>,
     },
+    /// A mirror.
+    Mirror {
+        /// Factor of the reflected light.
+        tint: Color,
+        /// What bends its normals.
+        normal_map: Option<NormalMap>,
+    },
+    /// Clear glass, by Fresnel's equations.
+    Glass {
+        /// Index of refraction of what is on the side away from the outward normal, relative to the other side.
+        ior: f64,
+        /// Factor of the light that passes the surface, on the way in and on the way out.
+        tint: Color,
+        /// What bends its normals.
+        normal_map: Option<NormalMap>,
+    },
+}
+
+impl Material {
+    /// What bends its normals.
+    pub fn normal_map(&self) -> Option<NormalMap> {
+        match self {
+            Material::Phong { normal_map, .. }
+            | Material::Mirror { normal_map, .. }
+            | Material::Glass { normal_map, .. } => *normal_map,
+        }
+    }
 }
 
 /// A source of light.

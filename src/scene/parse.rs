@@ -84,6 +84,8 @@ struct Sections {
     #[serde(default)]
     render: Table,
     #[serde(default)]
+    textures: BTreeMap<String, Table>,
+    #[serde(default)]
     materials: BTreeMap<String, Table>,
     #[serde(default)]
     lights: Vec<Table>,
@@ -93,20 +95,23 @@ struct Sections {
 
 fn read_file(file: Table) -> Result<Description, Problem> {
     let sections: Sections = read(file)?;
-    let material = |(name, table): (String, Table)| {
-        let material = read_tagged(table, None).at(name.as_str());
-        material.map(|material| (name, material))
-    };
     Ok(Description {
         image: read(sections.image).at("image")?,
         camera: read_tagged(sections.camera, Some("perspective")).at("camera")?,
         render: read(sections.render).at("render")?,
-        materials: (sections.materials.into_iter().map(material))
-            .collect::<Result<_, _>>()
-            .at("materials")?,
+        textures: read_map(sections.textures).at("textures")?,
+        materials: read_map(sections.materials).at("materials")?,
         lights: read_list(sections.lights).at("lights")?,
         shapes: read_list(sections.shapes).at("shapes")?,
     })
+}
+
+fn read_map<T: Tagged>(tables: BTreeMap<String, Table>) -> Result<BTreeMap<String, T>, Problem> {
+    let read = |(name, table): (String, Table)| {
+        let value = read_tagged(table, None).at(name.as_str());
+        value.map(|value| (name, value))
+    };
+    tables.into_iter().map(read).collect()
 }
 
 fn read_list<T: Tagged>(tables: Vec<Table>) -> Result<Vec<T>, Problem> {

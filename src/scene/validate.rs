@@ -2,22 +2,28 @@
 //!
 //! The limits keep all that is computed from a scene, squares of lengths included, inside the range of `f32`.
 
+mod appearance;
+
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use glam::DVec3;
 
+use self::appearance::Textures;
 use super::error::{At, Problem};
 use super::parse::list;
 use super::{
-    Camera, CameraDescription, Description, EllipsoidDescription, Geometry, Light, LightDescription, Material,
-    MaterialDescription, Parallelogram, Pattern, PhongDescription, Projection, Render, RenderDescription, Samples,
-    SamplesDescription, Scene, Shape, ShapeDescription,
+    Assets, Camera, CameraDescription, Color, Description, EllipsoidDescription, Geometry, Light, LightDescription,
+    Material, Parallelogram, Pattern, Projection, Render, RenderDescription, Samples, SamplesDescription, Scene, Shape,
+    ShapeDescription,
 };
 
 /// Largest absolute coordinate.
 const FARTHEST: f64 = 1e9;
 /// Smallest and largest length.
 const LENGTHS: (f64, f64) = (1e-9, 1e9);
+/// Most bounces of a path.
+const DEEPEST: u32 = 64;
 /// Largest component of a colour.
 const BRIGHTEST: f64 = 1e6;
 /// Most pixels along a side of the picture, and most samples.
@@ -29,26 +35,43 @@ const FLATTEST: f64 = 1e-6;
 type Checked<T> = Result<T, Problem>;
 
 impl Description {
-    /// Checks every value and makes a scene of them.
+    /// Checks every value and makes a scene of them; files that they name are in the current folder.
     ///
     /// # Errors
     ///
     /// The first value that breaks a rule.
     pub fn validate(&self) -> Result<Scene, Problem> {
+        self.validate_with(&Assets::beside(Path::new(".")))
+    }
+
+    /// Checks every value, the files that they name among them, and makes a scene of them.
+    ///
+    /// # Errors
+    ///
+    /// The first value that breaks a rule.
+    pub fn validate_with(&self, assets: &Assets) -> Result<Scene, Problem> {
         // A map is sorted: a material's index is its place among the names.
         let names = self.materials.keys().map(String::as_str);
         let indices: BTreeMap<_, _> = names.zip(0..).collect();
+        let textures = appearance::textures(&self.textures, assets).at("textures")?;
+        let known = Textures {
+            names: self.textures.keys().map(String::as_str).collect(),
+            textures: &textures,
+        };
+        let materials = (self.materials.iter())
+            .map(|(name, description)| known.material(description).at(name.as_str()))
+            .collect::<Checked<Vec<_>>>()
+            .at("materials")?;
+        let shapes = each(&self.shapes, |description| shape(description, &indices, &materials)).at("shapes")?;
         Ok(Scene {
             width: side(self.image.width).at("width").at("image")?,
             height: side(self.image.height).at("height").at("image")?,
             camera: camera(&self.camera).at("camera")?,
             render: render(&self.render).at("render")?,
-            materials: (self.materials.iter())
-                .map(|(name, description)| material(description).at(name.as_str()))
-                .collect::<Checked<_>>()
-                .at("materials")?,
             lights: each(&self.lights, light).at("lights")?,
-            shapes: each(&self.shapes, |description| shape(description, &indices)).at("shapes")?,
+            textures,
+            materials,
+            shapes,
         })
     }
 }
@@ -102,10 +125,20 @@ fn render(description: &RenderDescription) -> Checked<Render> {
         ambient: color(description.ambient).at("ambient")?,
         background: color(description.background).at("background")?,
         shadow_epsilon: between(description.shadow_epsilon, 0.0, 0.1).at("shadow_epsilon")?,
+        shadows: description.shadows,
+        max_depth: max_depth(description.max_depth).at("max_depth")?,
+        ray_differentials: description.ray_differentials,
         seed: description.seed,
         pixel_samples: samples(&description.pixel_samples).at("pixel_samples")?,
         light_samples: samples(&description.light_samples).at("light_samples")?,
     })
+}
+
+fn max_depth(depth: u32) -> Checked<u32> {
+    check((1..=DEEPEST).contains(&depth), || {
+        format!("{depth} must be from 1 to {DEEPEST}")
+    })?;
+    Ok(depth)
 }
 
 fn camera(description: &CameraDescription) -> Checked<Camera> {
@@ -155,27 +188,6 @@ fn camera(description: &CameraDescription) -> Checked<Camera> {
     })
 }
 
-fn material(description: &MaterialDescription) -> Checked<Material> {
-    match description {
-        MaterialDescription::Phong(phong) => {
-            if let Some(all) = phong.color {
-                color(all).at("color")?;
-            }
-            Ok(Material::Phong {
-                ambient: factor(phong, phong.ambient, "ambient")?,
-                diffuse: factor(phong, phong.diffuse, "diffuse")?,
-                specular: factor(phong, phong.specular, "specular")?,
-                shininess: between(phong.shininess, 1e-6, 1e6).at("shininess")?,
-            })
-        }
-    }
-}
-
-fn factor(phong: &PhongDescription, own: Option<DVec3>, key: &str) -> Checked<DVec3> {
-    let missing = || Problem::new("is missing, and there is no color to stand in for it");
-    own.or(phong.color).ok_or_else(missing).and_then(color).at(key)
-}
-
 fn light(description: &LightDescription) -> Checked<Light> {
     Ok(match description {
         LightDescription::Rectangle(light) => Light::Rectangle {
@@ -193,8 +205,8 @@ fn light(description: &LightDescription) -> Checked<Light> {
     })
 }
 
-fn shape(description: &ShapeDescription, materials: &BTreeMap<&str, usize>) -> Checked<Shape> {
-    let (geometry, material) = match description {
+fn shape(description: &ShapeDescription, indices: &BTreeMap<&str, usize>, materials: &[Material]) -> Checked<Shape> {
+    let (geometry, name) = match description {
         ShapeDescription::Rectangle(shape) => {
             let rectangle = rectangle(shape.center, shape.size, shape.normal, shape.tangent)?;
             (Geometry::Rectangle(rectangle), &shape.material)
@@ -220,13 +232,17 @@ fn shape(description: &ShapeDescription, materials: &BTreeMap<&str, usize>) -> C
         }
     };
     let unknown = || {
-        let message = match materials.is_empty() {
-            true => format!("{material:?} is no material; the file has none"),
-            false => format!("{material:?} is no material; there are {}", list(materials.keys())),
-        };
-        Problem::new(message).at("material")
+        Problem::new(match indices.is_empty() {
+            true => format!("{name:?} is no material; the file has none"),
+            false => format!("{name:?} is no material; there are {}", list(indices.keys())),
+        })
     };
-    let material = *materials.get(material.as_str()).ok_or_else(unknown)?;
+    let material = *indices.get(name.as_str()).ok_or_else(unknown).at("material")?;
+    let has_tangents = !matches!(geometry, Geometry::Triangles(_));
+    check(has_tangents || materials[material].normal_map().is_none(), || {
+        format!("{name:?} must have no normal map here, as the sides of this shape have no tangents")
+    })
+    .at("material")?;
     Ok(Shape { geometry, material })
 }
 
@@ -377,6 +393,10 @@ fn number(x: f64) -> String {
 
 fn show(v: DVec3) -> String {
     format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
+}
+
+fn show_pair([x, y]: [f64; 2]) -> String {
+    format!("[{}, {}]", number(x), number(y))
 }
 
 fn show_all(points: &[DVec3]) -> String {

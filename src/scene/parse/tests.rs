@@ -1,7 +1,10 @@
 //! What is told of bad text, and the page that describes the format.
 
+use std::path::Path;
+
 use super::super::{
-    CameraDescription, LightDescription, MaterialDescription, Overrides, RenderDescription, Scene, ShapeDescription,
+    Assets, CameraDescription, LightDescription, MaterialDescription, Overrides, RenderDescription, Scene,
+    ShapeDescription, TextureDescription,
 };
 use super::*;
 
@@ -37,7 +40,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[film]\n",
             1,
-            "film: unknown key; the keys here are \"image\", \"camera\", \"render\", \"materials\", \"lights\", \"shapes\"",
+            "film: unknown key; the keys here are \"image\", \"camera\", \"render\", \"textures\", \"materials\", \"lights\", \"shapes\"",
         ),
         (
             "type = 'fisheye'",
@@ -93,7 +96,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[materials.red]\ncolor = [1, 0, 0]",
             1,
-            "materials.red.type: is missing; it is one of \"phong\"",
+            "materials.red.type: is missing; it is one of \"phong\", \"mirror\", \"glass\"",
         ),
         (
             "[materials.\"a b\"]\ntype = 'phong'\nshininess = 'x'",
@@ -189,7 +192,7 @@ fn a_scene_written_and_read_back_is_the_same() {
             "{}",
             path.display()
         );
-        description.validate().unwrap();
+        description.validate_with(&Assets::beside(Path::new(folder))).unwrap();
         assert!(text.starts_with("# "), "{} does not say what it shows", path.display());
         count += 1;
     }
@@ -247,6 +250,7 @@ fn the_page_has_every_key() {
     check_keys(&format!("{START}[render]"), "## `[render]`");
     check_keys(&format!("{START}[render.pixel_samples]"), "### Samples");
     check_types::<CameraDescription>(image, "[camera]", "[camera]");
+    check_types::<TextureDescription>(START, "[textures.a]", "[textures.NAME]");
     check_types::<MaterialDescription>(START, "[materials.a]", "[materials.NAME]");
     check_types::<LightDescription>(START, "[[lights]]", "[[lights]]");
     check_types::<ShapeDescription>(START, "[[shapes]]", "[[shapes]]");

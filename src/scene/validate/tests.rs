@@ -106,10 +106,11 @@ fn a_good_scene_is_what_its_file_says() {
     };
     assert_eq!(scene.camera, camera);
     let phong = |ambient, diffuse, specular, shininess| Material::Phong {
-        ambient,
-        diffuse,
-        specular,
+        ambient: Color::Plain(ambient),
+        diffuse: Color::Plain(diffuse),
+        specular: Color::Plain(specular),
         shininess,
+        normal_map: None,
     };
     let (white, red) = (DVec3::splat(0.7), DVec3::X);
     let dark_red = phong(red * 0.3, red * 0.4, red * 0.5, 16.0);

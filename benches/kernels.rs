@@ -1,0 +1,136 @@
+//! `cargo bench`: the twins one by one, and whole pictures on the first adapter and on the CPU.
+
+use std::hint::black_box;
+use std::path::Path;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use glam::{UVec2, Vec3};
+use wgray::cpu::Cpu;
+use wgray::cpu::ellipsoid::intersect_ellipsoid;
+use wgray::cpu::light::segments_to_light;
+use wgray::cpu::phong::{Lobes, phong_block};
+use wgray::cpu::ray::Ray;
+use wgray::cpu::rectangle::intersect_rectangle;
+use wgray::cpu::shadow::{Block, cone_to_light, may_block, shadow_bits};
+use wgray::cpu::surface::surface_at;
+use wgray::cpu::triangle::intersect_triangle;
+use wgray::film::Region;
+use wgray::gpu::{self, Choice, Gpu, Options, compose::Shaders};
+use wgray::job::{self, Backend, Cut};
+use wgray::pack::{ELLIPSOID, FAR, GRID, Packed, RECTANGLE, TRIANGLE, pack};
+use wgray::scene::{Overrides, Scene};
+
+fn scene(path: &str, size: u32) -> Packed {
+    let overrides = Overrides {
+        size: Some((size, size)),
+        light_samples: Some(16),
+        ..Overrides::default()
+    };
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    pack(&Scene::load(&path, &overrides).expect("the project's scenes are valid"))
+}
+
+/// One call of each function that a picture spends its time in.
+fn twins(criterion: &mut Criterion) {
+    let scene = scene("scenes/cornell.toml", 400);
+    let of_kind = |kind| {
+        scene
+            .primitives
+            .iter()
+            .position(|q| q.kind == kind)
+            .expect("cornell has all of these")
+    };
+    let [rectangle, triangle, ellipsoid] =
+        [RECTANGLE, TRIANGLE, ELLIPSOID].map(|kind| &scene.primitives[of_kind(kind)]);
+    let ray = Ray {
+        origin: Vec3::new(0.0, -3.0, 1.3),
+        direction: Vec3::new(0.1, 0.98, -0.2).normalize(),
+    };
+    let light = &scene.lights[0];
+    let surface = surface_at(rectangle, ray, 3.0, 1e-5);
+    let block = Block {
+        pattern: GRID,
+        side: 4,
+        first: 0,
+        count: 16,
+        group: 0,
+        key: UVec2::ZERO,
+    };
+    let cone = cone_to_light(light, surface.start);
+    let bound = scene.bounds[of_kind(ELLIPSOID)];
+
+    let mut group = criterion.benchmark_group("twins");
+    group.bench_function("intersect_rectangle", |b| {
+        b.iter(|| intersect_rectangle(rectangle, black_box(ray), FAR))
+    });
+    group.bench_function("intersect_triangle", |b| {
+        b.iter(|| intersect_triangle(triangle, black_box(ray), FAR))
+    });
+    group.bench_function("intersect_ellipsoid", |b| {
+        b.iter(|| intersect_ellipsoid(ellipsoid, black_box(ray), FAR))
+    });
+    group.bench_function("may_block", |b| b.iter(|| may_block(&black_box(bound), &cone)));
+    group.bench_function("shadow_bits of 16 samples, triangle", |b| {
+        b.iter(|| shadow_bits(TRIANGLE, triangle, black_box(surface.start), light, block))
+    });
+    group.bench_function("shadow_bits of 16 samples, ellipsoid", |b| {
+        b.iter(|| shadow_bits(ELLIPSOID, ellipsoid, black_box(surface.start), light, block))
+    });
+    group.bench_function("phong_block of 16 samples", |b| {
+        let to = segments_to_light(light, surface.start);
+        let none = Lobes {
+            diffuse: 0.0,
+            specular: 0.0,
+        };
+        b.iter(|| phong_block(surface, &scene.materials[0], to, block, black_box(0), 5, none))
+    });
+    group.finish();
+}
+
+/// Whole pictures; the throughput is in nominal rays.
+fn pictures(criterion: &mut Criterion) {
+    let device = gpu::choose(&Choice::Auto).expect("benchmarks need an adapter");
+    let adapter = device.info.name.clone();
+    for path in ["scenes/cornell.toml", "benches/peers/ellipsoids20.toml"] {
+        let scene = scene(path, 128);
+        let mut group = criterion.benchmark_group(path);
+        let rays = 128 * 128 * u64::from(scene.pixel_samples) * (1 + scene.light_samples());
+        group.throughput(Throughput::Elements(rays)).sample_size(20);
+        let new = |baked| {
+            let options = Options {
+                baked,
+                ..Options::best(&device)
+            };
+            Gpu::new(&device, &scene, &Shaders::built_in(), options).expect("the project's shaders compile")
+        };
+        let backends: [(String, Box<dyn Backend>); 3] = [
+            (format!("{adapter}, scene as constants"), Box::new(new(true))),
+            (format!("{adapter}, scene in buffers"), Box::new(new(false))),
+            ("cpu".to_string(), Box::new(Cpu::new(&scene))),
+        ];
+        for (name, mut backend) in backends {
+            group.bench_function(name, |b| {
+                b.iter(|| {
+                    let region = Region::whole(128, 128);
+                    let samples = scene.pixel_samples;
+                    job::render(
+                        backend.as_mut(),
+                        region,
+                        samples,
+                        &Cut::default(),
+                        &mut |_| true,
+                        &mut |film| {
+                            black_box(film);
+                            Ok(())
+                        },
+                    )
+                    .expect("nothing cancels it")
+                });
+            });
+        }
+        group.finish();
+    }
+}
+
+criterion_group!(benches, twins, pictures);
+criterion_main!(benches);

@@ -1,0 +1,64 @@
+// The footprint of a sample on a surface, in texture coordinates.
+
+struct Footprint {
+    uv: vec2f,
+    dx: vec2f,             // the edges of the parallelogram that the sample stands for
+    dy: vec2f,
+}
+
+// At a point of local space, whose position has the derivatives `dx` and `dy` in the world.
+fn surface_footprint(q: Primitive, local: vec3f, dx: vec3f, dy: vec3f) -> Footprint {
+    let uv = primitive_uv(q, local);
+    return Footprint(uv, uv_derivative(q, local, vector_to_local(q, dx)), uv_derivative(q, local, vector_to_local(q, dy)));
+}
+
+// Of `primitive_uv`, where the local point has the derivative d.
+fn uv_derivative(q: Primitive, local: vec3f, d: vec3f) -> vec2f {
+    if q.kind == RECTANGLE {
+        return d.xy * 0.5;
+    }
+    if q.kind == ELLIPSOID {
+        let r2 = max(local.x * local.x + local.y * local.y, 1e-12); // 0 at the poles
+        let du = (local.x * d.y - local.y * d.x) / r2;
+        let r = sqrt(r2);
+        let dv = r * d.z - local.z * ((local.x * d.x + local.y * d.y) / r);
+        return vec2f(du * 0.15915494309189535, dv * 0.3183098861837907);
+    }
+    return d.xy;
+}
+
+// The same in a texture's own coordinates.
+fn texture_footprint(t: Texture, f: Footprint) -> Footprint {
+    let dx = vec2f(t.u.x * f.dx.x + t.u.y * f.dx.y, t.v.x * f.dx.x + t.v.y * f.dx.y);
+    let dy = vec2f(t.u.x * f.dy.x + t.u.y * f.dy.y, t.v.x * f.dy.x + t.v.y * f.dy.y);
+    let uv = vec2f(t.u.x * f.uv.x + t.u.y * f.uv.y + t.u.z, t.v.x * f.uv.x + t.v.y * f.uv.y + t.v.z);
+    return Footprint(uv, dx, dy);
+}
+
+// An ellipse: the points p with p^T M^-1 p <= 1.
+struct Ellipse {
+    m: vec3f,              // M's elements xx, xy and yy
+    major: f32,            // the half axes' lengths
+    minor: f32,
+}
+
+// The ellipse with the conjugate half axes dx and dy, its minor axis made at least 1 / `anisotropy` of the major one.
+// The eigenvalues of J J^T for J = (dx, dy) are the squares of the half axes.
+fn footprint_ellipse(dx: vec2f, dy: vec2f, anisotropy: f32) -> Ellipse {
+    let p = dx.x * dx.x + dy.x * dy.x;
+    let q = dx.x * dx.y + dy.x * dy.y;
+    let r = dx.y * dx.y + dy.y * dy.y;
+    let half = 0.5 * (p - r);
+    let root = sqrt(half * half + q * q);
+    let large = 0.5 * (p + r) + root;
+    let area = dx.x * dy.y - dx.y * dy.x;
+    let least = large / (anisotropy * anisotropy);
+    let small = min(max(area * area / max(large, 1e-30), least), large);
+    // M = small I + (large - small) e e^T with the unit vector e of the major axis.
+    let wide = half >= 0.0;
+    let e = vec2f(select(q, half + root, wide), select(root - half, q, wide));
+    let e2 = e.x * e.x + e.y * e.y;
+    let stretch = select(0.0, (large - small) / e2, e2 > 0.0);
+    let m = vec3f(small + stretch * (e.x * e.x), stretch * (e.x * e.y), small + stretch * (e.y * e.y));
+    return Ellipse(m, sqrt(large), sqrt(small));
+}

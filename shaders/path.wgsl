@@ -1,0 +1,64 @@
+// Paths from the camera through mirrors and glass.
+
+struct Path {
+    ray: Ray,
+    differential: Differential,
+    throughput: vec3f,     // factor of the light that comes along the ray
+    depth: u32,            // bounces so far
+    branch: u32,           // bit i is set if this is the reflection at the split of bounce i
+}
+
+// What becomes of a path at a mirror or at glass.
+struct Scattered {
+    onward: Path,
+    other: Path,           // the second branch, if there is one
+    splits: bool,
+}
+
+fn mirrored_path(path: Path, surface: Surface, at: Arrival, material: Material) -> Scattered {
+    let onward = reflected_path(path, surface, at, path.throughput * material.specular);
+    return Scattered(onward, onward, false);
+}
+
+// A normal map's normal, if it faces the viewer and reflects to the surface's outer side; else the surface's own.
+fn usable_normal(surface: Surface, normal: vec3f) -> vec3f {
+    let outward = dot(reflected_direction(-surface.wo, normal), surface.normal) > 0.0;
+    return select(surface.normal, normal, outward & (dot(surface.wo, normal) > 0.0));
+}
+
+// Both branches at the first bounces; then the one that `random`, in [0, 1), chooses.
+fn glass_path(path: Path, surface: Surface, at: Arrival, material: Material, random: f32) -> Scattered {
+    let eta = select(material.shininess, 1.0 / material.shininess, surface.side > 0.0);
+    let cosine_i = max(dot(surface.wo, surface.normal), 1e-6);
+    let cosine_t = refracted_cosine(cosine_i, eta);
+    let reflectance = fresnel(cosine_i, cosine_t, eta);
+    let splits = (path.depth < SPLITS) & (reflectance > 0.0) & (reflectance < 1.0);
+    let share = select(1.0, reflectance, splits);
+    var reflection = reflected_path(path, surface, at, path.throughput * share);
+    let rest = select(1.0, 1.0 - reflectance, splits);
+    let refraction = refracted_path(path, surface, at, path.throughput * material.specular * rest, eta, cosine_i, cosine_t);
+    if splits {
+        reflection.branch |= 1u << path.depth;
+        return Scattered(refraction, reflection, true);
+    }
+    if random < reflectance {
+        return Scattered(reflection, reflection, false);
+    }
+    return Scattered(refraction, refraction, false);
+}
+
+fn reflected_path(path: Path, surface: Surface, at: Arrival, throughput: vec3f) -> Path {
+    let d = path.ray.direction;
+    let ray = Ray(surface.start, reflected_direction(d, surface.normal));
+    let differential = reflected_differential(at, d, surface.normal);
+    return Path(ray, differential, throughput, path.depth + 1u, path.branch);
+}
+
+fn refracted_path(path: Path, surface: Surface, at: Arrival, throughput: vec3f, eta: f32, cosine_i: f32,
+                  cosine_t: f32) -> Path {
+    let d = path.ray.direction;
+    let below = surface.position - (surface.start - surface.position);
+    let ray = Ray(below, refracted_direction(d, surface.normal, eta, cosine_i, cosine_t));
+    let differential = refracted_differential(at, d, surface.normal, eta, cosine_t);
+    return Path(ray, differential, throughput, path.depth + 1u, path.branch);
+}

@@ -1,0 +1,60 @@
+// Low-discrepancy sequences on the unit square, made random by integer hashing.
+
+// Point `index` of Sobol's (0,2)-sequence, Owen-scrambled by hashing: Burley, "Practical Hash-based Owen Scrambling",
+// JCGT 9(4), 2020. Sequences of different keys are independent, since the order of their points is scrambled too.
+fn sobol_sample(index: u32, key: vec2u) -> vec2f {
+    let i = shuffled_index(index, key.x ^ key.y);
+    let x = reverseBits(scramble(i, key.x));
+    let y = reverseBits(scramble(sobol_reversed(i), key.y));
+    return vec2f(unit_float(x), unit_float(y));
+}
+
+// The second coordinate of Sobol's point i as 32 binary digits, the first in the lowest bit; those of the first
+// coordinate are i itself. Digit j is the sum of the bits k of i with C(k, j) odd: Pascal's triangle modulo 2, here as
+// the product of its five factors (Ahmed, "An Implementation Algorithm of 2D Sobol Sequence Fast, Elegant, and
+// Compact", EGSR 2024).
+fn sobol_reversed(i: u32) -> u32 {
+    var x = i;
+    x ^= (x >> 1u) & 0x55555555u;
+    x ^= (x >> 2u) & 0x33333333u;
+    x ^= (x >> 4u) & 0x0f0f0f0fu;
+    x ^= (x >> 8u) & 0x00ff00ffu;
+    return x ^ (x >> 16u);
+}
+
+// Changes every bit in dependence on the lower ones, which is Owen's scrambling of digits in reverse order: the
+// permutation of Laine and Karras, "Stratified Sampling for Stochastic Transparency", EGSR 2011, with the constants of
+// Burley 2020, listing 2.
+fn scramble(digits: u32, seed: u32) -> u32 {
+    var x = digits + seed;
+    x ^= x * 0x6c50b47cu;
+    x ^= x * 0xb82f1e52u;
+    x ^= x * 0xc7afe638u;
+    x ^= x * 0x8d22f6e6u;
+    return x;
+}
+
+// A permutation of the indices that takes every aligned run of 2^k of them to another.
+fn shuffled_index(index: u32, seed: u32) -> u32 {
+    return reverseBits(scramble(reverseBits(index), seed));
+}
+
+// Point `index` of Halton's sequence in bases 2 and 3, in scrambled order and rotated on the torus (Cranley and
+// Patterson, "Randomization of Number Theoretic Methods for Multiple Integration", 1976).
+fn halton_sample(index: u32, key: vec2u) -> vec2f {
+    let i = shuffled_index(index, key.x ^ key.y);
+    let x = reverseBits(i) + key.x;
+    let y = (radical_inverse_3(i) + key.y % 14348907u) % 14348907u;
+    return vec2f(unit_float(x), f32(y) * 6.969171550963438e-8);
+}
+
+// The lowest 15 digits of i in base 3, in reverse order, as a whole number below 3^15.
+fn radical_inverse_3(i: u32) -> u32 {
+    var rest = i;
+    var reversed = 0u;
+    for (var k = 0u; k < 15u; k++) {
+        reversed = reversed * 3u + rest % 3u;
+        rest /= 3u;
+    }
+    return reversed;
+}

@@ -1,0 +1,188 @@
+// Colours from textures.
+
+fn texture_color(t: Texture, surface: Footprint) -> vec3f {
+    let f = texture_footprint(t, surface);
+    var x = vec3f(0.0);
+    if (TEXTURE_KINDS & 3u) != 0u {
+        if t.kind <= LINES {
+            x = vec3f(pattern_share(t.kind, t.parameter, f));
+        }
+    }
+    if (TEXTURE_KINDS & 4u) != 0u {
+        if t.kind == NEAREST {
+            x = nearest_color(t, f.uv);
+        }
+    }
+    if (TEXTURE_KINDS & 24u) != 0u {
+        if (t.kind == BILINEAR) | (t.kind == TRILINEAR) {
+            x = linear_color(t, f);
+        }
+    }
+    if (TEXTURE_KINDS & 32u) != 0u {
+        if t.kind == EWA {
+            x = ewa_color(t, f);
+        }
+    }
+    return t.first + (t.second - t.first) * x;
+}
+
+// One level of an image.
+struct Level {
+    start: u32,            // of its texels
+    width: u32,
+    height: u32,
+}
+
+fn level_of(t: Texture, i: u32) -> Level {
+    return Level(texels[t.texels + i], level_size(t.width, i), level_size(t.height, i));
+}
+
+fn load_texel(t: Texture, level: Level, x: i32, y: i32) -> vec3f {
+    let i = wrapped_index(y, level.height, t.wrap) * level.width + wrapped_index(x, level.width, t.wrap);
+    var color = vec3f(0.0);
+    if (TEXEL_FORMATS & 4u) != 0u {
+        if t.format == FLOAT {
+            let at = level.start + 3u * i;
+            color = vec3f(bitcast<f32>(texels[at]), bitcast<f32>(texels[at + 1u]), bitcast<f32>(texels[at + 2u]));
+        }
+    }
+    if (TEXEL_FORMATS & 3u) != 0u {
+        if t.format != FLOAT {
+            color = unpacked_color(texels[level.start + i], t.format);
+        }
+    }
+    return color;
+}
+
+fn nearest_color(t: Texture, uv: vec2f) -> vec3f {
+    let level = level_of(t, 0u);
+    let x = floor(near_coordinate(uv.x, t.wrap) * f32(level.width));
+    let y = floor(near_coordinate(uv.y, t.wrap) * f32(level.height));
+    return load_texel(t, level, i32(x), i32(y));
+}
+
+// The level in whose texels a length, measured in those of the finest level, is from 1 to 2; as a fraction between two.
+fn level_of_length(t: Texture, length: f32) -> f32 {
+    let coarsest = f32(t.levels - 1u);
+    let level = max(log2(max(length, 1.0)), 0.0);
+    return select(coarsest, level, (length < 1e9) & (level < coarsest));
+}
+
+// Bilinear at the finest level; TRILINEAR: between the two levels whose texels are about as large as the footprint's
+// longer edge, as graphics hardware does: Williams, "Pyramidal Parametrics", SIGGRAPH 1983.
+fn linear_color(t: Texture, f: Footprint) -> vec3f {
+    let size = vec2f(f32(t.width), f32(t.height));
+    let dx = f.dx * size;
+    let dy = f.dy * size;
+    let longest = sqrt(max(dx.x * dx.x + dx.y * dx.y, dy.x * dy.x + dy.y * dy.y));
+    let lod = select(0.0, level_of_length(t, longest), t.kind == TRILINEAR);
+    let finer = floor(lod);
+    let between = lod - finer;
+    var color = vec3f(0.0);
+    for (var i = 0u; i < select(1u, 2u, between > 0.0); i++) {
+        let sampled = bilinear_color(t, level_of(t, u32(i32(finer)) + i), f.uv);
+        color = select(color + (sampled - color) * between, sampled, i == 0u);
+    }
+    return color;
+}
+
+fn bilinear_color(t: Texture, level: Level, uv: vec2f) -> vec3f {
+    let x = near_coordinate(uv.x, t.wrap) * f32(level.width) - 0.5;
+    let y = near_coordinate(uv.y, t.wrap) * f32(level.height) - 0.5;
+    let x0 = floor(x);
+    let y0 = floor(y);
+    var rows = array(vec3f(0.0), vec3f(0.0));
+    for (var i = 0; i < 2; i++) {
+        let left = load_texel(t, level, i32(x0), i32(y0) + i);
+        let right = load_texel(t, level, i32(x0) + 1, i32(y0) + i);
+        rows[i] = left + (right - left) * (x - x0);
+    }
+    return rows[0] + (rows[1] - rows[0]) * (y - y0);
+}
+
+// The elliptical weighted average: Greene and Heckbert, "Creating Raster Omnimax Images from Multiple Perspective Views
+// Using the Elliptical Weighted Average Filter", IEEE CG&A 6(6), 1986; over a pyramid as in Pharr, Jakob and Humphreys,
+// "Physically Based Rendering", 3rd edition, 10.4.5: between the two levels where the minor axis is about a texel.
+fn ewa_color(t: Texture, f: Footprint) -> vec3f {
+    let size = vec2f(f32(t.width), f32(t.height));
+    let minor = footprint_ellipse(f.dx * size, f.dy * size, t.parameter).minor;
+    let lod = level_of_length(t, minor);
+    let finer = floor(lod);
+    let between = lod - finer;
+    let coarsest = lod >= f32(t.levels - 1u); // one texel: no footprint is needed, and it may have no bound
+    let dx = select(f.dx, vec2f(0.0), coarsest);
+    let dy = select(f.dy, vec2f(0.0), coarsest);
+    var color = vec3f(0.0);
+    for (var i = 0u; i < select(1u, 2u, between > 0.0); i++) {
+        let sampled = ewa_level_color(t, level_of(t, u32(i32(finer)) + i), f.uv, dx, dy);
+        color = select(color + (sampled - color) * between, sampled, i == 0u);
+    }
+    return color;
+}
+
+// The mean over one level's texels in the ellipse, which is widened by a texel's reconstruction: M + I. The mean is
+// taken of differences to one of the texels, so that a constant stays what it is.
+fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) -> vec3f {
+    let size = vec2f(f32(level.width), f32(level.height));
+    let m = footprint_ellipse(dx * size, dy * size, t.parameter).m;
+    let xx = m.x + 1.0;
+    let yy = m.z + 1.0;
+    let slope = m.y / yy;
+    let across = xx - m.y * slope; // the square of the half width of the row through the centre
+    let x = near_coordinate(uv.x, t.wrap) * size.x - 0.5;
+    let y = near_coordinate(uv.y, t.wrap) * size.y - 0.5;
+    let reach = sqrt(yy);
+    let first_row = -i32(floor(reach - y));
+    let last_row = i32(floor(y + reach));
+    var base = vec3f(0.0);
+    var sum = vec3f(0.0);
+    var total = 0.0;
+    for (var row = first_row; row <= last_row; row++) {
+        let h = f32(row) - y;
+        let along = h * h / yy;
+        let middle = x + h * slope;
+        let half = sqrt(across * max(1.0 - along, 0.0));
+        let last = i32(floor(middle + half));
+        for (var column = -i32(floor(half - middle)); column <= last; column++) {
+            let w = f32(column) - middle;
+            let weight = max(gaussian_weight(along + w * w / across), 0.0);
+            let color = load_texel(t, level, column, row);
+            base = select(base, color, total == 0.0);
+            sum += (color - base) * weight;
+            total += weight;
+        }
+    }
+    return base + sum * select(0.0, 1.0 / total, total > 0.0);
+}
+
+// A surface's material and normal as its textures make them.
+struct Appearance {
+    material: Material,
+    normal: vec3f,
+}
+
+// `lookups` is how many the material has at most.
+fn appearance(q: Primitive, material: Material, surface: Surface, at: Arrival, lookups: u32) -> Appearance {
+    var look = Appearance(material, surface.normal);
+    if lookups == 0u {
+        return look;
+    }
+    let local = point_to_local(q, surface.position);
+    let footprint = surface_footprint(q, local, at.x.position, at.y.position);
+    for (var i = 0u; i < lookups; i++) {
+        let lookup = material.lookups[i];
+        if lookup != 0u {
+            let t = load_texture(lookup & TEXTURE_NUMBER);
+            let color = texture_color(t, footprint);
+            look.material.ambient = select(look.material.ambient, color, (lookup & FOR_AMBIENT) != 0u);
+            look.material.diffuse = select(look.material.diffuse, color, (lookup & FOR_DIFFUSE) != 0u);
+            look.material.specular = select(look.material.specular, color, (lookup & FOR_SPECULAR) != 0u);
+            if NORMAL_MAPS == 1u {
+                if (lookup & FOR_NORMAL) != 0u {
+                    look.normal = mapped_normal(q, local, surface, t, color);
+                }
+            }
+        }
+    }
+    return look;
+}

@@ -1,0 +1,86 @@
+//! Twin of `shaders/footprint.wgsl`: the footprint of a sample on a surface, in texture coordinates.
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::{Vec2, Vec3};
+
+use super::math::{max, min};
+use super::ray::vector_to_local;
+use super::surface::primitive_uv;
+use crate::pack::{ELLIPSOID, Primitive, RECTANGLE, Texture};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footprint {
+    pub uv: Vec2,
+    pub dx: Vec2,
+    pub dy: Vec2,
+}
+
+pub fn surface_footprint(q: &Primitive, local: Vec3, dx: Vec3, dy: Vec3) -> Footprint {
+    Footprint {
+        uv: primitive_uv(q, local),
+        dx: uv_derivative(q, local, vector_to_local(q, dx)),
+        dy: uv_derivative(q, local, vector_to_local(q, dy)),
+    }
+}
+
+pub fn uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2 {
+    if q.kind == RECTANGLE {
+        return Vec2::new(d.x, d.y) * 0.5;
+    }
+    if q.kind == ELLIPSOID {
+        let r2 = max(local.x * local.x + local.y * local.y, 1e-12);
+        let du = (local.x * d.y - local.y * d.x) / r2;
+        let r = r2.sqrt();
+        let dv = r * d.z - local.z * ((local.x * d.x + local.y * d.y) / r);
+        return Vec2::new(du * (0.5 * FRAC_1_PI), dv * FRAC_1_PI);
+    }
+    Vec2::new(d.x, d.y)
+}
+
+pub fn texture_footprint(t: &Texture, f: Footprint) -> Footprint {
+    let dx = Vec2::new(t.u.x * f.dx.x + t.u.y * f.dx.y, t.v.x * f.dx.x + t.v.y * f.dx.y);
+    let dy = Vec2::new(t.u.x * f.dy.x + t.u.y * f.dy.y, t.v.x * f.dy.x + t.v.y * f.dy.y);
+    let uv = Vec2::new(
+        t.u.x * f.uv.x + t.u.y * f.uv.y + t.u.z,
+        t.v.x * f.uv.x + t.v.y * f.uv.y + t.v.z,
+    );
+    Footprint { uv, dx, dy }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ellipse {
+    pub m: Vec3,
+    pub major: f32,
+    pub minor: f32,
+}
+
+pub fn footprint_ellipse(dx: Vec2, dy: Vec2, anisotropy: f32) -> Ellipse {
+    let p = dx.x * dx.x + dy.x * dy.x;
+    let q = dx.x * dx.y + dy.x * dy.y;
+    let r = dx.y * dx.y + dy.y * dy.y;
+    let half = 0.5 * (p - r);
+    let root = (half * half + q * q).sqrt();
+    let large = 0.5 * (p + r) + root;
+    let area = dx.x * dy.y - dx.y * dy.x;
+    let least = large / (anisotropy * anisotropy);
+    let small = min(max(area * area / max(large, 1e-30), least), large);
+    let wide = half >= 0.0;
+    let e = if wide {
+        Vec2::new(half + root, q)
+    } else {
+        Vec2::new(q, root - half)
+    };
+    let e2 = e.x * e.x + e.y * e.y;
+    let stretch = if e2 > 0.0 { (large - small) / e2 } else { 0.0 };
+    let m = Vec3::new(
+        small + stretch * (e.x * e.x),
+        stretch * (e.x * e.y),
+        small + stretch * (e.y * e.y),
+    );
+    Ellipse {
+        m,
+        major: large.sqrt(),
+        minor: small.sqrt(),
+    }
+}

@@ -1,0 +1,122 @@
+//! Twin of `shaders/path.wgsl`: paths from the camera through mirrors and glass.
+
+use glam::Vec3;
+
+use super::differential::{Arrival, Differential, reflected_differential, refracted_differential};
+use super::math::{dot, max};
+use super::ray::Ray;
+use super::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
+use super::surface::Surface;
+use crate::pack::{Material, SPLITS};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Path {
+    pub ray: Ray,
+    pub differential: Differential,
+    pub throughput: Vec3,
+    pub depth: u32,
+    pub branch: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scattered {
+    pub onward: Path,
+    pub other: Path,
+    pub splits: bool,
+}
+
+pub fn mirrored_path(path: Path, surface: Surface, at: Arrival, material: &Material) -> Scattered {
+    let onward = reflected_path(path, surface, at, path.throughput * material.specular);
+    Scattered {
+        onward,
+        other: onward,
+        splits: false,
+    }
+}
+
+pub fn usable_normal(surface: Surface, normal: Vec3) -> Vec3 {
+    let outward = dot(reflected_direction(-surface.wo, normal), surface.normal) > 0.0;
+    if outward & (dot(surface.wo, normal) > 0.0) {
+        normal
+    } else {
+        surface.normal
+    }
+}
+
+pub fn glass_path(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Scattered {
+    let eta = if surface.side > 0.0 {
+        1.0 / material.shininess
+    } else {
+        material.shininess
+    };
+    let cosine_i = max(dot(surface.wo, surface.normal), 1e-6);
+    let cosine_t = refracted_cosine(cosine_i, eta);
+    let reflectance = fresnel(cosine_i, cosine_t, eta);
+    let splits = (path.depth < SPLITS) & (reflectance > 0.0) & (reflectance < 1.0);
+    let share = if splits { reflectance } else { 1.0 };
+    let mut reflection = reflected_path(path, surface, at, path.throughput * share);
+    let rest = if splits { 1.0 - reflectance } else { 1.0 };
+    let throughput = path.throughput * material.specular * rest;
+    let refraction = refracted_path(path, surface, at, throughput, eta, cosine_i, cosine_t);
+    if splits {
+        reflection.branch |= 1 << path.depth;
+        return Scattered {
+            onward: refraction,
+            other: reflection,
+            splits: true,
+        };
+    }
+    if random < reflectance {
+        return Scattered {
+            onward: reflection,
+            other: reflection,
+            splits: false,
+        };
+    }
+    Scattered {
+        onward: refraction,
+        other: refraction,
+        splits: false,
+    }
+}
+
+pub fn reflected_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3) -> Path {
+    let d = path.ray.direction;
+    let ray = Ray {
+        origin: surface.start,
+        direction: reflected_direction(d, surface.normal),
+    };
+    let differential = reflected_differential(at, d, surface.normal);
+    Path {
+        ray,
+        differential,
+        throughput,
+        depth: path.depth + 1,
+        branch: path.branch,
+    }
+}
+
+pub fn refracted_path(
+    path: Path,
+    surface: Surface,
+    at: Arrival,
+    throughput: Vec3,
+    eta: f32,
+    cosine_i: f32,
+    cosine_t: f32,
+) -> Path {
+    let d = path.ray.direction;
+    let below = surface.position - (surface.start - surface.position);
+    let ray = Ray {
+        origin: below,
+        direction: refracted_direction(d, surface.normal, eta, cosine_i, cosine_t),
+    };
+    let differential = refracted_differential(at, d, surface.normal, eta, cosine_t);
+    Path {
+        ray,
+        differential,
+        throughput,
+        depth: path.depth + 1,
+        branch: path.branch,
+    }
+}

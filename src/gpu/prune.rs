@@ -1,0 +1,83 @@
+//! Drops what a kernel's constants rule out. Drivers do so as well, but later than they inline functions and at far
+//! greater cost.
+
+use naga::compact::{KeepUnused, compact};
+use naga::{Arena, Block, Expression, Literal, Module, Statement};
+
+/// Replaces every branch whose condition is a constant by the block that is taken, and removes what is unused then.
+pub fn prune(module: &mut Module) {
+    let functions = module.functions.iter_mut().map(|(_, function)| function);
+    let entry_points = module
+        .entry_points
+        .iter_mut()
+        .map(|entry_point| &mut entry_point.function);
+    for function in functions.chain(entry_points) {
+        let body = std::mem::take(&mut function.body);
+        function.named_expressions.clear(); // they count as used, those of dropped blocks too
+        function.body = taken(body, &function.expressions).0;
+    }
+    compact(module, KeepUnused::No);
+}
+
+/// A block without the branches that are not taken, and whether it ends in a statement that leaves it.
+fn taken(block: Block, expressions: &Arena<Expression>) -> (Block, bool) {
+    let mut out = Block::new();
+    for (statement, span) in block.span_into_iter() {
+        match statement {
+            Statement::If {
+                condition,
+                accept,
+                reject,
+            } => match expressions[condition] {
+                Expression::Literal(Literal::Bool(value)) => {
+                    let (inner, leaves) = taken(if value { accept } else { reject }, expressions);
+                    inner
+                        .span_into_iter()
+                        .for_each(|(statement, span)| out.push(statement, span));
+                    if leaves {
+                        return (out, true);
+                    }
+                }
+                _ => {
+                    let (accept, reject) = (taken(accept, expressions).0, taken(reject, expressions).0);
+                    out.push(
+                        Statement::If {
+                            condition,
+                            accept,
+                            reject,
+                        },
+                        span,
+                    );
+                }
+            },
+            Statement::Block(inner) => {
+                let (inner, leaves) = taken(inner, expressions);
+                out.push(Statement::Block(inner), span);
+                if leaves {
+                    return (out, true);
+                }
+            }
+            Statement::Loop {
+                body,
+                continuing,
+                break_if,
+            } => {
+                let (body, continuing) = (taken(body, expressions).0, taken(continuing, expressions).0);
+                out.push(
+                    Statement::Loop {
+                        body,
+                        continuing,
+                        break_if,
+                    },
+                    span,
+                );
+            }
+            Statement::Return { .. } | Statement::Break | Statement::Continue | Statement::Kill => {
+                out.push(statement, span);
+                return (out, true);
+            }
+            other => out.push(other, span),
+        }
+    }
+    (out, false)
+}

@@ -1,0 +1,101 @@
+//! Mip pyramids: Williams, "Pyramidal Parametrics", SIGGRAPH 1983.
+
+use glam::DVec3;
+
+use crate::scene::image_file::{linear_to_srgb, srgb_to_linear};
+use crate::scene::{Encoding, Image, Texels};
+
+/// Adds an image's levels to the texels, from the finest on, each row by row from the bottom; a table of the levels'
+/// places comes before them. Returns the table's place.
+pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
+    let table = texels.len();
+    texels.resize(table + levels as usize, 0);
+    let mut level = finest(image);
+    for i in 0..levels as usize {
+        texels[table + i] = texels.len() as u32;
+        match &image.texels {
+            Texels::Bytes(encoding, _) => texels.extend(level.texels.iter().map(|c| packed(*c, *encoding))),
+            Texels::Floats(_) => texels.extend(
+                level
+                    .texels
+                    .iter()
+                    .flat_map(|c| c.as_vec3().to_array())
+                    .map(f32::to_bits),
+            ),
+        }
+        level = level.half();
+    }
+    table as u32
+}
+
+/// A level in linear light.
+struct Level {
+    width: usize,
+    height: usize,
+    texels: Vec<DVec3>,
+}
+
+fn finest(image: &Image) -> Level {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let texel: Box<dyn Fn(usize) -> DVec3> = match &image.texels {
+        Texels::Bytes(encoding, bytes) => {
+            let decode = |value: u32| match encoding {
+                Encoding::Srgb => srgb_to_linear(f64::from(value) / 255.0),
+                Encoding::Linear => f64::from(value) / 255.0,
+            };
+            let table: Vec<f64> = (0..256).map(decode).collect();
+            Box::new(move |i| DVec3::from_array(bytes[i].map(|byte| table[usize::from(byte)])))
+        }
+        Texels::Floats(floats) => Box::new(|i| DVec3::from_array(floats[i].map(f64::from))),
+    };
+    let rows = (0..height).rev();
+    let texels = rows.flat_map(|y| (y * width..(y + 1) * width).map(&texel)).collect();
+    Level { width, height, texels }
+}
+
+impl Level {
+    /// The next level: each texel the mean over the part of this level that it covers.
+    fn half(&self) -> Level {
+        let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
+        let (columns, rows) = (covers(self.width, width), covers(self.height, height));
+        let mut texels = Vec::with_capacity(width * height);
+        for row in &rows {
+            for column in &columns {
+                let mut sum = DVec3::ZERO;
+                for (y, v) in row {
+                    for (x, u) in column {
+                        sum += self.texels[y * self.width + x] * (u * v);
+                    }
+                }
+                texels.push(sum);
+            }
+        }
+        Level { width, height, texels }
+    }
+}
+
+/// Which of `from` texels in a line each of `to` covers, and with what weight; `to` is half of `from`, rounded down.
+fn covers(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
+    let size = from as f64 / to as f64;
+    let cover = |i: usize| {
+        let (start, end) = (i as f64 * size, (i + 1) as f64 * size);
+        let inside = move |j: usize| (end.min((j + 1) as f64) - start.max(j as f64)) / size;
+        let touched = start as usize..from.min(end.ceil() as usize);
+        touched
+            .map(move |j| (j, inside(j)))
+            .filter(|(_, weight)| *weight > 0.0)
+            .collect()
+    };
+    (0..to).map(cover).collect()
+}
+
+fn packed(color: DVec3, encoding: Encoding) -> u32 {
+    let byte = |x: f64| {
+        let x = match encoding {
+            Encoding::Srgb => linear_to_srgb(x),
+            Encoding::Linear => x,
+        };
+        (x * 255.0).round() as u32
+    };
+    byte(color.x) | byte(color.y) << 8 | byte(color.z) << 16
+}

@@ -1,0 +1,174 @@
+//! What a scene file says of textures, and of the colours that may come from them.
+
+use std::fmt;
+
+use glam::DVec3;
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Serialize};
+use toml::Table;
+
+use super::description::{ReadError, Tagged, tagged};
+use super::{Encoding, Filter, Wrap};
+
+/// A colour of a material: `[r, g, b]` or `{ texture = "NAME" }`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum ColorDescription {
+    /// Linear RGB.
+    Plain(DVec3),
+    /// From a texture.
+    Texture(TextureReference),
+}
+
+impl Default for ColorDescription {
+    fn default() -> Self {
+        Self::Plain(DVec3::ONE)
+    }
+}
+
+// By hand: serde's untagged enums lose the place and the reason of an error.
+impl<'de> Deserialize<'de> for ColorDescription {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct ColorVisitor;
+
+        impl<'de> Visitor<'de> for ColorVisitor {
+            type Value = ColorDescription;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a list of 3 numbers or { texture = NAME }")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
+                DVec3::deserialize(SeqAccessDeserializer::new(seq)).map(ColorDescription::Plain)
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+                TextureReference::deserialize(MapAccessDeserializer::new(map)).map(ColorDescription::Texture)
+            }
+        }
+
+        deserializer.deserialize_any(ColorVisitor)
+    }
+}
+
+/// `{ texture = "NAME" }`
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct TextureReference {
+    /// Name of the texture.
+    pub texture: String,
+}
+
+/// `{ texture = "NAME", strength = 1 }`
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct NormalMapDescription {
+    /// Name of the texture.
+    pub texture: String,
+    /// Factor of the slopes.
+    #[serde(default = "one")]
+    pub strength: f64,
+}
+
+tagged! {
+    /// `[textures.NAME]`
+    TextureDescription {
+        /// One colour.
+        "constant" => Constant(ConstantDescription),
+        /// Squares of two colours.
+        "checker" => Checker(CheckerDescription),
+        /// Lines.
+        "grid" => Grid(GridDescription),
+        /// An image file.
+        "image" => Image(ImageTextureDescription),
+    }
+}
+
+/// One colour.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConstantDescription {
+    /// Linear RGB.
+    pub color: DVec3,
+}
+
+/// Squares of two colours, of side 1.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct CheckerDescription {
+    /// Of the square from (0, 0) to (1, 1); linear RGB.
+    pub even: DVec3,
+    /// Of its neighbours.
+    pub odd: DVec3,
+    /// Factors of u and v.
+    #[serde(default = "ones")]
+    pub scale: [f64; 2],
+    /// Counter-clockwise, in degrees.
+    #[serde(default)]
+    pub rotate: f64,
+    /// Added to u and v.
+    #[serde(default)]
+    pub offset: [f64; 2],
+}
+
+/// Lines around whole numbers.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct GridDescription {
+    /// Between the lines; linear RGB.
+    pub cell: DVec3,
+    /// On the lines.
+    pub line: DVec3,
+    /// Of the lines; cells with their lines have width 1.
+    pub line_width: f64,
+    /// Factors of u and v.
+    #[serde(default = "ones")]
+    pub scale: [f64; 2],
+    /// Counter-clockwise, in degrees.
+    #[serde(default)]
+    pub rotate: f64,
+    /// Added to u and v.
+    #[serde(default)]
+    pub offset: [f64; 2],
+}
+
+/// An image file.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImageTextureDescription {
+    /// Its path, relative to the scene file.
+    pub file: String,
+    /// What its values mean; sRGB if absent, but EXR and HDR files are linear.
+    pub encoding: Option<Encoding>,
+    /// Beyond the edges.
+    #[serde(default)]
+    pub wrap: Wrap,
+    /// How its colours are found.
+    #[serde(default)]
+    pub filter: Filter,
+    /// The largest ratio of a footprint's axes.
+    #[serde(default = "sixteen")]
+    pub max_anisotropy: f64,
+    /// Factors of u and v.
+    #[serde(default = "ones")]
+    pub scale: [f64; 2],
+    /// Counter-clockwise, in degrees.
+    #[serde(default)]
+    pub rotate: f64,
+    /// Added to u and v.
+    #[serde(default)]
+    pub offset: [f64; 2],
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn sixteen() -> f64 {
+    16.0
+}
+
+fn ones() -> [f64; 2] {
+    [1.0, 1.0]
+}

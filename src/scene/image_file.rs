@@ -1,0 +1,166 @@
+//! Image files that textures name: found, decoded within limits, and checked.
+
+use std::fs::File;
+use std::io::{Cursor, Read as _};
+use std::path::{Path, PathBuf};
+
+use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+
+use super::texture::{Encoding, Image, Texels};
+
+/// Most texels along a side.
+const LONGEST_SIDE: u32 = 16_384;
+/// The largest file, and the largest memory that decoding may take, in bytes.
+const LARGEST_FILE: u64 = 256 << 20;
+const LARGEST_IMAGE: u64 = 512 << 20;
+/// The largest texel, as of any colour.
+const BRIGHTEST: f32 = 1e6;
+
+/// Where the files that a scene names are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Assets {
+    /// Their names are relative to this folder, the scene file's.
+    pub folder: PathBuf,
+    /// They must lie in this one.
+    pub root: PathBuf,
+}
+
+impl Assets {
+    /// Files in a folder.
+    pub fn beside(folder: &Path) -> Assets {
+        let folder = match folder.as_os_str().is_empty() {
+            true => Path::new("."),
+            false => folder,
+        };
+        Assets {
+            folder: folder.to_owned(),
+            root: folder.to_owned(),
+        }
+    }
+
+    /// Reads an image. `encoding` is what its values mean, if that is said. The error is the value with the rule.
+    pub(super) fn image(&self, file: &str, encoding: Option<Encoding>) -> Result<Image, String> {
+        let bytes = self.read(file)?;
+        let format = image::guess_format(&bytes)
+            .ok()
+            .filter(|format| NAMES.iter().any(|(known, _)| known == format));
+        let format = format.ok_or_else(|| format!("{file:?} must be a PNG, JPEG, EXR or HDR file"))?;
+        let named = ImageFormat::from_path(file).ok();
+        if named.is_some_and(|named| named != format) {
+            return Err(format!(
+                "{file:?} must be what its name says; it is a file of type {}",
+                name(format)
+            ));
+        }
+        let is_float = matches!(format, ImageFormat::OpenExr | ImageFormat::Hdr);
+        if is_float && encoding == Some(Encoding::Srgb) {
+            return Err(format!(
+                "{file:?} must not be \"srgb\": files of type {} are linear",
+                name(format)
+            ));
+        }
+        let mut reader = ImageReader::with_format(Cursor::new(&bytes), format);
+        let mut limits = Limits::default();
+        limits.max_image_width = Some(LONGEST_SIDE);
+        limits.max_image_height = Some(LONGEST_SIDE);
+        limits.max_alloc = Some(LARGEST_IMAGE);
+        reader.limits(limits);
+        let decoded = reader.decode().map_err(|error| {
+            let sides = format!("sound, and have at most {LONGEST_SIDE} texels along a side");
+            format!("{file:?} must be {sides}: {error}")
+        })?;
+        let (width, height) = (decoded.width(), decoded.height());
+        if width == 0 || height == 0 {
+            return Err(format!(
+                "{file:?} must have a texel at least; its size is {width} x {height}"
+            ));
+        }
+        let texels = texels(decoded, is_float, encoding.unwrap_or(Encoding::Srgb));
+        if let Texels::Floats(values) = &texels {
+            let bad = |value: &f32| !(0.0..=BRIGHTEST).contains(value);
+            if let Some(i) = values.iter().position(|texel| texel.iter().any(bad)) {
+                let (x, y) = (i as u32 % width, i as u32 / width);
+                let [r, g, b] = values[i];
+                let rule = "the values of each must be finite, from 0 to 1e6";
+                return Err(format!("{file:?} has the texel [{r}, {g}, {b}] at ({x}, {y}); {rule}"));
+            }
+        }
+        Ok(Image { width, height, texels })
+    }
+
+    fn read(&self, file: &str) -> Result<Vec<u8>, String> {
+        let unreadable = |error: std::io::Error| format!("{file:?} cannot be read: {error}");
+        let path = self.folder.join(file).canonicalize().map_err(unreadable)?;
+        let root = self.root.canonicalize().map_err(|error| {
+            let root = self.root.display();
+            format!("{file:?} must lie in {root}, which cannot be found: {error}")
+        })?;
+        if !path.starts_with(&root) {
+            let root = self.root.display();
+            return Err(format!("{file:?} must not leave {root}, unless --asset-root allows it"));
+        }
+        if !path.is_file() {
+            return Err(format!("{file:?} must be a file"));
+        }
+        let mut bytes = Vec::new();
+        let file_handle = File::open(&path).map_err(unreadable)?;
+        file_handle
+            .take(LARGEST_FILE + 1)
+            .read_to_end(&mut bytes)
+            .map_err(unreadable)?;
+        if bytes.len() as u64 > LARGEST_FILE {
+            return Err(format!("{file:?} must not be larger than {} MiB", LARGEST_FILE >> 20));
+        }
+        Ok(bytes)
+    }
+}
+
+const NAMES: [(ImageFormat, &str); 4] = [
+    (ImageFormat::Png, "PNG"),
+    (ImageFormat::Jpeg, "JPEG"),
+    (ImageFormat::OpenExr, "EXR"),
+    (ImageFormat::Hdr, "HDR"),
+];
+
+fn name(format: ImageFormat) -> &'static str {
+    NAMES
+        .iter()
+        .find(|(known, _)| *known == format)
+        .map_or("unknown", |(_, name)| name)
+}
+
+fn texels(image: DynamicImage, is_float: bool, encoding: Encoding) -> Texels {
+    use DynamicImage::{ImageLuma16, ImageLumaA16, ImageRgb16, ImageRgba16};
+    if is_float {
+        return Texels::Floats(image.into_rgb32f().pixels().map(|texel| texel.0).collect());
+    }
+    if matches!(image, ImageLuma16(_) | ImageLumaA16(_) | ImageRgb16(_) | ImageRgba16(_)) {
+        let decode = |value: u16| {
+            let value = f64::from(value) / 65_535.0;
+            match encoding {
+                Encoding::Srgb => srgb_to_linear(value) as f32,
+                Encoding::Linear => value as f32,
+            }
+        };
+        return Texels::Floats(image.into_rgb16().pixels().map(|texel| texel.0.map(decode)).collect());
+    }
+    Texels::Bytes(encoding, image.into_rgb8().pixels().map(|texel| texel.0).collect())
+}
+
+/// The linear value of one by the sRGB curve: IEC 61966-2-1.
+pub(crate) fn srgb_to_linear(x: f64) -> f64 {
+    if x <= 0.04045 {
+        x / 12.92
+    } else {
+        ((x + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+/// The value by the sRGB curve of a linear one.
+pub(crate) fn linear_to_srgb(x: f64) -> f64 {
+    if x <= 0.003_130_8 {
+        x * 12.92
+    } else {
+        1.055 * x.powf(1.0 / 2.4) - 0.055
+    }
+}

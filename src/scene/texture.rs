@@ -1,0 +1,149 @@
+//! Textures that have been checked.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// A colour of a material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Color {
+    /// The same everywhere; linear RGB.
+    Plain(DVec3),
+    /// From a texture: index into [`Scene::textures`](super::Scene::textures).
+    Texture(usize),
+}
+
+/// A texture in tangent space that gives normals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NormalMap {
+    /// Index into [`Scene::textures`](super::Scene::textures) of a [`Pattern::Image`] with linear texels.
+    pub texture: usize,
+    /// Factor of the slopes.
+    pub strength: f64,
+}
+
+/// A colour for each point of a plane.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    /// What is on it.
+    pub pattern: TexturePattern,
+    /// Rows of the map from a surface's (u, v, 1) to the plane's (u, v); invertible.
+    pub transform: [DVec3; 2],
+}
+
+/// What is on a texture. Colours are linear RGB.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TexturePattern {
+    /// One colour.
+    Constant(DVec3),
+    /// Squares of side 1, the one from (0, 0) to (1, 1) being even.
+    Checker {
+        /// Where the floors of u and v have an even sum.
+        even: DVec3,
+        /// Elsewhere.
+        odd: DVec3,
+    },
+    /// Lines around all whole numbers.
+    Grid {
+        /// Between the lines.
+        cell: DVec3,
+        /// On the lines.
+        line: DVec3,
+        /// The lines' width, in (0, 1).
+        line_width: f64,
+    },
+    /// An image on the square from (0, 0), its lower left corner, to (1, 1).
+    Image {
+        /// The texels.
+        image: Arc<Image>,
+        /// Beyond the square.
+        wrap: Wrap,
+        /// How its colours are found.
+        filter: Filter,
+        /// The largest ratio of a footprint's axes that [`Filter::Ewa`] follows, at least 1.
+        max_anisotropy: f64,
+    },
+}
+
+/// An image beyond its edges. In a file the names are in snake case: `"repeat"`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Wrap {
+    /// Again and again.
+    #[default]
+    Repeat,
+    /// The colour of the nearest edge.
+    Clamp,
+    /// Again and again, every other one mirrored.
+    Mirror,
+}
+
+/// How an image's colours are found. In a file the names are in snake case: `"ewa"`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Filter {
+    /// The texel that the point lies in.
+    Nearest,
+    /// Between the four nearest texels.
+    Bilinear,
+    /// Bilinear on the two nearest levels of a mip pyramid.
+    Trilinear,
+    /// The elliptical weighted average over the footprint, on the two nearest levels.
+    #[default]
+    Ewa,
+}
+
+impl Filter {
+    /// Whether it reads the coarser levels of a mip pyramid.
+    pub const fn needs_levels(self) -> bool {
+        matches!(self, Filter::Trilinear | Filter::Ewa)
+    }
+}
+
+/// What an image's 8-bit and 16-bit values mean. In a file the names are in snake case: `"srgb"`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Encoding {
+    /// Colours by the curve of IEC 61966-2-1.
+    Srgb,
+    /// Numbers.
+    Linear,
+}
+
+/// The texels of an image, row by row from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Texels in a row, at least 1.
+    pub width: u32,
+    /// Rows, at least 1.
+    pub height: u32,
+    /// Red, green and blue of each.
+    pub texels: Texels,
+}
+
+/// Texels by their type.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Texels {
+    /// 8 bits.
+    Bytes(Encoding, Vec<[u8; 3]>),
+    /// Linear floats.
+    Floats(Vec<[f32; 3]>),
+}
+
+impl Image {
+    /// Levels of its pyramid: each half the size of the one before, down to one texel.
+    pub fn levels(&self) -> u32 {
+        self.width.max(self.height).ilog2() + 1
+    }
+
+    /// 32-bit words that so many levels take, with the table of their places.
+    pub fn words(&self, levels: u32) -> u64 {
+        let texel = match self.texels {
+            Texels::Bytes(..) => 1,
+            Texels::Floats(_) => 3,
+        };
+        let sizes = (0..levels).map(|i| u64::from((self.width >> i).max(1)) * u64::from((self.height >> i).max(1)));
+        u64::from(levels) + texel * sizes.sum::<u64>()
+    }
+}

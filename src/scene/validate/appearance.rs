@@ -1,0 +1,217 @@
+//! The rules of materials and textures.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::super::{
+    Assets, ColorDescription, Encoding, Material, MaterialDescription, NormalMap, NormalMapDescription,
+    PhongDescription, Texels, Texture, TextureDescription, TexturePattern,
+};
+use super::{At, BTreeMap, Checked, Color, Problem, between, check, color, list, number, show_pair};
+
+/// What all texels together may take, in bytes: what devices let a shader see of one buffer.
+const TEXEL_MEMORY: u64 = 128 << 20;
+/// Largest index of refraction.
+const DENSEST: f64 = 100.0;
+/// Largest ratio of a footprint's axes.
+const LONGEST_FOOTPRINT: f64 = 64.0;
+/// The largest factor of, and addend to, a texture coordinate.
+const FARTHEST_COORDINATE: f64 = 1e6;
+
+pub(super) fn textures(descriptions: &BTreeMap<String, TextureDescription>, assets: &Assets) -> Checked<Vec<Texture>> {
+    let mut taken = 0;
+    let textures = descriptions
+        .iter()
+        .map(|(name, description)| texture(description, assets, &mut taken).at(name.as_str()));
+    textures.collect()
+}
+
+/// `taken` is the memory of the textures so far, in bytes.
+fn texture(description: &TextureDescription, assets: &Assets, taken: &mut u64) -> Checked<Texture> {
+    Ok(match description {
+        TextureDescription::Constant(constant) => Texture {
+            pattern: TexturePattern::Constant(color(constant.color).at("color")?),
+            transform: [DVec3::X, DVec3::Y],
+        },
+        TextureDescription::Checker(checker) => Texture {
+            pattern: TexturePattern::Checker {
+                even: color(checker.even).at("even")?,
+                odd: color(checker.odd).at("odd")?,
+            },
+            transform: transform(checker.scale, checker.rotate, checker.offset)?,
+        },
+        TextureDescription::Grid(grid) => {
+            let line_width = grid.line_width;
+            check(line_width > 0.0 && line_width < 1.0, || {
+                format!("{} must be greater than 0 and less than 1", number(line_width))
+            })
+            .at("line_width")?;
+            Texture {
+                pattern: TexturePattern::Grid {
+                    cell: color(grid.cell).at("cell")?,
+                    line: color(grid.line).at("line")?,
+                    line_width,
+                },
+                transform: transform(grid.scale, grid.rotate, grid.offset)?,
+            }
+        }
+        TextureDescription::Image(texture) => {
+            let max_anisotropy = between(texture.max_anisotropy, 1.0, LONGEST_FOOTPRINT).at("max_anisotropy")?;
+            let transform = transform(texture.scale, texture.rotate, texture.offset)?;
+            let image = assets
+                .image(&texture.file, texture.encoding)
+                .map_err(Problem::new)
+                .at("file")?;
+            let levels = if texture.filter.needs_levels() {
+                image.levels()
+            } else {
+                1
+            };
+            let bytes = 4 * image.words(levels);
+            check(*taken + bytes <= TEXEL_MEMORY, || {
+                let mib = |bytes: u64| format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20));
+                let (file, bytes, taken) = (&texture.file, mib(bytes), mib(*taken));
+                let limit = mib(TEXEL_MEMORY);
+                format!("{file:?} takes {bytes}, the textures before it {taken}; together they must fit {limit}")
+            })
+            .at("file")?;
+            *taken += bytes;
+            Texture {
+                pattern: TexturePattern::Image {
+                    image: Arc::new(image),
+                    wrap: texture.wrap,
+                    filter: texture.filter,
+                    max_anisotropy,
+                },
+                transform,
+            }
+        }
+    })
+}
+
+/// (u, v) is first scaled, then turned, then moved.
+fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 2]> {
+    let valid = scale
+        .iter()
+        .all(|s| (1.0 / FARTHEST_COORDINATE..=FARTHEST_COORDINATE).contains(&s.abs()));
+    let limits = || (number(1.0 / FARTHEST_COORDINATE), number(FARTHEST_COORDINATE));
+    check(valid, || {
+        let (low, high) = limits();
+        format!(
+            "{} must be finite and not 0: from {low} to {high}, or negative",
+            show_pair(scale)
+        )
+    })
+    .at("scale")?;
+    let rotate = between(rotate, -360.0, 360.0).at("rotate")?;
+    check(offset.iter().all(|x| x.abs() <= FARTHEST_COORDINATE), || {
+        let high = limits().1;
+        format!("{} must be finite, from -{high} to {high}", show_pair(offset))
+    })
+    .at("offset")?;
+    let (sin, cos) = rotate.to_radians().sin_cos();
+    Ok([
+        DVec3::new(cos * scale[0], -sin * scale[1], offset[0]),
+        DVec3::new(sin * scale[0], cos * scale[1], offset[1]),
+    ])
+}
+
+/// The textures that materials may name.
+pub(super) struct Textures<'a> {
+    pub(super) names: Vec<&'a str>,
+    pub(super) textures: &'a [Texture],
+}
+
+impl Textures<'_> {
+    fn find(&self, name: &str) -> Checked<usize> {
+        let unknown = || {
+            Problem::new(match self.names.is_empty() {
+                true => format!("{name:?} is no texture; the file has none"),
+                false => format!("{name:?} is no texture; there are {}", list(&self.names)),
+            })
+        };
+        self.names
+            .iter()
+            .position(|known| *known == name)
+            .ok_or_else(unknown)
+            .at("texture")
+    }
+
+    fn color(&self, description: &ColorDescription) -> Checked<Color> {
+        Ok(match description {
+            ColorDescription::Plain(plain) => Color::Plain(color(*plain)?),
+            ColorDescription::Texture(reference) => Color::Texture(self.find(&reference.texture)?),
+        })
+    }
+
+    /// The factor of a mirror or of glass, which cannot give more light than it gets.
+    fn tint(&self, description: &ColorDescription) -> Checked<Color> {
+        if let ColorDescription::Plain(tint) = description {
+            for x in tint.to_array() {
+                between(x, 0.0, 1.0)?;
+            }
+        }
+        self.color(description)
+    }
+
+    fn normal_map(&self, description: &Option<NormalMapDescription>) -> Checked<Option<NormalMap>> {
+        let Some(NormalMapDescription {
+            texture: name,
+            strength,
+        }) = description
+        else {
+            return Ok(None);
+        };
+        let texture = self.find(name)?;
+        let TexturePattern::Image { image, .. } = &self.textures[texture].pattern else {
+            return Err(Problem::new(format!("{name:?} must be a texture of type \"image\"")).at("texture"));
+        };
+        check(!matches!(image.texels, Texels::Bytes(Encoding::Srgb, _)), || {
+            format!("{name:?} must have encoding = \"linear\" to be a normal map")
+        })
+        .at("texture")?;
+        let strength = between(*strength, 0.0, 100.0).at("strength")?;
+        Ok(Some(NormalMap { texture, strength }))
+    }
+
+    pub(super) fn material(&self, description: &MaterialDescription) -> Checked<Material> {
+        Ok(match description {
+            MaterialDescription::Phong(phong) => {
+                if let Some(all) = &phong.color {
+                    self.color(all).at("color")?;
+                }
+                Material::Phong {
+                    ambient: self.factor(phong, &phong.ambient, "ambient")?,
+                    diffuse: self.factor(phong, &phong.diffuse, "diffuse")?,
+                    specular: self.factor(phong, &phong.specular, "specular")?,
+                    shininess: between(phong.shininess, 1e-6, 1e6).at("shininess")?,
+                    normal_map: self.normal_map(&phong.normal_map).at("normal_map")?,
+                }
+            }
+            MaterialDescription::Mirror(mirror) => Material::Mirror {
+                tint: self.tint(&mirror.tint).at("tint")?,
+                normal_map: self.normal_map(&mirror.normal_map).at("normal_map")?,
+            },
+            MaterialDescription::Glass(glass) => Material::Glass {
+                ior: ior(glass.ior).at("ior")?,
+                tint: self.tint(&glass.tint).at("tint")?,
+                normal_map: self.normal_map(&glass.normal_map).at("normal_map")?,
+            },
+        })
+    }
+
+    fn factor(&self, phong: &PhongDescription, own: &Option<ColorDescription>, key: &str) -> Checked<Color> {
+        let missing = || Problem::new("is missing, and there is no color to stand in for it");
+        let factor = own.as_ref().or(phong.color.as_ref()).ok_or_else(missing);
+        factor.and_then(|factor| self.color(factor)).at(key)
+    }
+}
+
+fn ior(ior: f64) -> Checked<f64> {
+    check((1.0 / DENSEST..=DENSEST).contains(&ior), || {
+        let (ior, low, high) = (number(ior), number(1.0 / DENSEST), number(DENSEST));
+        format!("{ior} must be greater than 0, from {low} to {high}")
+    })?;
+    Ok(ior)
+}

@@ -1,0 +1,159 @@
+//! Pictures of all scenes, and what their pixels show first, against the oracle's.
+
+use glam::{DVec2, DVec3};
+use wgray::pack::{FirstHit, NOTHING};
+use wgray::scene::{Description, Pattern, SamplesDescription};
+
+use crate::oracle::{Flaw, Meeting, Oracle};
+use crate::pictures::{both, first_hits, means, render};
+use crate::scenes;
+
+/// A pixel agrees if each of its values is within this, times one more than the value. It is what f32 leaves after a
+/// specular exponent of 50.
+const TOLERANCE: f64 = 1e-5;
+
+/// The share of pixels that may not agree: on edges, where one of a pixel's samples falls on the other side.
+const EDGES: f64 = 0.0005;
+
+/// Scenes that the oracle does not know enough for, and why.
+const BEYOND: &[(&str, &str)] = &[];
+
+/// The scene, small, with grids of samples.
+fn small(description: &Description) -> Description {
+    let mut d = description.clone();
+    let scale = f64::from(d.image.width) / 96.0;
+    d.image.width = 96;
+    d.image.height = (f64::from(d.image.height) / scale) as u32;
+    d.render.pixel_samples = SamplesDescription {
+        pattern: Pattern::Grid,
+        count: 4,
+    };
+    d.render.light_samples = SamplesDescription {
+        pattern: Pattern::Grid,
+        count: 16,
+    };
+    d
+}
+
+fn known() -> impl Iterator<Item = (String, Description)> {
+    let scenes = scenes::descriptions().into_iter();
+    scenes
+        .filter(|(name, _)| !BEYOND.iter().any(|(beyond, _)| beyond == name))
+        .map(|(name, d)| (name, small(&d)))
+}
+
+/// The share of pixels that differ by more than the tolerance.
+fn differing(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let agree = |a: &f64, b: &f64| (a - b).abs() <= TOLERANCE * (1.0 + b.abs());
+    let differ = a
+        .iter()
+        .zip(b)
+        .filter(|(a, b)| !a.iter().zip(*b).all(|(a, b)| agree(a, b)))
+        .count();
+    differ as f64 / a.len() as f64
+}
+
+#[test]
+fn pictures_are_the_oracles() {
+    for (name, description) in known() {
+        let truth = Oracle::new(&description, Flaw::None).picture();
+        for way in both() {
+            let picture = means(&render(&scenes::packed(&description), way));
+            let share = differing(&picture, &truth);
+            let worst = picture
+                .iter()
+                .flatten()
+                .zip(truth.iter().flatten())
+                .map(|(a, b)| (a - b).abs());
+            let mean = |p: &[[f64; 3]]| p.iter().flatten().sum::<f64>() / p.len() as f64;
+            println!(
+                "{name} {way:?}: {} of {} pixels differ by more than {TOLERANCE}, worst {:.1e}, mean by {:.1e}",
+                (share * truth.len() as f64).round(),
+                truth.len(),
+                worst.fold(0.0, f64::max),
+                mean(&picture) / mean(&truth) - 1.0
+            );
+            assert!(share <= EDGES, "{name}, {way:?}: {share} of the pixels differ");
+            assert!(
+                (mean(&picture) / mean(&truth) - 1.0).abs() < 1e-4,
+                "{name}, {way:?}: the mean differs"
+            );
+        }
+    }
+}
+
+/// Each mistake is found in at least one scene; those that concern all scenes in all.
+#[test]
+fn a_flawed_oracle_is_found() {
+    let way = *both().last().expect("the CPU at least");
+    let mut found = Vec::new();
+    for (name, description) in known() {
+        let picture = means(&render(&scenes::packed(&description), way));
+        for flaw in [
+            Flaw::MissingCosine,
+            Flaw::SwappedAxes,
+            Flaw::ShiftedPixel,
+            Flaw::CornerSamples,
+            Flaw::NoShadows,
+            Flaw::Exponent,
+        ] {
+            let share = differing(&picture, &Oracle::new(&description, flaw).picture());
+            if share > 10.0 * EDGES {
+                found.push(flaw);
+            }
+            let everywhere = matches!(flaw, Flaw::MissingCosine | Flaw::ShiftedPixel | Flaw::CornerSamples);
+            assert!(
+                !everywhere || share > 10.0 * EDGES,
+                "{name}: {flaw:?} differs in {share} of the pixels only"
+            );
+        }
+    }
+    for flaw in [Flaw::SwappedAxes, Flaw::NoShadows, Flaw::Exponent] {
+        assert!(found.contains(&flaw), "{flaw:?} is found in no scene");
+    }
+}
+
+/// Whether a first hit is what the oracle met.
+fn same_first_hit(hit: &FirstHit, meeting: &Option<Meeting>) -> bool {
+    let Some(meeting) = meeting else {
+        return hit.shape == NOTHING && hit.depth == 0.0;
+    };
+    let close = |a: f64, b: f64| (a - b).abs() <= 2e-5 * (1.0 + b.abs());
+    let (normal, uv): (DVec3, DVec2) = (hit.normal.as_dvec3(), hit.uv.as_dvec2());
+    // An angle may be told from either side of where it starts, and has no digits near its pole.
+    let around = |a: f64, b: f64| close(a, b) || close((a - b).abs(), 1.0);
+    let pole = (meeting.uv.y - 0.5).abs() > 0.49;
+    hit.shape as usize == meeting.shape
+        && close(f64::from(hit.depth), meeting.t)
+        && (normal - meeting.normal).length() < 1e-4
+        && (pole || around(uv.x, meeting.uv.x))
+        && close(uv.y, meeting.uv.y)
+}
+
+#[test]
+fn first_hits_are_the_oracles() {
+    for (name, description) in known() {
+        let truth = Oracle::new(&description, Flaw::None).meetings();
+        let shifted = Oracle::new(&description, Flaw::ShiftedPixel).meetings();
+        for way in both() {
+            let hits = first_hits(&scenes::packed(&description), way);
+            let differing = |truth: &[Option<Meeting>]| {
+                assert_eq!(hits.len(), truth.len());
+                let differ = hits
+                    .iter()
+                    .zip(truth)
+                    .filter(|(hit, meeting)| !same_first_hit(hit, meeting))
+                    .count();
+                differ as f64 / hits.len() as f64
+            };
+            let share = differing(&truth);
+            println!("{name} {way:?}: the first hits of {share} of the pixels differ");
+            assert!(
+                share <= EDGES,
+                "{name}, {way:?}: the first hits of {share} of the pixels differ"
+            );
+            assert!(differing(&shifted) > 0.1, "{name}: a shifted pixel is not found");
+        }
+    }
+}

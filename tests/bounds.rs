@@ -1,0 +1,247 @@
+//! How far the functions of `shaders/math.wgsl` are from the truth, which f64 stands for; on the CPU and on the device.
+
+use crate::adapter;
+use crate::kernel::functions;
+use crate::probes::twin;
+use crate::random::Random;
+use crate::sources::{parse, shared_source};
+
+/// A function's error over its domain.
+struct Bound {
+    function: &'static str,
+    /// What the error is measured in.
+    unit: &'static str,
+    /// The promise that stands beside the function in WGSL and in `docs/agreement.md`.
+    bound: f64,
+    arguments: fn(&Random) -> Vec<f32>,
+    /// The error of a result, in that unit.
+    error: fn(&[f32], f64) -> f64,
+}
+
+const EPSILON: f64 = f32::EPSILON as f64;
+const CALLS: usize = 1 << 20;
+
+/// Units in the last place of the truth.
+fn ulps(result: f64, truth: f64) -> f64 {
+    let last_place = (truth as f32).abs().max(f32::MIN_POSITIVE);
+    (result - truth).abs() / f64::from(last_place.next_up() - last_place)
+}
+
+const BOUNDS: &[Bound] = &[
+    Bound {
+        function: "log2",
+        unit: "units in the last place, x a normal number",
+        bound: 4.5,
+        arguments: |random| {
+            let (any, near_one) = (random.magnitude(-37.9, 38.5), random.between(0.9, 1.1));
+            vec![random.pick(&[any, near_one]) as f32]
+        },
+        error: |x, result| ulps(result, f64::from(x[0]).log2()),
+    },
+    Bound {
+        function: "exp2",
+        unit: "units in the last place, x from -126 to 127.4",
+        bound: 1.5,
+        arguments: |random| vec![random.between(-126.0, 127.4) as f32],
+        error: |x, result| ulps(result, f64::from(x[0]).exp2()),
+    },
+    Bound {
+        function: "power",
+        unit: "2^-23 (1 + |y log2 x|) relative, where the power is a normal number",
+        bound: 1.7,
+        arguments: |random| loop {
+            let x = if random.once_in(2) {
+                random.unit()
+            } else {
+                1.0 - random.magnitude(-7.0, 0.0)
+            } as f32;
+            let y = random.magnitude(-6.0, 6.0) as f32;
+            if x > 0.0 && (f64::from(x).log2() * f64::from(y)) > -125.0 {
+                return vec![x, y];
+            }
+        },
+        error: |x, result| {
+            let (x, y) = (f64::from(x[0]), f64::from(x[1]));
+            let truth = x.powf(y);
+            (result / truth - 1.0).abs() / (EPSILON * (1.0 + (y * x.log2()).abs()))
+        },
+    },
+    Bound {
+        function: "power_whole",
+        unit: "2^-24 n relative, n below 4096, where the power is a normal number",
+        bound: 1.0,
+        arguments: |random| loop {
+            let n = random.magnitude(0.0, 3.6) as u32;
+            let x = 1.0 - random.magnitude(-6.0, -0.01);
+            if x.powi(n as i32) > 1.2e-38 {
+                return vec![x as f32, f32::from_bits(n), f32::from_bits(12)];
+            }
+        },
+        error: |x, result| {
+            let (x, n) = (f64::from(x[0]), x[1].to_bits());
+            (result / x.powi(n as i32) - 1.0).abs() / (EPSILON / 2.0 * f64::from(n))
+        },
+    },
+    Bound {
+        function: "atan2",
+        unit: "units in the last place of pi",
+        bound: 1.25,
+        arguments: |random| {
+            let one = || (random.pick(&[1.0, -1.0]) * random.magnitude(-3.0, 3.0)) as f32;
+            vec![one(), one()]
+        },
+        error: |x, result| {
+            let truth = f64::from(x[0]).atan2(f64::from(x[1]));
+            (result - truth).abs() / (2.0 * EPSILON)
+        },
+    },
+    Bound {
+        function: "atan2",
+        unit: "units in the last place",
+        bound: 3.5,
+        arguments: |random| {
+            let one = || (random.pick(&[1.0, -1.0]) * random.magnitude(-3.0, 3.0)) as f32;
+            vec![one(), one()]
+        },
+        error: |x, result| ulps(result, f64::from(x[0]).atan2(f64::from(x[1]))),
+    },
+    Bound {
+        function: "normalize",
+        unit: "2^-24, largest component's error",
+        bound: 3.0,
+        arguments: |random| {
+            let size = random.magnitude(-9.0, 9.0);
+            (0..3).map(|_| (random.between(-1.0, 1.0) * size) as f32).collect()
+        },
+        error: |v, result| {
+            let v = [v[0], v[1], v[2]].map(f64::from);
+            let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+            (result - v[0] / length).abs() / (EPSILON / 2.0)
+        },
+    },
+];
+
+/// The largest error over many arguments, of the first word of each result.
+fn largest(bound: &Bound, evaluate: &dyn Fn(&[u32]) -> Vec<u32>) -> f64 {
+    let random = Random::new(bound.bound.to_bits());
+    let arguments: Vec<Vec<f32>> = (0..CALLS).map(|_| (bound.arguments)(&random)).collect();
+    let words: Vec<u32> = arguments.iter().flatten().map(|x| x.to_bits()).collect();
+    let results = evaluate(&words);
+    let per = results.len() / CALLS;
+    let errors = arguments.iter().zip(results.chunks_exact(per));
+    // NaN must not pass, and `max` would drop it
+    errors
+        .map(|(x, r)| (bound.error)(x, f64::from(f32::from_bits(r[0]))))
+        .fold(0.0, |a, b| if b <= a { a } else { b })
+}
+
+#[test]
+fn functions_are_as_near_to_the_truth_as_they_promise() {
+    let source = shared_source();
+    let module = parse(&source);
+    let functions = functions(&module, &source);
+    let mut problems = Vec::new();
+    for bound in BOUNDS {
+        let (_, function) = functions
+            .iter()
+            .find(|(_, f)| f.name() == bound.function)
+            .expect("the function");
+        let words_out = function.words_out().len();
+        let mut figures = vec![(
+            "CPU",
+            largest(bound, &|words| twin(bound.function).results(words, words_out)),
+        )];
+        if let Some(device) = adapter::device() {
+            figures.push(("GPU", largest(bound, &|words| function.run(device, words))));
+        }
+        for (path, error) in figures {
+            let line = format!(
+                "{path} {}: {error:.3} {}; promised {}",
+                bound.function, bound.unit, bound.bound
+            );
+            println!("{line}");
+            if !(error <= bound.bound) {
+                problems.push(line);
+            }
+        }
+    }
+    assert!(problems.is_empty(), "{}", problems.join("\n"));
+}
+
+/// What the functions answer where there is an exact answer.
+#[test]
+fn functions_have_their_exact_answers() {
+    let source = shared_source();
+    let module = parse(&source);
+    let functions = functions(&module, &source);
+    let infinity = f32::INFINITY;
+    let cases: &[(&str, &[f32], f32)] = &[
+        ("log2", &[1.0], 0.0),
+        ("log2", &[8.0], 3.0),
+        ("log2", &[f32::MIN_POSITIVE], -126.0),
+        ("exp2", &[0.0], 1.0),
+        ("exp2", &[-126.0], f32::MIN_POSITIVE),
+        ("exp2", &[-126.6], 0.0),
+        ("exp2", &[f32::NEG_INFINITY], 0.0),
+        ("exp2", &[127.0], 1.701_411_8e38),
+        ("exp2", &[128.0], infinity),
+        ("exp2", &[infinity], infinity),
+        ("power", &[1.0, 1e6], 1.0),
+        ("power", &[0.0, 0.5], 0.0),
+        ("power", &[1e-40, 0.5], 0.0), // below the normal numbers counts as 0
+        ("power", &[0.25, 0.5], 0.5),
+        ("power", &[f32::NAN, 2.0], 0.0),
+        ("atan2", &[0.0, 1.0], 0.0),
+        ("atan2", &[0.0, 0.0], 0.0),
+        ("atan2", &[0.0, -1.0], std::f32::consts::PI),
+        ("atan2", &[1.0, 0.0], std::f32::consts::FRAC_PI_2),
+        ("atan2", &[-1.0, 0.0], -std::f32::consts::FRAC_PI_2),
+        ("atan2", &[2.0, 2.0], std::f32::consts::FRAC_PI_4),
+        ("atan2", &[-2.0, -2.0], -3.0 * std::f32::consts::FRAC_PI_4),
+        ("min", &[1.0, 2.0], 1.0),
+        ("max", &[1.0, 2.0], 2.0),
+        ("min", &[0.0, -0.0], -0.0), // the second, as neither is less
+        ("max", &[f32::NAN, 0.0], 0.0),
+        ("dot", &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], 32.0),
+        ("cross", &[1.0, 2.0, 3.0, 4.0, 6.0, 8.0], -2.0),
+    ];
+    for (name, arguments, expected) in cases {
+        let (_, function) = functions.iter().find(|(_, f)| f.name() == *name).expect("the function");
+        let words: Vec<u32> = arguments.iter().map(|x| x.to_bits()).collect();
+        let mut results = vec![twin(name).results(&words, function.words_out().len())];
+        results.extend(adapter::device().map(|device| function.run(device, &words)));
+        for result in results {
+            assert_eq!(
+                f32::from_bits(result[0]).to_bits(),
+                expected.to_bits(),
+                "{name}{arguments:?}"
+            );
+        }
+    }
+}
+
+/// A wrong digit in a series is found.
+#[test]
+fn a_function_that_is_further_from_the_truth_is_found() {
+    let Some(device) = adapter::device() else { return };
+    for (bound, from, to) in [
+        (0, "s2 * (0.2 +", "s2 * (0.201 +"),
+        (1, "f * 0.0001984127", "f * 0.00001984127"),
+        (2, "2.8853900817779268", "2.8854"),
+        (4, "0.05882353", "0.5882353"),
+    ] {
+        let bound = &BOUNDS[bound];
+        let text = shared_source().text;
+        assert!(text.contains(from), "'{from}' is not there to be changed");
+        let mut source = wgray::gpu::compose::Source::default();
+        source.append("changed", &text.replacen(from, to, 1));
+        let module = parse(&source);
+        let functions = functions(&module, &source);
+        let (_, function) = functions
+            .iter()
+            .find(|(_, f)| f.name() == bound.function)
+            .expect("the function");
+        let error = largest(bound, &|words| function.run_in(device, &source, words));
+        assert!(!(error <= bound.bound), "{}: {error} with '{to}'", bound.function);
+    }
+}

@@ -1,0 +1,164 @@
+//! Wrong command lines and bad scenes: one message, the promised exit code, and no file.
+
+use super::{NO_DRIVER, Place, Ran, SCENE};
+
+/// A failure says why on standard error, and does nothing else.
+#[track_caller]
+fn assert_failed(place: &Place, ran: &Ran, code: i32, message: &str) {
+    assert_eq!(ran.code, code, "{}", ran.stderr);
+    assert_eq!(ran.stdout, "");
+    assert!(ran.stderr.starts_with("error: "), "{}", ran.stderr);
+    assert!(ran.stderr.contains(message), "'{message}' is not in: {}", ran.stderr);
+    assert!(place.files().is_empty(), "left behind: {:?}", place.files());
+}
+
+#[test]
+fn wrong_command_lines_exit_with_2() {
+    let place = Place::new();
+    let cases: [(&[&str], &str); 26] = [
+        (&["--size", "64"], "--size"),
+        (&["--size", "64x"], "--size"),
+        (&["--size", "0x64"], "--size: 0 must be from 1 to 65536"),
+        (&["--size", "64x65537"], "--size: 65537 must be from 1 to 65536"),
+        (&["--size", "-1x4"], "-1"),
+        (&["--spp", "0"], "--pixel-samples: 0 must be from 1"),
+        (&["--spp", "many"], "--pixel-samples"),
+        (&["--spp", "4", "--pixel-samples", "4"], "cannot be used multiple times"),
+        (
+            &["--light-samples", "10"],
+            "--light-samples: 10 must be a square number",
+        ),
+        (&["--seed", "-1"], "--seed"),
+        (&["--seed", "4294967296"], "--seed"),
+        (&["--crop", "0,0,10"], "--crop"),
+        (&["--crop", "5,0,5,4"], "x0 must be less than x1"),
+        (&["--crop", "0,4,5,3"], "y0 less than y1"),
+        (
+            &["--crop", "0,0,11,6"],
+            "--crop: 0,0,11,6 must lie in the picture of 10 x 6 pixels",
+        ),
+        (&["--crop", "0,6,10,7"], "--crop"),
+        (&["--device", ""], "--device"),
+        (&["--threads", "0"], "--threads"),
+        (&["--aov", "normal,colour"], "colour"),
+        (&["--progress", "loud"], "--progress"),
+        (&["-q", "-v"], "cannot be used with"),
+        (&["-o", "picture.jpg"], "picture.jpg: must end in .png or .exr"),
+        (&["-o", "picture"], "must end in .png or .exr"),
+        (&["-o", ".png"], "must end in .png or .exr"),
+        (&["another.toml"], "another.toml"),
+        (&["--unknown"], "--unknown"),
+    ];
+    for (arguments, message) in cases {
+        let ran = place.run(&[&["render", "small.toml"], arguments].concat());
+        assert_failed(&place, &ran, 2, message);
+    }
+    for (arguments, message) in [
+        (&["render"][..], "<SCENE>"),
+        (&["check"], "<SCENE>..."),
+        (&["paint"], "paint"),
+    ] {
+        assert_failed(&place, &place.run(arguments), 2, message);
+    }
+    assert_eq!(place.run(&[]).code, 2);
+}
+
+#[test]
+fn a_size_in_the_option_makes_room_for_the_crop() {
+    let place = Place::new();
+    place.quietly(&["render", "small.toml", "--size", "20x20", "--crop", "0,0,11,7"]);
+}
+
+/// Every rule of scene files has its test beside the parser; these are the ways a message reaches the user.
+#[test]
+fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
+    let cases = [
+        (
+            "radius = 0.8",
+            "radius = -1",
+            "bad.toml:22: shapes[0].radius: -1 must be",
+        ),
+        ("radius = 0.8", "radius = nan", "bad.toml:22: shapes[0].radius: "),
+        ("radius = 0.8", "radius = ", "bad.toml:22:"),
+        (
+            "radius = 0.8",
+            "radius = 0.8\ncolour = 1",
+            "bad.toml:23: shapes[0].colour: ",
+        ),
+        ("radius = 0.8\n", "", "shapes[0]"),
+        ("fov = 40", "fov = 180", "bad.toml:2: camera.fov: 180 must be"),
+        ("fov = 40", "fov = 'wide'", "bad.toml:2: camera.fov: "),
+        (
+            "look_at = [0, 0, 1]",
+            "look_at = [0, -5, 1]",
+            "bad.toml:2: camera.look_at",
+        ),
+        (
+            "width = 10",
+            "width = 0",
+            "bad.toml:1: image.width: 0 must be from 1 to 65536",
+        ),
+        (
+            "width = 10",
+            "width = 65537",
+            "bad.toml:1: image.width: 65537 must be from 1 to 65536",
+        ),
+        (
+            "count = 4",
+            "count = 5",
+            "bad.toml:7: render.light_samples.count: 5 must be a square number",
+        ),
+        ("material = \"gray\"", "material = \"grey\"", "shapes[0].material: "),
+        ("tangent = [1, 0, 0]\ncolor", "tangent = [0, 0, 2]\ncolor", "lights[0]"),
+        ("[render]", "[render", "bad.toml:3:"),
+    ];
+    for (from, to, message) in cases {
+        let place = Place::new();
+        assert!(SCENE.contains(from), "{from}");
+        let bad = place.path("small.toml").with_file_name("bad.toml");
+        let text = SCENE.replacen(from, to, 1);
+        for command in ["render", "check"] {
+            std::fs::write(&bad, &text).unwrap();
+            let ran = place.run(&[command, "bad.toml"]);
+            std::fs::remove_file(&bad).unwrap();
+            assert_failed(&place, &ran, 3, message);
+            assert!(
+                ran.stderr.starts_with("error: bad.toml"),
+                "the place is first: {}",
+                ran.stderr
+            );
+        }
+    }
+}
+
+#[test]
+fn a_missing_scene_is_a_bad_scene() {
+    let place = Place::new();
+    for command in ["render", "check"] {
+        assert_failed(
+            &place,
+            &place.run(&[command, "none.toml"]),
+            3,
+            "none.toml: cannot be read",
+        );
+    }
+}
+
+#[test]
+fn the_check_goes_on_after_a_bad_scene() {
+    let place = Place::new();
+    let ran = place.run(&["check", "none.toml", "small.toml"]);
+    assert_eq!(ran.code, 3);
+    assert!(ran.stderr.contains("none.toml") && ran.stdout.starts_with("small.toml: good"));
+}
+
+#[test]
+fn a_device_that_is_not_there_exits_with_4() {
+    let place = Place::new();
+    let ran = place.run(&["render", "small.toml", "--device", "abacus"]);
+    assert_failed(&place, &ran, 4, "no adapter's name, driver or type contains 'abacus'");
+    for device in ["gpu", "lavapipe"] {
+        let ran = place.run_with(&["render", "small.toml", "--device", device], &NO_DRIVER);
+        assert_failed(&place, &ran, 4, "apt-get install mesa-vulkan-drivers");
+    }
+}

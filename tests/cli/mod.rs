@@ -1,0 +1,140 @@
+//! The program, driven as a user drives it.
+
+mod bad_input;
+mod files;
+mod options;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+
+use crate::backends::project;
+
+/// What a run of the program left.
+struct Ran {
+    code: i32,
+    stdout: String,
+    stderr: String,
+}
+
+/// A folder of its own to run the program in, with a small scene in it.
+struct Place {
+    folder: TempDir,
+}
+
+/// 10 x 6 pixels, in which everything random differs from pixel to pixel.
+const SCENE: &str = r#"image = { width = 10, height = 6 }
+camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40 }
+[render]
+ambient = [0.1, 0.1, 0.1]
+background = [0.2, 0.3, 2]
+pixel_samples = { pattern = "random", count = 3 }
+light_samples = { pattern = "grid", count = 4 }
+[materials.gray]
+type = "phong"
+color = [0.5, 0.4, 0.3]
+[[lights]]
+type = "rectangle"
+center = [0, -1, 4]
+size = [2, 2]
+normal = [0, 0, -1]
+tangent = [1, 0, 0]
+color = [0.8, 0.8, 0.8]
+[[shapes]]
+type = "sphere"
+material = "gray"
+center = [0, 0, 1]
+radius = 0.8
+[[shapes]]
+type = "plane"
+material = "gray"
+point = [0, 0, 0]
+normal = [0, 0, 1]
+tangent = [1, 0, 0]
+"#;
+
+impl Place {
+    fn new() -> Place {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        fs::write(folder.path().join("small.toml"), SCENE).expect("a scene");
+        Place { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn read(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).expect("a file");
+    }
+
+    /// The names of the files, hidden ones too, but for the small scene.
+    fn files(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.folder.path()).expect("the folder");
+        let names = entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
+        let mut names: Vec<String> = names.filter(|name| name != "small.toml").collect();
+        names.sort();
+        names
+    }
+
+    fn run(&self, arguments: &[&str]) -> Ran {
+        self.run_with(arguments, &[])
+    }
+
+    /// Runs the program with further variables in its environment.
+    fn run_with(&self, arguments: &[&str], variables: &[(&str, &str)]) -> Ran {
+        let mut command = assert_cmd::Command::new(program());
+        command
+            .current_dir(self.folder.path())
+            .args(arguments)
+            .envs(variables.iter().copied());
+        let output = command
+            .timeout(std::time::Duration::from_secs(120))
+            .output()
+            .expect("the program runs");
+        Ran {
+            code: output.status.code().unwrap_or(-1),
+            stdout: String::from_utf8(output.stdout).expect("UTF-8"),
+            stderr: String::from_utf8(output.stderr).expect("UTF-8"),
+        }
+    }
+
+    /// Runs the program, which must succeed in silence.
+    fn quietly(&self, arguments: &[&str]) {
+        let ran = self.run(arguments);
+        assert_eq!(
+            (ran.code, ran.stdout.as_str(), ran.stderr.as_str()),
+            (0, "", ""),
+            "{arguments:?}"
+        );
+    }
+}
+
+fn program() -> &'static Path {
+    Path::new(env!("CARGO_BIN_EXE_wgray"))
+}
+
+/// An environment without any Vulkan driver.
+const NO_DRIVER: [(&str, &str); 2] = [
+    ("VK_DRIVER_FILES", "/nonexistent.json"),
+    ("VK_ICD_FILENAMES", "/nonexistent.json"),
+];
+
+/// Width, height and bytes of a PNG of 8-bit RGB.
+fn read_png(path: &Path) -> (u32, u32, Vec<u8>) {
+    let picture = image::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let image::DynamicImage::ImageRgb8(picture) = picture else {
+        panic!("{}: not 8-bit RGB", path.display());
+    };
+    (picture.width(), picture.height(), picture.into_raw())
+}
+
+/// The path of a scene of the project, as an argument.
+fn project_scene(name: &str) -> String {
+    project("scenes").join(name).display().to_string()
+}

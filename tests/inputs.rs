@@ -1,0 +1,386 @@
+//! Inputs for the probes. Most are arguments as they occur, so that every branch is taken: a primitive, a ray at a
+//! point of it, in its inside, on its edge or past it. Some of these have single numbers replaced by edge values, and
+//! some are random bits of all magnitudes.
+
+use glam::{DMat3, DVec3, Vec3};
+use naga::{Handle, Module, ScalarKind, Type};
+use wgray::cpu::light::Segments;
+use wgray::cpu::phong::Lobes;
+use wgray::cpu::ray::{Hit, Ray};
+use wgray::cpu::shadow::{Block, cone_to_light};
+use wgray::cpu::surface::Surface;
+use wgray::pack::{Camera, FAR, Light, Material, NOTHING, Primitive, Sphere};
+
+use crate::kernel::{Function, scalars};
+use crate::random::Random;
+use crate::sources::type_name;
+use crate::words::Words;
+
+/// Numbers at which arithmetic turns.
+const EDGES: &[f32] = &[
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    0.5,
+    2.0,
+    1.0 + f32::EPSILON,
+    1.0 - f32::EPSILON / 2.0,
+    f32::MIN_POSITIVE,
+    -f32::MIN_POSITIVE,
+    1e-45, // the least denormal number
+    -1e-45,
+    1e-39,
+    f32::MAX,
+    f32::MIN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::NAN,
+    1e10,
+    1e-10,
+    16_777_216.0,
+    0.333_333_34,
+];
+
+/// The arguments' words for so many calls.
+pub fn inputs(function: &Function, calls: usize, seed: u64) -> Vec<u32> {
+    let random = Random::new(seed);
+    let mut words = Vec::new();
+    for _ in 0..calls {
+        call(function, &random, &mut words);
+    }
+    words
+}
+
+fn call(function: &Function, random: &Random, words: &mut Vec<u32>) {
+    let situation = Situation::new(random);
+    let manner = random.below(8);
+    for (name, ty) in function.arguments() {
+        let start = words.len();
+        situation.argument((function.name(), &name), function.module, ty, random, words);
+        for (word, kind) in words[start..].iter_mut().zip(scalars(function.module, ty)) {
+            if kind == ScalarKind::Float {
+                let x = f32::from_bits(*word);
+                *word = match manner {
+                    0 => wild(random),
+                    1 if random.once_in(4) => random.pick(EDGES),
+                    2 if random.once_in(8) => neighbour(x, random),
+                    _ => x,
+                }
+                .to_bits();
+            }
+        }
+    }
+}
+
+/// Of any magnitude and sign.
+fn wild(random: &Random) -> f32 {
+    let sign = random.pick(&[1.0, -1.0]);
+    (sign * random.magnitude(-44.0, 38.0)) as f32
+}
+
+/// One or two units in the last place away.
+fn neighbour(x: f32, random: &Random) -> f32 {
+    let step = random.pick(&[-2, -1, 1, 2]);
+    f32::from_bits(x.to_bits().wrapping_add_signed(step))
+}
+
+/// What the arguments of one call have in common.
+struct Situation {
+    primitive: Primitive,
+    /// A point of local space, often of the primitive, and the same in the world.
+    local: DVec3,
+    target: DVec3,
+    /// Where a ray to it starts, in the world and in local space.
+    start: DVec3,
+    local_start: DVec3,
+    direction: DVec3,
+    light: Light,
+}
+
+impl Situation {
+    fn new(random: &Random) -> Situation {
+        let center = DVec3::from_array([(); 3].map(|()| random.between(-2.0, 2.0))) * random.pick(&[0.0, 1.0, 100.0]);
+        let scale = random.magnitude(-3.0, 3.0);
+        let mut columns = DMat3::from_cols(vector(random), vector(random), vector(random)) * scale;
+        if random.once_in(4) {
+            columns = DMat3::from_diagonal(DVec3::splat(scale)); // parallel to the axes, as scenes often are
+        }
+        let rows = columns.inverse().transpose();
+        let local = local_point(random);
+        let away = vector(random) * random.pick(&[0.3, 1.0, 3.0, 300.0]);
+        let local_start = if random.once_in(8) {
+            local + DVec3::new(away.x, away.y, 0.0)
+        } else {
+            local + away
+        };
+        let target = center + columns * local;
+        let start = center + columns * local_start;
+        let primitive = Primitive {
+            center: center.as_vec3(),
+            material: random.below(4),
+            x: rows.x_axis.as_vec3(),
+            shape: random.below(4),
+            y: rows.y_axis.as_vec3(),
+            kind: random.below(4),
+            z: rows.z_axis.as_vec3(),
+            determinant: rows.determinant() as f32,
+        };
+        let directional = random.once_in(4);
+        let size = scale * random.pick(&[0.0, 0.3, 3.0]);
+        let light = Light {
+            center: if directional {
+                (target - start).normalize_or(DVec3::Z)
+            } else {
+                target + (target - start)
+            }
+            .as_vec3(),
+            reach: if directional { 1e10 } else { 1.0 - 1e-5 },
+            u: (vector(random) * size).as_vec3(),
+            finite: if directional { 0.0 } else { 1.0 },
+            v: (vector(random) * size).as_vec3(),
+            area: (size * size) as f32,
+            color: color(random),
+            number: random.below(4),
+        };
+        let direction = target - start;
+        Situation {
+            primitive,
+            local,
+            target,
+            start,
+            local_start,
+            direction,
+            light,
+        }
+    }
+
+    /// An argument's words, by its type, and where a type says too little by its name.
+    fn argument(
+        &self,
+        (function, name): (&str, &str),
+        module: &Module,
+        ty: Handle<Type>,
+        random: &Random,
+        words: &mut Vec<u32>,
+    ) {
+        match type_name(module, ty).as_str() {
+            "Primitive" => self.primitive.write(words),
+            "Light" => self.light.write(words),
+            "Ray" => self.ray(random).write(words),
+            "Hit" => {
+                Hit {
+                    t: random.pick(&[FAR, self.t() as f32]),
+                    primitive: random.pick(&[NOTHING, 0, 7]),
+                }
+                .write(words);
+            }
+            "Surface" => self.surface(random).write(words),
+            "Segments" => {
+                let towards = (self.target - self.start).as_vec3();
+                Segments {
+                    towards,
+                    u: self.light.u,
+                    v: self.light.v,
+                }
+                .write(words);
+            }
+            "Block" => block(random).write(words),
+            "Sphere" => self.sphere(random).write(words),
+            "Cone" => cone_to_light(&self.light, self.start.as_vec3()).write(words),
+            "Material" => material(random).write(words),
+            "Camera" => self.camera(random).write(words),
+            "Lobes" => Lobes {
+                diffuse: random.unit() as f32,
+                specular: random.unit() as f32,
+            }
+            .write(words),
+            "vec3<f32>" => self.vector(name, random).write(words),
+            "f32" => self.number(name, random).write(words),
+            "u32" => whole(function, name, random).write(words),
+            "vec2<f32>" => {
+                let size = random.pick(&[1.0, 1.0, 400.0]);
+                words.extend([(); 2].map(|()| ((random.unit() * size) as f32).to_bits()));
+            }
+            _ => anything(&scalars(module, ty), random, words),
+        }
+    }
+
+    /// Where its ray meets the target.
+    fn t(&self) -> f64 {
+        (self.target - self.start).length()
+    }
+
+    fn ray(&self, random: &Random) -> Ray {
+        let along = match random.below(8) {
+            0 => DVec3::Z,
+            1 => -self.direction,
+            _ => self.direction,
+        };
+        let origin = if random.once_in(8) {
+            self.primitive.center.as_dvec3()
+        } else {
+            self.start
+        };
+        Ray {
+            origin: origin.as_vec3(),
+            direction: along.normalize_or(DVec3::X).as_vec3(),
+        }
+    }
+
+    fn surface(&self, random: &Random) -> Surface {
+        let normal = vector(random).normalize().as_vec3();
+        let position = self.start.as_vec3();
+        let wo = if random.once_in(4) {
+            normal
+        } else {
+            vector(random).normalize().as_vec3()
+        };
+        Surface {
+            position,
+            normal,
+            wo,
+            start: position + normal * 1e-5,
+        }
+    }
+
+    /// About the way to the light, or off it.
+    fn sphere(&self, random: &Random) -> Sphere {
+        let away = self.direction.length() * random.pick(&[0.0, 0.1, 0.5, 2.0]);
+        let center = self.start + self.direction * random.between(-0.5, 1.5) + vector(random) * away;
+        Sphere {
+            center: center.as_vec3(),
+            radius: (away * random.pick(&[0.5, 1.0, 0.1, 1e18])) as f32,
+        }
+    }
+
+    fn camera(&self, random: &Random) -> Camera {
+        Camera {
+            position: self.start.as_vec3(),
+            projection: random.below(2),
+            right: vector(random).as_vec3(),
+            width: 1 + random.below(1000),
+            up: vector(random).as_vec3(),
+            height: 1 + random.below(1000),
+            forward: self.direction.normalize_or(DVec3::X).as_vec3(),
+            seed: random.bits() as u32,
+        }
+    }
+
+    fn vector(&self, name: &str, random: &Random) -> Vec3 {
+        let v = match name {
+            "o" => self.local_start,
+            "d" => (self.local - self.local_start) * random.pick(&[0.5, 1.0, 1.0 + 1e-5, 2.0, -1.0]),
+            "local" => self.local,
+            "p" => random.pick(&[self.start, self.target]),
+            "to" | "direction" => self.direction,
+            _ => vector(random) * random.magnitude(-2.0, 2.0),
+        };
+        v.as_vec3()
+    }
+
+    fn number(&self, name: &str, random: &Random) -> f32 {
+        match name {
+            "limit" => random.pick(&[FAR, FAR, self.t() as f32, (2.0 * self.t()) as f32]),
+            "t" => random.pick(&[self.t() as f32, FAR]),
+            "reach" => random.pick(&[self.light.reach, 1.0 - 1e-5, 1e10, 1.0]),
+            "epsilon" => random.pick(&[1e-5, 1e-4, 0.0]),
+            _ => {
+                let (unit, sign) = (random.unit(), random.pick(&[1.0, -1.0]));
+                random.pick(&[
+                    unit,
+                    unit * sign,
+                    sign * random.magnitude(-5.0, 3.0),
+                    1000.0 * unit.floor(),
+                ]) as f32
+            }
+        }
+    }
+}
+
+/// A vector that is not short.
+fn vector(random: &Random) -> DVec3 {
+    loop {
+        let v = DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
+        if v.length() > 0.1 {
+            return v;
+        }
+    }
+}
+
+fn color(random: &Random) -> Vec3 {
+    Vec3::from_array([(); 3].map(|()| random.unit() as f32))
+}
+
+/// A point of local space: of any of the canonical shapes, on an edge or corner of one, or near.
+fn local_point(random: &Random) -> DVec3 {
+    let coordinate = || random.between(-1.2, 1.2);
+    let p = DVec3::new(coordinate(), coordinate(), coordinate());
+    match random.below(10) {
+        0 | 1 => DVec3::new(p.x, p.y, 0.0),
+        2 | 3 => p.normalize(),
+        4 => DVec3::new(random.pick(&[-1.0, 0.0, 1.0]), p.y, 0.0),
+        5 => DVec3::new(random.pick(&[-1.0, 0.0, 1.0]), random.pick(&[-1.0, 0.0, 1.0]), 0.0),
+        6 => DVec3::new(p.x.abs(), 1.0 - p.x.abs(), 0.0),
+        7 | 8 => DVec3::new(random.between(0.0, 0.6), random.between(0.0, 0.6), 0.0),
+        _ => p,
+    }
+}
+
+fn block(random: &Random) -> Block {
+    Block {
+        pattern: whole("block_sample", "pattern", random),
+        side: whole("block_sample", "side", random),
+        first: 32 * random.below(4),
+        count: 1 + random.below(32),
+        group: random.below(16),
+        key: glam::UVec2::new(random.bits() as u32, random.bits() as u32),
+    }
+}
+
+fn material(random: &Random) -> Material {
+    let exponent = random.pick(&[0, 1, 2, 16, 50, 4096]);
+    let mut material: Material = bytemuck::Zeroable::zeroed();
+    material.ambient = color(random);
+    material.kind = random.below(2);
+    material.diffuse = color(random);
+    material.specular = color(random);
+    material.exponent = exponent;
+    material.shininess = if random.once_in(2) {
+        exponent as f32
+    } else {
+        random.magnitude(-6.0, 6.0) as f32
+    };
+    material
+}
+
+/// Whole numbers are small where they count something.
+fn whole(function: &str, name: &str, random: &Random) -> u32 {
+    match name {
+        "bits" if function != "power_whole" => random.bits() as u32,
+        "kind" | "pattern" => random.below(8),
+        "side" => 1 + random.below(16),
+        "count" => 1 + random.below(256),
+        "i" => random.below(32),
+        "bits" | "exponent_bits" => random.below(14),
+        _ => random.pick(&[
+            0,
+            1,
+            random.below(300),
+            random.below(1 << 16),
+            random.bits() as u32,
+            u32::MAX,
+        ]),
+    }
+}
+
+/// Words of a type that nothing more is known of.
+fn anything(kinds: &[ScalarKind], random: &Random, words: &mut Vec<u32>) {
+    for kind in kinds {
+        words.push(match kind {
+            ScalarKind::Float => (random.between(-1.0, 1.0) as f32).to_bits(),
+            ScalarKind::Bool => random.below(2),
+            _ => random.pick(&[random.below(4), random.below(300), random.bits() as u32]),
+        });
+    }
+}

@@ -1,0 +1,425 @@
+//! A third renderer, in f64, straight from what the scene file says. It shares no code and no choice of formula with
+//! the twins, which could share a mistake: ellipsoids are quadrics, triangles Moeller and Trumbore's, rectangles are
+//! cut out of their planes by projection, and Phong's model is the formula of `docs/scene-format.md` with unit vectors.
+
+use glam::{DMat4, DVec2, DVec3, DVec4};
+use wgray::scene::{
+    CameraDescription, Description, LightDescription, MaterialDescription, PhongDescription, ShapeDescription,
+};
+
+/// A mistake that the tests of the tests make on purpose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flaw {
+    None,
+    /// The diffuse term without n.l.
+    MissingCosine,
+    /// Width and height of rectangles confused.
+    SwappedAxes,
+    /// Pixels seen one to the left.
+    ShiftedPixel,
+    /// Samples at the corners of their cells.
+    CornerSamples,
+    /// Lights shine through everything.
+    NoShadows,
+    /// The specular exponent one too low.
+    Exponent,
+}
+
+pub struct Oracle<'a> {
+    scene: &'a Description,
+    solids: Vec<Solid>,
+    flaw: Flaw,
+}
+
+/// One surface and what it is of.
+struct Solid {
+    form: Form,
+    /// Its number in the file; lights follow the shapes.
+    shape: usize,
+    /// A shape's; lights have a colour of their own.
+    material: Option<String>,
+}
+
+enum Form {
+    /// The points p with (p, 1)^T Q (p, 1) = 0, and the map from its local space.
+    Quadric {
+        q: DMat4,
+        from_local: DMat4,
+    },
+    Triangle([DVec3; 3]),
+    /// Centre, unit tangent and bitangent, and half the sizes along them; endless if there are no sizes.
+    Flat {
+        center: DVec3,
+        tangent: DVec3,
+        bitangent: DVec3,
+        half: Option<DVec2>,
+    },
+}
+
+/// What a ray meets.
+pub struct Meeting {
+    pub t: f64,
+    pub shape: usize,
+    /// Outward.
+    pub normal: DVec3,
+    pub uv: DVec2,
+    solid: usize,
+}
+
+impl<'a> Oracle<'a> {
+    pub fn new(scene: &'a Description, flaw: Flaw) -> Oracle<'a> {
+        let mut solids = Vec::new();
+        for (shape, description) in scene.shapes.iter().enumerate() {
+            let (material, forms) = forms(description, flaw);
+            let solid = |form| Solid {
+                form,
+                shape,
+                material: Some(material.clone()),
+            };
+            solids.extend(forms.into_iter().map(solid));
+        }
+        for (number, light) in scene.lights.iter().enumerate() {
+            if let LightDescription::Rectangle(light) = light {
+                let form = flat(light.center, light.normal, light.tangent, Some(light.size), flaw);
+                solids.push(Solid {
+                    form,
+                    shape: scene.shapes.len() + number,
+                    material: None,
+                });
+            }
+        }
+        Oracle { scene, solids, flaw }
+    }
+
+    /// The means of all pixels. Samples are at the centres of square grids, whatever the scene says.
+    pub fn picture(&self) -> Vec<[f64; 3]> {
+        let (width, height) = (self.scene.image.width, self.scene.image.height);
+        let places = self.grid(self.scene.render.pixel_samples.count);
+        let pixel = |i: u32| {
+            let corner = DVec2::new(f64::from(i % width), f64::from(i / width));
+            let sum: DVec3 = places
+                .iter()
+                .map(|place| self.radiance(self.camera_ray(corner + *place)))
+                .sum();
+            (sum / places.len() as f64).to_array()
+        };
+        (0..width * height).map(pixel).collect()
+    }
+
+    /// What the rays through the pixels' centres meet.
+    pub fn meetings(&self) -> Vec<Option<Meeting>> {
+        let (width, height) = (self.scene.image.width, self.scene.image.height);
+        let pixel = |i: u32| {
+            let center = DVec2::new(f64::from(i % width) + 0.5, f64::from(i / width) + 0.5);
+            let (origin, direction) = self.camera_ray(center);
+            self.nearest(origin, direction)
+        };
+        (0..width * height).map(pixel).collect()
+    }
+
+    /// The centres of the cells of a square grid.
+    fn grid(&self, count: u32) -> Vec<DVec2> {
+        let side = f64::from(count).sqrt().round() as u32;
+        assert_eq!(side * side, count, "the oracle samples by square grids");
+        let offset = if self.flaw == Flaw::CornerSamples { 0.0 } else { 0.5 };
+        let place = |i: u32| (DVec2::new(f64::from(i % side), f64::from(i / side)) + offset) / f64::from(side);
+        (0..count).map(place).collect()
+    }
+
+    /// Origin and unit direction of the ray through a point of the picture, in pixels from its top left corner: the
+    /// image plane is one unit ahead, its pixels are squares.
+    fn camera_ray(&self, at: DVec2) -> (DVec3, DVec3) {
+        let (width, height) = (f64::from(self.scene.image.width), f64::from(self.scene.image.height));
+        let basis = |position: DVec3, look_at: DVec3, up: DVec3| {
+            let forward = (look_at - position).normalize();
+            let right = forward.cross(up).normalize();
+            (forward, right, right.cross(forward))
+        };
+        let column = if self.flaw == Flaw::ShiftedPixel {
+            at.x - 1.0
+        } else {
+            at.x
+        };
+        let (to_right, to_top) = (column - width / 2.0, height / 2.0 - at.y);
+        match &self.scene.camera {
+            CameraDescription::Perspective(c) => {
+                let (forward, right, up) = basis(c.position, c.look_at, c.up);
+                let pixel = 2.0 * (c.fov.to_radians() / 2.0).tan() / height;
+                (
+                    c.position,
+                    (forward + right * (to_right * pixel) + up * (to_top * pixel)).normalize(),
+                )
+            }
+            CameraDescription::Orthographic(c) => {
+                let (forward, right, up) = basis(c.position, c.look_at, c.up);
+                let pixel = c.height / height;
+                (c.position + right * (to_right * pixel) + up * (to_top * pixel), forward)
+            }
+            other => panic!("the oracle does not know the camera {other:?}"),
+        }
+    }
+
+    fn nearest(&self, origin: DVec3, direction: DVec3) -> Option<Meeting> {
+        let mut nearest: Option<(f64, usize)> = None;
+        for (i, solid) in self.solids.iter().enumerate() {
+            for t in crossings(&solid.form, origin, direction) {
+                if t > 0.0 && nearest.is_none_or(|(nearer, _)| t < nearer) {
+                    nearest = Some((t, i));
+                }
+            }
+        }
+        let (t, i) = nearest?;
+        let (normal, uv) = facing(&self.solids[i].form, origin + direction * t);
+        Some(Meeting {
+            t,
+            shape: self.solids[i].shape,
+            normal,
+            uv,
+            solid: i,
+        })
+    }
+
+    fn radiance(&self, (origin, direction): (DVec3, DVec3)) -> DVec3 {
+        let render = &self.scene.render;
+        let Some(meeting) = self.nearest(origin, direction) else {
+            return render.background;
+        };
+        let Some(material) = &self.solids[meeting.solid].material else {
+            return light_color(&self.scene.lights[meeting.shape - self.scene.shapes.len()]);
+        };
+        let phong = match &self.scene.materials[material] {
+            MaterialDescription::Phong(phong) => phong,
+            other => panic!("the oracle does not know the material {other:?}"),
+        };
+        let factor = |own: Option<DVec3>| own.or(phong.color).expect("a checked material");
+        let point = origin + direction * meeting.t;
+        let viewer = -direction;
+        let normal = if meeting.normal.dot(viewer) < 0.0 {
+            -meeting.normal
+        } else {
+            meeting.normal
+        };
+        // "how far above the surface a shadow ray starts, relative to the largest coordinate there"
+        let coordinate = point.abs().max_element().max(meeting.t);
+        let above = point + normal * (render.shadow_epsilon * coordinate);
+        let mut sum = render.ambient * factor(phong.ambient);
+        for light in &self.scene.lights {
+            let samples = self.samples(light, above);
+            for (to_light, distance) in &samples {
+                let reflected = self.reflected(phong, normal, viewer, *to_light, factor);
+                if self.flaw == Flaw::NoShadows || !self.hidden(above, *to_light, *distance) {
+                    sum += light_color(light) * reflected / samples.len() as f64;
+                }
+            }
+        }
+        sum
+    }
+
+    /// kd max(0, n.l) + ks max(0, r.v)^shininess; nothing where n.l <= 0.
+    fn reflected(
+        &self,
+        phong: &PhongDescription,
+        normal: DVec3,
+        viewer: DVec3,
+        light: DVec3,
+        factor: impl Fn(Option<DVec3>) -> DVec3,
+    ) -> DVec3 {
+        let cosine = normal.dot(light);
+        if cosine <= 0.0 {
+            return DVec3::ZERO;
+        }
+        let mirrored = (-light).reflect(normal);
+        let exponent = if self.flaw == Flaw::Exponent {
+            phong.shininess - 1.0
+        } else {
+            phong.shininess
+        };
+        let highlight = mirrored.dot(viewer).max(0.0).powf(exponent);
+        let diffuse = if self.flaw == Flaw::MissingCosine { 1.0 } else { cosine };
+        factor(phong.diffuse) * diffuse + factor(phong.specular) * highlight
+    }
+
+    /// Unit directions and distances from a point to a light's samples.
+    fn samples(&self, light: &LightDescription, from: DVec3) -> Vec<(DVec3, f64)> {
+        let way = |to: DVec3| ((to - from).normalize(), (to - from).length());
+        match light {
+            LightDescription::Rectangle(light) => {
+                let (tangent, bitangent) = frame(light.normal, light.tangent);
+                let [width, height] = sizes(light.size, self.flaw);
+                let place =
+                    |at: DVec2| light.center + tangent * (width * (at.x - 0.5)) + bitangent * (height * (at.y - 0.5));
+                self.grid(self.scene.render.light_samples.count)
+                    .into_iter()
+                    .map(|at| way(place(at)))
+                    .collect()
+            }
+            LightDescription::Point(light) => vec![way(light.position)],
+            LightDescription::Directional(light) => vec![(-light.direction.normalize(), f64::INFINITY)],
+            other => panic!("the oracle does not know the light {other:?}"),
+        }
+    }
+
+    /// Whether a shape, not a light, is between a point and a light.
+    fn hidden(&self, from: DVec3, direction: DVec3, distance: f64) -> bool {
+        let end = distance * (1.0 - self.scene.render.shadow_epsilon);
+        let shapes = self.solids.iter().filter(|solid| solid.material.is_some());
+        shapes
+            .flat_map(|solid| crossings(&solid.form, from, direction))
+            .any(|t| t > 0.0 && t < end)
+    }
+}
+
+fn light_color(light: &LightDescription) -> DVec3 {
+    match light {
+        LightDescription::Rectangle(light) => light.color,
+        LightDescription::Point(light) => light.color,
+        LightDescription::Directional(light) => light.color,
+        other => panic!("the oracle does not know the light {other:?}"),
+    }
+}
+
+/// Unit tangent and bitangent: normal x tangent.
+fn frame(normal: DVec3, tangent: DVec3) -> (DVec3, DVec3) {
+    let bitangent = normal.cross(tangent).normalize();
+    (bitangent.cross(normal.normalize()), bitangent)
+}
+
+fn sizes(size: [f64; 2], flaw: Flaw) -> [f64; 2] {
+    let [width, height] = size;
+    if flaw == Flaw::SwappedAxes {
+        [height, width]
+    } else {
+        size
+    }
+}
+
+fn flat(center: DVec3, normal: DVec3, tangent: DVec3, size: Option<[f64; 2]>, flaw: Flaw) -> Form {
+    let (tangent, bitangent) = frame(normal, tangent);
+    let half = size.map(|size| DVec2::from_array(sizes(size, flaw)) / 2.0);
+    Form::Flat {
+        center,
+        tangent,
+        bitangent,
+        half,
+    }
+}
+
+fn quadric(center: DVec3, axes: [DVec3; 3]) -> Form {
+    let [a, b, c] = axes;
+    let from_local = DMat4::from_cols(a.extend(0.0), b.extend(0.0), c.extend(0.0), center.extend(1.0));
+    let to_local = from_local.inverse();
+    let sphere = DMat4::from_diagonal(DVec4::new(1.0, 1.0, 1.0, -1.0));
+    Form::Quadric {
+        q: to_local.transpose() * sphere * to_local,
+        from_local,
+    }
+}
+
+/// A shape's material and its surfaces.
+fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
+    match shape {
+        ShapeDescription::Rectangle(r) => (
+            r.material.clone(),
+            vec![flat(r.center, r.normal, r.tangent, Some(r.size), flaw)],
+        ),
+        ShapeDescription::Plane(p) => (p.material.clone(), vec![flat(p.point, p.normal, p.tangent, None, flaw)]),
+        ShapeDescription::Ellipsoid(e) => (e.material.clone(), vec![quadric(e.center, [e.a, e.b, e.c])]),
+        ShapeDescription::Sphere(s) => {
+            let axes = [DVec3::X * s.radius, DVec3::Y * s.radius, DVec3::Z * s.radius];
+            (s.material.clone(), vec![quadric(s.center, axes)])
+        }
+        ShapeDescription::Triangle(t) => (t.material.clone(), vec![Form::Triangle(t.vertices)]),
+        ShapeDescription::Tetrahedron(t) => {
+            let [v0, mut v1, mut v2, v3] = t.vertices;
+            // The first face, (v0, v2, v1), must look away from v3.
+            if (v2 - v0).cross(v1 - v0).dot(v3 - v0) > 0.0 {
+                (v1, v2) = (v2, v1);
+            }
+            let faces = [[v0, v2, v1], [v0, v1, v3], [v1, v2, v3], [v0, v3, v2]];
+            (t.material.clone(), faces.map(Form::Triangle).into())
+        }
+        other => panic!("the oracle does not know the shape {other:?}"),
+    }
+}
+
+/// Where a line crosses a surface, as distances along it.
+fn crossings(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
+    match form {
+        Form::Quadric { q, .. } => {
+            let (o, d) = (origin.extend(1.0), direction.extend(0.0));
+            let (a, b, c) = (d.dot(*q * d), 2.0 * d.dot(*q * o), o.dot(*q * o));
+            let discriminant = b * b - 4.0 * a * c;
+            if discriminant < 0.0 {
+                return Vec::new();
+            }
+            let root = discriminant.sqrt();
+            vec![(-b - root) / (2.0 * a), (-b + root) / (2.0 * a)]
+        }
+        Form::Triangle([v0, v1, v2]) => {
+            // Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997
+            let (edge1, edge2) = (*v1 - *v0, *v2 - *v0);
+            let p = direction.cross(edge2);
+            let determinant = edge1.dot(p);
+            let to_origin = origin - *v0;
+            let u = to_origin.dot(p) / determinant;
+            let q = to_origin.cross(edge1);
+            let v = direction.dot(q) / determinant;
+            let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
+            if inside {
+                vec![edge2.dot(q) / determinant]
+            } else {
+                Vec::new()
+            }
+        }
+        Form::Flat {
+            center,
+            tangent,
+            bitangent,
+            half,
+        } => {
+            let normal = tangent.cross(*bitangent);
+            let t = (*center - origin).dot(normal) / direction.dot(normal);
+            let place = origin + direction * t - *center;
+            let inside =
+                half.is_none_or(|half| place.dot(*tangent).abs() <= half.x && place.dot(*bitangent).abs() <= half.y);
+            if inside && t.is_finite() { vec![t] } else { Vec::new() }
+        }
+    }
+}
+
+/// Outward unit normal and texture coordinates at a point of a surface.
+fn facing(form: &Form, point: DVec3) -> (DVec3, DVec2) {
+    match form {
+        Form::Quadric { q, from_local } => {
+            let gradient = *q * point.extend(1.0);
+            let local = from_local.inverse().transform_point3(point);
+            let turn = std::f64::consts::TAU;
+            let longitude = local.y.atan2(local.x) / turn;
+            let latitude = 0.5 + local.z.clamp(-1.0, 1.0).asin() / (turn / 2.0);
+            (
+                gradient.truncate().normalize(),
+                DVec2::new(longitude - longitude.floor(), latitude),
+            )
+        }
+        Form::Triangle([v0, v1, v2]) => {
+            let normal = (*v1 - *v0).cross(*v2 - *v1);
+            // Weights as ratios of areas.
+            let area = |a: DVec3, b: DVec3, c: DVec3| (b - a).cross(c - b).dot(normal);
+            let whole = area(*v0, *v1, *v2);
+            (
+                normal.normalize(),
+                DVec2::new(area(*v0, point, *v2), area(*v0, *v1, point)) / whole,
+            )
+        }
+        Form::Flat {
+            center,
+            tangent,
+            bitangent,
+            half,
+        } => {
+            let place = DVec2::new((point - *center).dot(*tangent), (point - *center).dot(*bitangent));
+            let uv = half.map_or(place, |half| place / (2.0 * half) + 0.5);
+            (tangent.cross(*bitangent), uv)
+        }
+    }
+}

@@ -1,0 +1,328 @@
+//! Every shared function, run on the device and on the CPU over thousands of inputs: the same bits.
+
+use glam::{UVec2, UVec4, Vec2, Vec3};
+use naga::ScalarKind;
+use wgray::cpu::camera::camera_ray;
+use wgray::cpu::ellipsoid::{ellipsoid_blocks, intersect_ellipsoid};
+use wgray::cpu::light::{Segments, segment, segments_to_light, segments_to_local};
+use wgray::cpu::math::{atan2, cross, dot, exp2, log2, max, min, normalize, power, power_whole};
+use wgray::cpu::phong::{Lobes, phong_block, phong_lobes, phong_power};
+use wgray::cpu::plane::{intersect_plane, plane_blocks};
+use wgray::cpu::ray::{
+    Hit, Ray, closer, crosses_plane, plane_distance, point_to_local, scaled_crossing, vector_to_local,
+};
+use wgray::cpu::rectangle::{intersect_rectangle, rectangle_blocks};
+use wgray::cpu::rng::{hash4, unit_float};
+use wgray::cpu::sampling::{grid_sample, random_sample, sample_key, sample_square};
+use wgray::cpu::shadow::{Block, Cone, block_sample, blocks, cone_to_light, may_block, shadow_bits};
+use wgray::cpu::surface::{Surface, first_hit, primitive_normal, primitive_uv, surface_at};
+use wgray::cpu::triangle::{intersect_triangle, triangle_blocks};
+use wgray::gpu::Device;
+use wgray::pack::{Camera, FirstHit, Light, Material, Primitive, Sphere};
+
+use crate::adapter::{self, allowed, judge};
+use crate::inputs::inputs;
+use crate::kernel::{Function, functions};
+use crate::random::Random;
+use crate::sources::{parse, shared_source, type_name};
+use crate::words::{Argument, Words};
+
+/// Calls of each function.
+const CALLS: usize = 8192;
+
+/// A twin by its name, over words.
+pub struct Probe {
+    pub name: &'static str,
+    /// The arguments' names.
+    arguments: &'static [&'static str],
+    pub run: fn(&mut &[u32], &mut Vec<u32>),
+}
+
+macro_rules! probes {
+    ($($name:ident($($argument:ident: $ty:ty),* $(,)?) -> $result:ty;)*) => {
+        /// The twins. A shared function that is not here fails the test.
+        pub const PROBES: &[Probe] = &[$(Probe {
+            name: stringify!($name),
+            arguments: &[$(stringify!($argument)),*],
+            run: |words, out| {
+                $(let $argument = <<$ty as Argument>::Owned as Words>::read(words);)*
+                let result: $result = $name($(<$ty as Argument>::of(&$argument)),*);
+                result.write(out);
+            },
+        }),*];
+    };
+}
+
+probes! {
+    dot(a: Vec3, b: Vec3) -> f32;
+    cross(a: Vec3, b: Vec3) -> Vec3;
+    normalize(v: Vec3) -> Vec3;
+    max(a: f32, b: f32) -> f32;
+    min(a: f32, b: f32) -> f32;
+    power_whole(x: f32, n: u32, bits: u32) -> f32;
+    power(x: f32, y: f32) -> f32;
+    log2(x: f32) -> f32;
+    exp2(x: f32) -> f32;
+    atan2(y: f32, x: f32) -> f32;
+    hash4(key: UVec4) -> UVec4;
+    unit_float(bits: u32) -> f32;
+    sample_square(pattern: u32, side: u32, index: u32, group: u32, key: UVec2) -> Vec2;
+    grid_sample(side: u32, index: u32) -> Vec2;
+    random_sample(index: u32, group: u32, key: UVec2) -> Vec2;
+    sample_key(pixel: UVec2, seed: u32, purpose: u32) -> UVec2;
+    point_to_local(q: &Primitive, p: Vec3) -> Vec3;
+    vector_to_local(q: &Primitive, v: Vec3) -> Vec3;
+    plane_distance(q: &Primitive, ray: Ray) -> f32;
+    crosses_plane(o: Vec3, d: Vec3, reach: f32) -> bool;
+    scaled_crossing(o: Vec3, d: Vec3) -> Vec2;
+    closer(hit: Hit, t: f32, i: u32) -> Hit;
+    intersect_rectangle(q: &Primitive, ray: Ray, limit: f32) -> f32;
+    rectangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
+    intersect_triangle(q: &Primitive, ray: Ray, limit: f32) -> f32;
+    triangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
+    intersect_ellipsoid(q: &Primitive, ray: Ray, limit: f32) -> f32;
+    ellipsoid_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
+    intersect_plane(q: &Primitive, ray: Ray, limit: f32) -> f32;
+    plane_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
+    camera_ray(camera: &Camera, at: Vec2) -> Ray;
+    primitive_normal(q: &Primitive, local: Vec3) -> Vec3;
+    surface_at(q: &Primitive, ray: Ray, t: f32, epsilon: f32) -> Surface;
+    primitive_uv(q: &Primitive, local: Vec3) -> Vec2;
+    first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit;
+    segments_to_light(light: &Light, p: Vec3) -> Segments;
+    segments_to_local(q: &Primitive, to: Segments) -> Segments;
+    segment(to: Segments, at: Vec2) -> Vec3;
+    shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: Block) -> u32;
+    block_sample(block: Block, i: u32) -> Vec2;
+    blocks(kind: u32, o: Vec3, d: Vec3, reach: f32) -> bool;
+    cone_to_light(light: &Light, p: Vec3) -> Cone;
+    may_block(sphere: &Sphere, cone: &Cone) -> bool;
+    phong_lobes(surface: Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes;
+    phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32;
+    phong_block(surface: Surface, material: &Material, to: Segments, block: Block, hidden: u32, exponent_bits: u32,
+                sum: Lobes) -> Lobes;
+}
+
+/// Shared functions that are not probed, and why.
+const EXCEPTIONS: &[(&str, &str)] = &[];
+
+/// The twin of a function.
+pub fn twin(name: &str) -> &'static Probe {
+    PROBES
+        .iter()
+        .find(|probe| probe.name == name)
+        .unwrap_or_else(|| panic!("{name} has no probe"))
+}
+
+impl Probe {
+    /// Its results for the words of many calls.
+    pub fn results(&self, words: &[u32], words_out: usize) -> Vec<u32> {
+        let mut words = words;
+        let mut out = Vec::new();
+        while !words.is_empty() {
+            let before = out.len();
+            (self.run)(&mut words, &mut out);
+            assert_eq!(
+                out.len() - before,
+                words_out,
+                "{}: the twin's result has other words",
+                self.name
+            );
+        }
+        out
+    }
+}
+
+/// Whether two words are the same value: the same bits, or both no number, whose bits no device promises.
+fn same(kind: ScalarKind, a: u32, b: u32) -> bool {
+    a == b || kind == ScalarKind::Float && f32::from_bits(a).is_nan() && f32::from_bits(b).is_nan()
+}
+
+/// Which calls have results that differ.
+fn differing(kinds: &[ScalarKind], a: &[u32], b: &[u32]) -> Vec<usize> {
+    assert_eq!(a.len(), b.len());
+    let calls = a.chunks_exact(kinds.len()).zip(b.chunks_exact(kinds.len())).enumerate();
+    let differ = calls.filter(|(_, (a, b))| !kinds.iter().zip(*a).zip(*b).all(|((kind, a), b)| same(*kind, *a, *b)));
+    differ.map(|(call, _)| call).collect()
+}
+
+fn show(kinds: &[ScalarKind], words: &[u32]) -> String {
+    let word = |(kind, word): (&ScalarKind, &u32)| match kind {
+        ScalarKind::Float => format!("{:?}", f32::from_bits(*word)),
+        _ => format!("{word}"),
+    };
+    kinds.iter().zip(words).map(word).collect::<Vec<_>>().join(" ")
+}
+
+/// Compares a function with its twin on a device.
+fn compare(device: &Device, function: &Function) -> Result<(), String> {
+    let (name, kinds) = (function.name(), function.words_out());
+    let words = inputs(function, CALLS, name.bytes().map(u64::from).sum());
+    let (gpu, cpu) = (function.run(device, &words), twin(name).results(&words, kinds.len()));
+    let differ = differing(&kinds, &gpu, &cpu);
+    let info = &device.info;
+    let known = allowed(adapter::KNOWN, &info.name, &info.driver, name);
+    judge(known, name, differ.len() as f64 / CALLS as f64).map_err(|message| {
+        let Some(&call) = differ.first() else { return message };
+        let (at, n) = (call * kinds.len(), function.words_in());
+        let kinds_in: Vec<ScalarKind> = vec![ScalarKind::Float; n];
+        let arguments = &words[call * n..(call + 1) * n];
+        format!(
+            "{message}, first call {call}:\n  arguments {}\n  GPU {}\n  CPU {}",
+            show(&kinds_in, arguments),
+            show(&kinds, &gpu[at..]),
+            show(&kinds, &cpu[at..])
+        )
+    })
+}
+
+#[test]
+fn every_shared_function_has_a_probe() {
+    let source = shared_source();
+    let module = parse(&source);
+    let mut names = Vec::new();
+    for (file, function) in functions(&module, &source) {
+        let name = function.name();
+        names.push(name.to_string());
+        if EXCEPTIONS.iter().any(|(exception, _)| *exception == name) {
+            continue;
+        }
+        let Some(probe) = PROBES.iter().find(|probe| probe.name == name) else {
+            panic!("{file}: {name} has no probe: add it to tests/probes.rs");
+        };
+        let arguments: Vec<String> = function.arguments().into_iter().map(|(name, _)| name).collect();
+        assert_eq!(arguments, probe.arguments, "{file}: {name}");
+    }
+    for name in PROBES
+        .iter()
+        .map(|probe| probe.name)
+        .chain(EXCEPTIONS.iter().map(|(name, _)| *name))
+    {
+        assert!(
+            names.iter().any(|n| n == name),
+            "{name} is probed, but no shared file has it"
+        );
+    }
+}
+
+#[test]
+fn functions_give_the_same_bits_on_gpu_and_cpu() {
+    let Some(device) = adapter::device() else { return };
+    let source = shared_source();
+    let module = parse(&source);
+    let functions = functions(&module, &source);
+    let probed = functions
+        .iter()
+        .filter(|(_, f)| !EXCEPTIONS.iter().any(|(exception, _)| *exception == f.name()));
+    let problems: Vec<String> = probed
+        .filter_map(|(file, f)| compare(device, f).err().map(|message| format!("{file}: {message}")))
+        .collect();
+    assert!(problems.is_empty(), "{}", problems.join("\n"));
+}
+
+/// The probes reach what a function decides: both answers of each that gives one, hits and misses of each intersection.
+#[test]
+fn inputs_take_both_ways_of_every_decision() {
+    let source = shared_source();
+    let module = parse(&source);
+    for (file, function) in functions(&module, &source) {
+        let (name, kinds) = (function.name(), function.words_out());
+        let Some(probe) = PROBES.iter().find(|probe| probe.name == name) else {
+            continue;
+        };
+        let words = inputs(&function, CALLS, 1);
+        let results = probe.results(&words, kinds.len());
+        let share = |wanted: &dyn Fn(u32) -> bool| {
+            results.iter().filter(|word| wanted(**word)).count() as f64 / results.len() as f64
+        };
+        if type_name(&module, function.result()) == "bool" {
+            let yes = share(&|word| word != 0);
+            assert!(
+                (0.05..0.95).contains(&yes),
+                "{file}: {name} is true for {yes} of the inputs"
+            );
+        }
+        if name.starts_with("intersect_") {
+            let per = function.words_in();
+            let limits = words.chunks_exact(per).map(|call| call[per - 1]);
+            let hits = results
+                .iter()
+                .zip(limits)
+                .filter(|(result, limit)| **result != *limit)
+                .count();
+            let hits = hits as f64 / CALLS as f64;
+            assert!(
+                (0.1..0.9).contains(&hits),
+                "{file}: {name} hits for {hits} of the inputs"
+            );
+        }
+        let nan = share(&|word| f32::from_bits(word).is_nan());
+        assert!(
+            kinds[0] != ScalarKind::Float || nan < 0.5,
+            "{file}: {name} is no number for {nan} of the inputs"
+        );
+    }
+}
+
+/// One unit in the last place, in one constant of a function, is found.
+#[test]
+fn a_function_that_differs_by_one_ulp_is_found() {
+    let Some(device) = adapter::device() else { return };
+    for (name, from, to) in [
+        ("log2", "2.8853900817779268", "2.8853903"),
+        ("exp2", "0.6931471805599453", "0.69314724"),
+        ("unit_float", "5.9604644775390625e-8", "5.9604652e-8"),
+        (
+            "dot",
+            "a.x * b.x + a.y * b.y + a.z * b.z",
+            "a.x * b.x + (a.y * b.y + a.z * b.z)",
+        ),
+        ("min", "select(b, a, a < b)", "select(b, a, a <= b)"), // signed zeros
+        ("max", "select(b, a, a > b)", "select(a, b, a < b)"),  // NaN
+    ] {
+        let mut source = shared_source();
+        assert!(
+            source.text.contains(from),
+            "{name}: '{from}' is not there to be changed"
+        );
+        let text = source.text.replacen(from, to, 1);
+        source = wgray::gpu::compose::Source::default();
+        source.append("changed", &text);
+        let module = parse(&source);
+        let (_, function) = functions(&module, &source)
+            .into_iter()
+            .find(|(_, f)| f.name() == name)
+            .expect("the function");
+        let kinds = function.words_out();
+        let words = inputs(&function, CALLS, 1);
+        let changed = function.run_in(device, &source, &words);
+        let differ = differing(&kinds, &changed, &twin(name).results(&words, kinds.len()));
+        assert!(!differ.is_empty(), "{name} with '{to}' in place of '{from}'");
+    }
+}
+
+/// What no number is to one argument does not become of the whole: `max(NaN, 0)` clears it.
+#[test]
+fn nan_does_not_spread_where_it_must_not() {
+    assert_eq!(max(f32::NAN, 0.0), 0.0);
+    assert_eq!(min(f32::NAN, 1.0), 1.0);
+    assert_eq!(power(f32::NAN, 2.0), 0.0);
+    let hit = Hit { t: 5.0, primitive: 3 };
+    assert_eq!(closer(hit, f32::NAN, 4), hit);
+    let source = shared_source();
+    let module = parse(&source);
+    let random = Random::new(7);
+    for (_, function) in functions(&module, &source) {
+        // A ray that has no numbers meets nothing.
+        if function.name().starts_with("intersect_") {
+            let mut words = inputs(&function, 500, random.bits());
+            let per = function.words_in();
+            for call in words.chunks_exact_mut(per) {
+                call[per - 1 - 6 + random.below(6) as usize] = f32::NAN.to_bits();
+                call[per - 1] = 100f32.to_bits();
+            }
+            let results = twin(function.name()).results(&words, 1);
+            assert!(results.iter().all(|r| *r == 100f32.to_bits()), "{}", function.name());
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Pictures whose values are known in closed form.
+
+use wgray::cpu::Cpu;
+use wgray::film::Film;
+use wgray::job::{Backend, Cut};
+use wgray::pack::Packed;
+
+use crate::backends::{BAKED, film, gpu, parse, whole};
+
+/// Both paths' pictures.
+fn films(scene: &Packed) -> [Film; 2] {
+    let backends: [&mut dyn Backend; 2] = [&mut Cpu::new(scene), &mut gpu(scene, BAKED)];
+    backends.map(|backend| film(backend, scene, whole(scene), &Cut::default()))
+}
+
+/// The camera looks straight down on the ground; a picture of 40 x 30 pixels shows 4 x 3 units.
+const DOWN: &str = r#"
+image = { width = 40, height = 30 }
+camera = { type = "orthographic", position = [0, 0, 5], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }
+[render]
+ambient = [0.1, 0.2, 0.3]
+background = [0.5, 0.25, 0.125]
+pixel_samples = { count = 1 }
+"#;
+
+const GROUND: &str = r#"
+[materials.ground]
+type = "phong"
+ambient = [0.5, 0.5, 1]
+diffuse = [0.6, 0.4, 0.2]
+specular = [0.25, 0.5, 0.75]
+shininess = 6
+[[shapes]]
+type = "plane"
+material = "ground"
+point = [7, -3, 0]
+normal = [0, 0, 1]
+tangent = [1, 1, 0]
+"#;
+
+/// A light 1.5 above (0.4, -0.3).
+const LIGHT: &str = r#"
+[[lights]]
+type = "point"
+position = [0.4, -0.3, 1.5]
+color = [1, 0.5, 2]
+"#;
+
+/// The largest difference of a picture from what a function says of the pixel centres, x to the right, y up.
+fn largest_error(film: &Film, expected: impl Fn(f64, f64) -> [f64; 3]) -> f64 {
+    let mut largest = 0.0f64;
+    for (i, found) in film.means().enumerate() {
+        let (column, row) = (i % 40, i / 40);
+        let value = expected((column as f64 + 0.5) / 10.0 - 2.0, 1.5 - (row as f64 + 0.5) / 10.0);
+        for (found, expected) in found.iter().zip(value) {
+            largest = largest.max((f64::from(*found) - expected).abs());
+        }
+    }
+    largest
+}
+
+/// What the point light adds: seen along the normal, the cosines to the light and from its mirrored direction to the
+/// viewer are the same, h / sqrt(h^2 + d^2).
+fn point_light(x: f64, y: f64, power: i32) -> [f64; 3] {
+    let (h, dx, dy) = (1.5, x - 0.4, y + 0.3);
+    let cosine = h / (h * h + dx * dx + dy * dy).sqrt();
+    let term = |color: f64, diffuse: f64, specular: f64| color * (diffuse * cosine + specular * cosine.powi(power));
+    let ambient = [0.05, 0.1, 0.3];
+    let added = [term(1.0, 0.6, 0.25), term(0.5, 0.4, 0.5), term(2.0, 0.2, 0.75)];
+    [0, 1, 2].map(|i| ambient[i] + added[i])
+}
+
+#[test]
+fn a_point_light_over_a_plane() {
+    // Light is seen from where shadow rays start; the formula knows of no offset.
+    let down = DOWN.replace("[render]", "[render]\nshadow_epsilon = 0");
+    let scene = parse(&format!("{down}{GROUND}{LIGHT}"));
+    for film in films(&scene) {
+        let error = largest_error(&film, |x, y| point_light(x, y, 6));
+        assert!(error < 2e-6, "{error}");
+        let without_cosine = largest_error(&film, |x, y| point_light(x, y, 5));
+        assert!(without_cosine > 0.01, "the wrong formula is told from the right one");
+    }
+}
+
+#[test]
+fn ambient_light_alone() {
+    let scene = parse(&format!("{DOWN}{GROUND}"));
+    for film in films(&scene) {
+        let (expected, wrong) = ([0.1f32 * 0.5, 0.2 * 0.5, 0.3 * 1.0], [0.1f32, 0.2, 0.3]);
+        assert!(film.means().all(|color| color == expected));
+        assert!(
+            !film.means().all(|color| color == wrong),
+            "without the material's factor"
+        );
+    }
+}
+
+#[test]
+fn nothing_but_background() {
+    let scene = parse(&format!("{DOWN}{LIGHT}"));
+    for film in films(&scene) {
+        assert!(film.means().all(|color| color == [0.5, 0.25, 0.125]));
+    }
+}
+
+#[test]
+fn a_light_from_below_reaches_no_ground_above() {
+    let below = LIGHT.replace("1.5]", "-1.5]");
+    let [lit, unlit] = [LIGHT, &below].map(|light| films(&parse(&format!("{DOWN}{GROUND}{light}"))));
+    for (lit, unlit) in lit.iter().zip(&unlit) {
+        assert!(
+            unlit.means().all(|color| color == [0.1 * 0.5, 0.2 * 0.5, 0.3]),
+            "only ambient light"
+        );
+        assert!(lit.means().all(|color| color[0] > 0.1));
+    }
+}
+
+/// A sphere of radius 0.5, one unit above the ground, under a directional light from straight above: its shadow is the
+/// disc of radius 0.5 below, which the sphere itself would hide from a camera above. So the camera is below the sphere:
+/// its image plane, where rays start, is at 0.25.
+#[test]
+fn a_sphere_in_parallel_light_casts_a_disc() {
+    let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
+    let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'ground'\ncenter = [0.2, 0.1, 1]\nradius = 0.5\n";
+    let light = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -2]\ncolor = [1, 1, 1]\n";
+    let disc = |radius: f64| {
+        move |x: f64, y: f64| {
+            let lit = (x - 0.2).hypot(y - 0.1) > radius;
+            let color = [0.6 + 0.25, 0.4 + 0.5, 0.2 + 0.75];
+            [0, 1, 2].map(|i| [0.05, 0.1, 0.3][i] + if lit { color[i] } else { 0.0 })
+        }
+    };
+    for film in films(&parse(&format!("{scene}{GROUND}{sphere}{light}"))) {
+        let error = largest_error(&film, disc(0.5));
+        assert!(error < 1e-6, "{error}");
+        assert!(largest_error(&film, disc(0.6)) > 0.5, "a larger disc is told from it");
+    }
+}

@@ -1,0 +1,37 @@
+//! The project's scenes, small: every file of `scenes/`, whatever it is called.
+
+use std::fs;
+
+use wgray::pack::{Packed, pack};
+use wgray::scene::Description;
+
+use crate::sources;
+
+/// What every file of `scenes/` says, by its name.
+pub fn descriptions() -> Vec<(String, Description)> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(sources::path("scenes")).expect("the scenes") {
+        let path = entry.expect("an entry").path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            let name = path.file_name().expect("a file").to_string_lossy().into_owned();
+            let text = fs::read_to_string(&path).expect("a scene");
+            found.push((name.clone(), Description::parse(&text, &name).expect("a sound scene")));
+        }
+    }
+    assert!(found.len() >= 4, "the scenes were not found");
+    found.sort_by(|a, b| a.0.cmp(&b.0));
+    found
+}
+
+/// A description as the backends read it.
+pub fn packed(description: &Description) -> Packed {
+    pack(&description.validate().unwrap_or_else(|problem| panic!("{problem:?}")))
+}
+
+/// The scenes as they are.
+pub fn all() -> Vec<(String, Packed)> {
+    descriptions()
+        .iter()
+        .map(|(name, description)| (name.clone(), packed(description)))
+        .collect()
+}

@@ -1,0 +1,227 @@
+//! The two texts of the shared mathematics, as naga and syn read them: which functions and records are where.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use naga::{ArraySize, Module, ScalarKind, TypeInner};
+use syn::{FnArg, Item, Pat, ReturnType, Type};
+use wgray::gpu::compose::{SHARED, Shaders, Source};
+
+/// A folder of shaders to test in place of the ones in the program: what `scripts/mutate` has changed.
+const SHADERS: &str = "WGRAY_TEST_SHADERS";
+
+/// A path of the project.
+pub fn path(relative: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(relative)
+}
+
+/// The shaders under test.
+pub fn shaders() -> &'static Shaders {
+    static SHADERS_UNDER_TEST: OnceLock<Shaders> = OnceLock::new();
+    SHADERS_UNDER_TEST.get_or_init(|| match std::env::var_os(SHADERS) {
+        Some(folder) => Shaders::read(Path::new(&folder)).expect("the shaders under test"),
+        None => Shaders::built_in(),
+    })
+}
+
+/// The shared files by themselves: that naga accepts them shows that they read no binding and no override.
+pub fn shared_source() -> Source {
+    let mut source = Source::default();
+    for file in SHARED {
+        source.append(file, shaders().text(file));
+    }
+    source
+}
+
+pub fn parse(source: &Source) -> Module {
+    naga::front::wgsl::parse_str(&source.text)
+        .unwrap_or_else(|error| panic!("{}", error.emit_to_string_with_path(&source.text, "composed.wgsl")))
+}
+
+/// The file that something in a module comes from.
+pub fn file_of(source: &Source, span: naga::Span) -> String {
+    let range = span.to_range().expect("naga knows where everything was written");
+    source.locate(range.start).expect("inside of the text").0.to_string()
+}
+
+/// A name and a type, which is written as in WGSL: `vec3<f32>`, `Primitive`.
+pub type Named = (String, String);
+
+/// A function's or a record's outside.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Signature {
+    pub name: String,
+    /// A function's arguments; a record's fields.
+    pub parts: Vec<Named>,
+    /// A function's result.
+    pub result: Option<String>,
+}
+
+/// The functions of a WGSL file, in its order.
+pub fn wgsl_functions(module: &Module, source: &Source, file: &str) -> Vec<Signature> {
+    let mut functions: Vec<(naga::Span, Signature)> = Vec::new();
+    for (handle, function) in module.functions.iter() {
+        let span = module.functions.get_span(handle);
+        if file_of(source, span) == file {
+            let argument = |a: &naga::FunctionArgument| (a.name.clone().unwrap_or_default(), type_name(module, a.ty));
+            let signature = Signature {
+                name: function.name.clone().unwrap_or_default(),
+                parts: function.arguments.iter().map(argument).collect(),
+                result: function.result.as_ref().map(|result| type_name(module, result.ty)),
+            };
+            functions.push((span, signature));
+        }
+    }
+    functions.sort_by_key(|(span, _)| span.to_range().map(|range| range.start));
+    functions.into_iter().map(|(_, signature)| signature).collect()
+}
+
+/// The records that a WGSL file declares, in its order.
+pub fn wgsl_records(module: &Module, source: &Source, file: &str) -> Vec<Signature> {
+    let mut records: Vec<(naga::Span, Signature)> = Vec::new();
+    for (handle, ty) in module.types.iter() {
+        let TypeInner::Struct { members, .. } = &ty.inner else {
+            continue;
+        };
+        let span = module.types.get_span(handle);
+        if file_of(source, span) == file {
+            let field = |m: &naga::StructMember| (m.name.clone().unwrap_or_default(), type_name(module, m.ty));
+            let name = ty.name.clone().unwrap_or_default();
+            records.push((
+                span,
+                Signature {
+                    name,
+                    parts: members.iter().map(field).collect(),
+                    result: None,
+                },
+            ));
+        }
+    }
+    records.sort_by_key(|(span, _)| span.to_range().map(|range| range.start));
+    records.into_iter().map(|(_, signature)| signature).collect()
+}
+
+pub fn type_name(module: &Module, ty: naga::Handle<naga::Type>) -> String {
+    let scalar = |scalar: naga::Scalar| match (scalar.kind, scalar.width) {
+        (ScalarKind::Float, 4) => "f32",
+        (ScalarKind::Uint, 4) => "u32",
+        (ScalarKind::Sint, 4) => "i32",
+        (ScalarKind::Bool, _) => "bool",
+        other => panic!("no shared record or function has a scalar {other:?}"),
+    };
+    let inner = &module.types[ty];
+    match &inner.inner {
+        TypeInner::Scalar(s) => scalar(*s).to_string(),
+        TypeInner::Vector { size, scalar: s } => format!("vec{}<{}>", *size as u8, scalar(*s)),
+        TypeInner::Struct { .. } => inner.name.clone().unwrap_or_default(),
+        TypeInner::Array {
+            base,
+            size: ArraySize::Constant(n),
+            ..
+        } => format!("array<{}, {n}>", type_name(module, *base)),
+        TypeInner::Array { base, .. } => format!("array<{}>", type_name(module, *base)),
+        other => format!("{other:?}"),
+    }
+}
+
+/// A Rust file of the project, read when the test runs.
+pub fn rust(relative: &str) -> syn::File {
+    let path = path(relative);
+    let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    syn::parse_file(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// All functions of a Rust file outside of its tests and `impl`s, in its order.
+pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
+    let argument = |input: &FnArg| match input {
+        FnArg::Typed(typed) => match &*typed.pat {
+            Pat::Ident(name) => (name.ident.to_string(), rust_type(&typed.ty)),
+            other => panic!("a twin's argument has a name, not {other:?}"),
+        },
+        FnArg::Receiver(_) => unreachable!("a free function"),
+    };
+    let function = |item: &Item| match item {
+        Item::Fn(function) => Some(Signature {
+            name: function.sig.ident.to_string(),
+            parts: function.sig.inputs.iter().map(argument).collect(),
+            result: match &function.sig.output {
+                ReturnType::Default => None,
+                ReturnType::Type(_, ty) => Some(rust_type(ty)),
+            },
+        }),
+        _ => None,
+    };
+    file.items.iter().filter_map(function).collect()
+}
+
+/// The structs of a Rust file for which `wanted` holds, in its order.
+pub fn rust_records(file: &syn::File, wanted: impl Fn(&syn::ItemStruct) -> bool) -> Vec<Signature> {
+    let field = |f: &syn::Field| {
+        (
+            f.ident.as_ref().map(|i| i.to_string()).unwrap_or_default(),
+            rust_type(&f.ty),
+        )
+    };
+    let record = |item: &Item| match item {
+        Item::Struct(s) if wanted(s) => Some(Signature {
+            name: s.ident.to_string(),
+            parts: s.fields.iter().map(field).collect(),
+            result: None,
+        }),
+        _ => None,
+    };
+    file.items.iter().filter_map(record).collect()
+}
+
+/// A Rust type as WGSL writes it. Records are passed by reference in Rust and by value in WGSL.
+fn rust_type(ty: &Type) -> String {
+    match ty {
+        Type::Reference(reference) => rust_type(&reference.elem),
+        Type::Array(array) => {
+            let length = &array.len;
+            let syn::Expr::Lit(syn::ExprLit {
+                lit: syn::Lit::Int(length),
+                ..
+            }) = length
+            else {
+                panic!("the length of a shared array is a literal, not {length:?}");
+            };
+            format!("array<{}, {}>", rust_type(&array.elem), length.base10_digits())
+        }
+        Type::Path(path) => {
+            let name = path.path.segments.last().expect("a path has a name").ident.to_string();
+            let (vector, scalar) = match name.strip_suffix(['2', '3', '4']) {
+                Some("Vec") => (true, "f32"),
+                Some("UVec") => (true, "u32"),
+                Some("IVec") => (true, "i32"),
+                _ => (false, ""),
+            };
+            if vector {
+                format!("vec{}<{scalar}>", &name[name.len() - 1..])
+            } else {
+                name
+            }
+        }
+        other => format!("{other:?}"), // like nothing in WGSL
+    }
+}
+
+/// How two lists differ, as lines for a person; nothing where they are the same.
+pub fn differences(place: &str, wgsl: &[Signature], rust: &[Signature]) -> Vec<String> {
+    let mut problems = Vec::new();
+    for w in wgsl {
+        match rust.iter().find(|r| r.name == w.name) {
+            None => problems.push(format!("{place}: {} is in WGSL, not in Rust", w.name)),
+            Some(r) if r != w => problems.push(format!("{place}: {} differs:\n  WGSL {w:?}\n  Rust {r:?}", w.name)),
+            Some(_) => {}
+        }
+    }
+    for r in rust.iter().filter(|r| !wgsl.iter().any(|w| w.name == r.name)) {
+        problems.push(format!("{place}: {} is in Rust, not in WGSL", r.name));
+    }
+    if problems.is_empty() && wgsl != rust {
+        problems.push(format!("{place}: the order differs"));
+    }
+    problems
+}

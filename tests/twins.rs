@@ -1,0 +1,300 @@
+//! The shared mathematics are the same functions in WGSL and in Rust, and what the device gets of them holds no
+//! floating-point operation that a driver may compute in another way.
+
+use std::collections::BTreeSet;
+
+use wgray::gpu::compose::{Kernel, SHARED, Source};
+use wgray::gpu::spirv::instructions;
+use wgray::gpu::{bake, check};
+use wgray::pack::Packed;
+
+use crate::scenes;
+use crate::sources::{self, Signature, differences, parse, rust_functions, rust_records, shared_source};
+
+/// Files of records and constants, whose other side is `src/pack.rs`: `layout` compares them.
+const RECORDS: &[&str] = &["layout.wgsl", "constants.wgsl"];
+
+/// Files without a twin, and why.
+const WITHOUT_TWIN: &[(&str, &str)] = &[
+    ("bindings.wgsl", "buffers only"),
+    ("specialization.wgsl", "overrides only"),
+    (
+        "scene.wgsl",
+        "how a kernel reads the scene; baked kernels have the same functions with constants",
+    ),
+];
+
+/// Files of `src/cpu` that are no file's twin.
+const NO_TWIN: &[&str] = &["mod.rs", "renderer.rs"];
+
+/// Functions and records that only one side has, or that differ, and why: file, name, reason.
+const ONE_SIDED: &[(&str, &str, &str)] = &[
+    (
+        "traverse.wgsl",
+        "closest_hit",
+        "in WGSL it is in scene.wgsl, as it reads the scene",
+    ),
+    (
+        "traverse.wgsl",
+        "hidden_by",
+        "Rust has a range of indices where WGSL has two numbers",
+    ),
+];
+
+/// How the functions and records of a WGSL file differ from those of its twin.
+fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String> {
+    let module = parse(source);
+    let two_sided = |s: &Signature| !ONE_SIDED.iter().any(|(f, name, _)| *f == file && *name == s.name);
+    let functions: Vec<_> = sources::wgsl_functions(&module, source, file)
+        .into_iter()
+        .filter(two_sided)
+        .collect();
+    let mut twins: Vec<_> = rust_functions(twin).into_iter().filter(two_sided).collect();
+    if !SHARED.contains(&file) {
+        for twin in &mut twins {
+            if twin.parts.first().is_some_and(|(_, ty)| ty == "Packed") {
+                twin.parts.remove(0);
+            }
+        }
+    }
+    let records = sources::wgsl_records(&module, source, file);
+    let twin_records: Vec<_> = rust_records(twin, |_| true).into_iter().filter(two_sided).collect();
+    let mut problems = differences(file, &functions, &twins);
+    problems.extend(differences(file, &records, &twin_records));
+    problems
+}
+
+fn twin_of(file: &str) -> syn::File {
+    sources::rust(&format!("src/cpu/{}", file.replace(".wgsl", ".rs")))
+}
+
+#[test]
+fn functions_and_records_are_the_same() {
+    let shared = shared_source();
+    let kernel = sources::shaders().compose(Kernel::Render, None);
+    let mut problems = Vec::new();
+    for (file, _) in wgray::gpu::compose::BUILT_IN {
+        if file.starts_with("kernels/") || RECORDS.contains(file) || WITHOUT_TWIN.iter().any(|(f, _)| f == file) {
+            continue;
+        }
+        // What reads overrides or bindings, in the kernel: its twins take the scene first.
+        let source = if SHARED.contains(file) { &shared } else { &kernel };
+        let count = sources::wgsl_functions(&parse(source), source, file).len();
+        assert!(count > 0, "{file}: no function was found");
+        problems.extend(twin_differences(source, file, &twin_of(file)));
+    }
+    assert!(problems.is_empty(), "{}", problems.join("\n"));
+}
+
+#[test]
+fn a_twin_that_drifted_is_found() {
+    let shared = shared_source();
+    let changed = |file: &str, from: &str, to: &str| {
+        let text = std::fs::read_to_string(sources::path(&format!("src/cpu/{file}"))).expect("a twin");
+        assert!(text.contains(from), "{file}: '{from}' is not there to be changed");
+        syn::parse_file(&text.replacen(from, to, 1)).expect("still Rust")
+    };
+    for (what, file, from, to) in [
+        (
+            "swapped arguments",
+            "math.rs",
+            "cross(a: Vec3, b: Vec3)",
+            "cross(b: Vec3, a: Vec3)",
+        ),
+        ("another type", "ray.rs", "t: f32, i: u32", "t: f32, i: i32"),
+        ("another result", "rng.rs", "(bits: u32) -> f32", "(bits: u32) -> f64"),
+        ("a renamed function", "plane.rs", "fn plane_blocks", "fn plane_block"),
+        (
+            "one more function",
+            "plane.rs",
+            "pub fn plane_blocks",
+            "fn more() {}\npub fn plane_blocks",
+        ),
+        ("a renamed field", "light.rs", "pub towards: Vec3", "pub toward: Vec3"),
+        (
+            "moved fields",
+            "phong.rs",
+            "pub diffuse: f32,\n    pub specular: f32",
+            "pub specular: f32,\n    pub diffuse: f32",
+        ),
+    ] {
+        let twin = changed(file, from, to);
+        assert!(
+            !twin_differences(&shared, &file.replace(".rs", ".wgsl"), &twin).is_empty(),
+            "{what}"
+        );
+    }
+}
+
+#[test]
+fn every_twin_is_some_files() {
+    for entry in std::fs::read_dir(sources::path("src/cpu")).expect("the twins") {
+        let name = entry
+            .expect("an entry")
+            .file_name()
+            .into_string()
+            .expect("a plain name");
+        let wgsl = name.replace(".rs", ".wgsl");
+        let twin = wgray::gpu::compose::BUILT_IN.iter().any(|(file, _)| *file == wgsl);
+        assert!(
+            twin || NO_TWIN.contains(&name.as_str()),
+            "src/cpu/{name} is no file's twin"
+        );
+    }
+}
+
+/// SPIR-V's instructions that may be in a kernel, by what they are. Of those on floats: the arithmetic that
+/// `NoContraction` protects, comparisons, conversions, and what moves bits.
+mod opcode {
+    use std::ops::RangeInclusive;
+
+    /// Names, modes, decorations, types, constants, variables.
+    pub const DECLARATIONS: &[RangeInclusive<u16>] =
+        &[3..=8, 10..=11, 14..=17, 19..=24, 28..=30, 32..=33, 41..=46, 71..=72];
+    /// Functions, memory and control flow.
+    pub const STRUCTURE: &[RangeInclusive<u16>] = &[1..=1, 54..=57, 59..=59, 61..=62, 65..=65, 68..=68, 245..=255];
+    /// Vectors and records put together and taken apart; copies; selections; bits read as another type.
+    pub const MOVES: &[RangeInclusive<u16>] = &[77..=83, 124..=124, 169..=169];
+    /// Integers, logic and comparisons.
+    pub const INTEGERS: &[RangeInclusive<u16>] = &[
+        126..=126,
+        128..=128,
+        130..=130,
+        132..=132,
+        134..=135,
+        137..=139,
+        149..=152,
+        154..=155,
+        164..=168,
+        170..=179,
+        194..=205,
+    ];
+    /// Comparisons of floats; conversions between floats and integers.
+    pub const COMPARISONS: &[RangeInclusive<u16>] = &[109..=112, 156..=157, 180..=191];
+    /// Negate, add, subtract, multiply, divide, vector times scalar.
+    pub const ARITHMETIC: &[u16] = &[127, 129, 131, 133, 136, 142];
+
+    pub const FUNCTION: u16 = 54;
+    pub const EXTENDED: u16 = 12;
+    pub const DECORATE: u16 = 71;
+    pub const NO_CONTRACTION: u32 = 42;
+    /// Of GLSL.std.450: absolute value of a float and of an integer, square root, integer minimum,
+    /// maximum and clamp, the place of the first bit.
+    pub const EXTENDED_ALLOWED: &[u32] = &[4, 5, 31, 38, 39, 41, 42, 44, 45, 73, 74, 75];
+    /// Of GLSL.std.450: naga clamps a float with it before it makes an integer of it, which is exact but for NaN.
+    pub const FLOAT_CLAMP: u32 = 43;
+    pub const FLOAT_TO_INTEGER: &[u16] = &[109, 110];
+}
+
+/// The floating-point operations of a module that two devices may compute differently.
+fn violations(module: &[u32]) -> Vec<String> {
+    let decorated: BTreeSet<u32> = instructions(module)
+        .filter(|(op, words)| *op == opcode::DECORATE && words[2] == opcode::NO_CONTRACTION)
+        .map(|(_, words)| words[1])
+        .collect();
+    let groups = [
+        opcode::DECLARATIONS,
+        opcode::STRUCTURE,
+        opcode::MOVES,
+        opcode::INTEGERS,
+        opcode::COMPARISONS,
+    ];
+    let mut problems = Vec::new();
+    for (op, words) in instructions(module) {
+        if opcode::ARITHMETIC.contains(&op) {
+            if !decorated.contains(&words[2]) {
+                problems.push(format!("%{} (opcode {op}) may be contracted", words[2]));
+            }
+        } else if op == opcode::EXTENDED {
+            let for_integer = words[4] == opcode::FLOAT_CLAMP && only_made_integer(module, words[2]);
+            if !opcode::EXTENDED_ALLOWED.contains(&words[4]) && !for_integer {
+                problems.push(format!("extended instruction {}", words[4]));
+            }
+        } else if !groups.iter().any(|group| group.iter().any(|range| range.contains(&op))) {
+            problems.push(format!("opcode {op}"));
+        }
+    }
+    problems
+}
+
+/// Whether a result goes nowhere but into conversions to integers.
+fn only_made_integer(module: &[u32], result: u32) -> bool {
+    let defines = |op: u16, words: &[u32]| op == opcode::EXTENDED && words[2] == result;
+    let functions = instructions(module).skip_while(|(op, _)| *op != opcode::FUNCTION);
+    let mut users = functions.filter(|(op, words)| words[1..].contains(&result) && !defines(*op, words));
+    users.all(|(op, _)| opcode::FLOAT_TO_INTEGER.contains(&op))
+}
+
+fn spirv(source: &Source, kernel: Kernel, packed: &Packed) -> Vec<u32> {
+    let checked =
+        check(source).unwrap_or_else(|error| panic!("{error}\n{}", error.excerpt.clone().unwrap_or_default()));
+    checked.exact_spirv(kernel, &packed.specialization).expect("a kernel")
+}
+
+#[test]
+fn kernels_hold_no_operation_that_devices_may_compute_differently() {
+    let mut operations = 0;
+    for (name, packed) in scenes::all() {
+        for kernel in [Kernel::Render, Kernel::Aov] {
+            for baked in [None, Some(bake(&packed))] {
+                let module = spirv(&sources::shaders().compose(kernel, baked.as_deref()), kernel, &packed);
+                operations += instructions(&module)
+                    .filter(|(op, _)| opcode::ARITHMETIC.contains(op))
+                    .count();
+                let problems = violations(&module);
+                assert!(
+                    problems.is_empty(),
+                    "{name}, {kernel:?}, baked {}: {problems:?}",
+                    baked.is_some()
+                );
+            }
+        }
+    }
+    assert!(operations > 1000, "the scan saw next to nothing");
+}
+
+#[test]
+fn an_operation_that_devices_may_compute_differently_is_found() {
+    let (_, packed) = scenes::all().remove(0);
+    let source = sources::shaders().compose(Kernel::Render, None);
+    let from = "    var sum = environment.ambient * material.ambient;\n";
+    assert!(source.text.contains(from));
+    for to in [
+        "    var sum = mix(environment.ambient, material.ambient, 0.5);\n",
+        "    var sum = fma(environment.ambient, material.ambient, surface.normal);\n",
+        "    var sum = mat3x3f(surface.normal, surface.wo, surface.start) * material.ambient;\n",
+        "    var sum = environment.ambient % material.ambient;\n",
+        "    var sum = floor(material.ambient);\n",
+        "    var sum = clamp(material.ambient, vec3f(0.0), vec3f(1.0));\n",
+        "    var sum = vec3f(pow(material.shininess, 2.0));\n",
+        "    var sum = vec3f(inverseSqrt(material.shininess));\n",
+        "    var sum = vec3f(length(material.ambient));\n",
+        "    var sum = vec3f(sin(material.shininess));\n",
+    ] {
+        let mut changed = Source::default();
+        changed.append("changed", &source.text.replacen(from, to, 1));
+        assert!(
+            !violations(&spirv(&changed, Kernel::Render, &packed)).is_empty(),
+            "{to}"
+        );
+    }
+    let module = spirv(&source, Kernel::Render, &packed);
+    assert_eq!(violations(&module), Vec::<String>::new());
+    let decorations: Vec<usize> = positions(&module)
+        .filter(|at| module[*at] as u16 == opcode::DECORATE && module[at + 2] == opcode::NO_CONTRACTION)
+        .collect();
+    assert!(decorations.len() > 100);
+    let mut without = module.clone();
+    without.drain(decorations[17]..decorations[17] + 3);
+    assert_eq!(violations(&without).len(), 1, "one undecorated operation");
+}
+
+/// Where the instructions of a module start.
+fn positions(module: &[u32]) -> impl Iterator<Item = usize> {
+    let mut at = 5; // behind the header
+    instructions(module).map(move |(_, words)| {
+        let start = at;
+        at += words.len();
+        start
+    })
+}

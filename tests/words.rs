@@ -1,0 +1,107 @@
+//! Values as the 32-bit words of their scalars, in the order of their fields: how they travel to a kernel and back.
+
+use glam::{IVec2, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
+use wgray::cpu::light::Segments;
+use wgray::cpu::phong::Lobes;
+use wgray::cpu::ray::{Hit, Ray};
+use wgray::cpu::shadow::{Block, Cone};
+use wgray::cpu::surface::Surface;
+use wgray::pack::{Camera, Environment, FirstHit, Light, Material, Primitive, Sphere};
+
+pub trait Words: Sized {
+    /// Takes its words from the front.
+    fn read(words: &mut &[u32]) -> Self;
+    /// Adds its words.
+    fn write(&self, words: &mut Vec<u32>);
+}
+
+/// The scalars that a word may be of.
+macro_rules! scalars {
+    ($($ty:ty: |$bits:ident| $from:expr, |$value:ident| $to:expr;)*) => {$(
+        impl Words for $ty {
+            fn read(words: &mut &[u32]) -> Self {
+                let ($bits, rest) = words.split_first().expect("as many words as the type has");
+                *words = rest;
+                $from
+            }
+            fn write(&self, words: &mut Vec<u32>) {
+                let $value = *self;
+                words.push($to);
+            }
+        }
+    )*};
+}
+scalars! {
+    f32: |bits| f32::from_bits(*bits), |x| x.to_bits();
+    u32: |bits| *bits, |x| x;
+    i32: |bits| *bits as i32, |x| x as u32;
+    bool: |bits| *bits != 0, |x| u32::from(x);
+}
+
+/// Types with nothing but their words, uploaded as they are.
+macro_rules! pod {
+    ($($ty:ty),* $(,)?) => {$(
+        impl Words for $ty {
+            fn read(words: &mut &[u32]) -> Self {
+                let (own, rest) = words.split_at(size_of::<$ty>() / 4);
+                *words = rest;
+                bytemuck::pod_read_unaligned(bytemuck::cast_slice(own))
+            }
+            fn write(&self, words: &mut Vec<u32>) {
+                words.extend(bytemuck::bytes_of(self).chunks_exact(4).map(bytemuck::pod_read_unaligned::<u32>));
+            }
+        }
+    )*};
+}
+pod![Vec2, Vec3, Vec4, UVec2, UVec3, UVec4, IVec2];
+pod![Camera, Environment, Primitive, Material, Light, FirstHit, Sphere];
+
+/// Records of `src/cpu/`; a field that is missing here does not compile.
+macro_rules! records {
+    ($($ty:ident { $($field:ident),* $(,)? })*) => {$(
+        impl Words for $ty {
+            fn read(words: &mut &[u32]) -> Self {
+                $(let $field = Words::read(words);)*
+                $ty { $($field),* }
+            }
+            fn write(&self, words: &mut Vec<u32>) {
+                let $ty { $($field),* } = self;
+                $($field.write(words);)*
+            }
+        }
+    )*};
+}
+records! {
+    Ray { origin, direction }
+    Hit { t, primitive }
+    Surface { position, normal, wo, start }
+    Segments { towards, u, v }
+    Lobes { diffuse, specular }
+    Block { pattern, side, first, count, group, key }
+    Cone { apex, to, length2, inverse_depth }
+}
+
+/// Something that a twin takes as an argument, by value or by reference.
+pub trait Argument<'a>: Sized {
+    type Owned: Words;
+    fn of(owned: &'a Self::Owned) -> Self;
+}
+
+impl<'a, T: Words + Copy> Argument<'a> for T {
+    type Owned = T;
+    fn of(owned: &'a T) -> T {
+        *owned
+    }
+}
+
+macro_rules! by_reference {
+    ($($ty:ty),*) => {$(
+        impl<'a> Argument<'a> for &'a $ty {
+            type Owned = $ty;
+            fn of(owned: &'a $ty) -> &'a $ty {
+                owned
+            }
+        }
+    )*};
+}
+by_reference![Camera, Environment, Primitive, Material, Light, Sphere, Cone];
