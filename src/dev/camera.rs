@@ -210,7 +210,7 @@ mod tests {
         let text = text(&moved(&perspective(), Move::Orbit(0.3, 0.2)));
         assert_eq!(
             text,
-            "[camera]\nposition = [-1.15853, -3.74518, 1.79468]\nlook_at = [0, 0, 1]\nup = [0, 0, 1]\nfov = 45\n"
+            "[camera]\nposition = [-1.15852, -3.74517, 1.79468]\nlook_at = [0, 0, 1]\nup = [0, 0, 1]\nfov = 45\n"
         );
     }
 

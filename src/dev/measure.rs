@@ -83,10 +83,8 @@ pub fn measure(sources: &Sources, device: Choice) -> Result<Vec<Measured>, Strin
             "kernels/render.wgsl must contain '{PLACE}', which is changed to measure"
         ));
     }
-    // Seconds within a day, so that each run of the program has kernels of its own.
-    let now = SystemTime::now()
-        .duration_since(SystemTime::UNIX_EPOCH)
-        .map_or(0, |time| time.as_millis() % 86_400_000);
+    // Every run has kernels of its own: factors that are not the same as f32.
+    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |time| time.as_millis() % 65_536);
     Ok(vec![
         clock.all("scene save", &mut |i, _| {
             fs::write(scene.path(), brighter(&text, i)).map_err(told)
@@ -96,10 +94,10 @@ pub fn measure(sources: &Sources, device: Choice) -> Result<Vec<Measured>, Strin
             Ok(())
         })?,
         clock.all("shader save", &mut |i, _| {
-            let factor = 1.0 + (now as f64 + i as f64) * 1e-9;
+            let factor = 1.0 + (now as f64 * ROUNDS as f64 + i as f64) / f64::from(1 << 21);
             fs::write(
                 &kernel,
-                kernel_text.replace(PLACE, &format!("({PLACE} * {factor:.12})")),
+                kernel_text.replace(PLACE, &format!("({PLACE} * {factor:?})")),
             )
             .map_err(told)
         })?,

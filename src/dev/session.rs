@@ -117,6 +117,9 @@ pub enum Event {
     Built(Box<Built>),
     /// Someone asks for something.
     Command(Command),
+    /// A driver loses its device.
+    #[cfg(test)]
+    Lose,
     /// The session ends.
     Stop,
 }
@@ -234,4 +237,125 @@ fn run(mut painter: Painter, inbox: Receiver<Event>) {
         }
     }
     drop(inbox); // first: other threads may wait for room in it, and the painter for them
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::time::Duration;
+
+    use super::*;
+    use crate::dev::picture::Content;
+    use crate::gpu::compose::{BUILT_IN, Shaders};
+    use crate::image::Pixels;
+    use crate::scene::Overrides;
+
+    const SCENE: &str = "
+        image = { width = 8, height = 8 }
+        camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }
+        render = { ambient = [1, 1, 1], pixel_samples = { count = 4 } }
+        materials.m = { type = 'phong', color = [0.5, 0.5, 0.5] }
+        shapes = [{ type = 'sphere', material = 'm', center = [0, 0, 0], radius = 1 }]
+    ";
+
+    fn wait<T>(what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(40) {
+            if let Some(value) = ready() {
+                return value;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        panic!("{what} does not come");
+    }
+
+    fn finished(session: &Session, after: u64) -> (u64, Pixels) {
+        wait("a picture", || {
+            let frame = session.frames.borrow().clone()?;
+            let header = &frame.header;
+            match &frame.content {
+                Content::Color(pixels) if header.done && header.revision > after => {
+                    Some((header.revision, pixels.clone()))
+                }
+                _ => None,
+            }
+        })
+    }
+
+    #[test]
+    fn a_lost_device_is_opened_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::create_dir_all(path("shaders/kernels")).unwrap();
+        for (name, text) in BUILT_IN {
+            fs::write(path("shaders").join(name), text).unwrap();
+        }
+        fs::write(path("scene.toml"), SCENE).unwrap();
+        let (told, reports) = std::sync::mpsc::channel();
+        let session = Session::start(Settings {
+            sources: Sources {
+                scene: path("scene.toml"),
+                overrides: Overrides::default(),
+                shaders: Some(path("shaders")),
+            },
+            device: Choice::Auto,
+            out: None,
+            report: Box::new(move |report| drop(told.send(report))),
+        })
+        .unwrap();
+        let (first, wanted) = finished(&session, 0);
+
+        // Lost while nothing happens: the next move finds it out, and is shown all the same.
+        session.events.send(Event::Lose).unwrap();
+        session.send(Command::Move(Move::Orbit(0.1, 0.0)));
+        let (second, _) = finished(&session, first);
+        session.send(Command::ResetCamera);
+        let (third, again) = finished(&session, second);
+        assert_eq!(again, wanted);
+        assert!(session.state.borrow().problems.is_empty());
+        let lost = reports.try_iter().find_map(|report| match report {
+            Report::Problem(problem) => Some(problem.kind),
+            _ => None,
+        });
+        assert_eq!(lost, Some("device"), "it was lost indeed");
+
+        // Lost while a kernel is compiled, with shaders that are wrong: the last good ones go on.
+        let good = Shaders::built_in().text("kernels/render.wgsl").to_string();
+        session.events.send(Event::Lose).unwrap();
+        fs::write(path("shaders/kernels/render.wgsl"), good.replace("= sum;", "= sun;")).unwrap();
+        wait("the shader's error", || {
+            session
+                .state
+                .borrow()
+                .problems
+                .iter()
+                .any(|problem| problem.kind == "shader")
+                .then_some(())
+        });
+        session.send(Command::Move(Move::Orbit(0.1, 0.0)));
+        session.send(Command::ResetCamera);
+        let (_, again) = wait("the picture", || {
+            Some(finished(&session, third)).filter(|(_, pixels)| *pixels == wanted)
+        });
+        assert_eq!(again, wanted);
+        fs::write(path("shaders/kernels/render.wgsl"), good).unwrap();
+        wait("no error", || session.state.borrow().problems.is_empty().then_some(()));
+    }
+
+    #[test]
+    fn a_scene_that_does_not_exist_is_an_error_at_once() {
+        let sources = Sources {
+            scene: "/nowhere/scene.toml".into(),
+            overrides: Overrides::default(),
+            shaders: None,
+        };
+        let settings = Settings {
+            sources,
+            device: Choice::Auto,
+            out: None,
+            report: Box::new(|_| ()),
+        };
+        let error = Session::start(settings).err().unwrap().to_string();
+        assert!(error.starts_with("/nowhere/scene.toml: cannot be read: "), "{error}");
+    }
 }

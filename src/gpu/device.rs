@@ -162,7 +162,8 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
 
 impl Device {
     /// Gives the device up: whatever uses it from now on fails, as when a driver loses it.
-    pub fn destroy(&self) {
+    #[cfg(test)]
+    pub(crate) fn destroy(&self) {
         self.device.destroy();
     }
 

@@ -6,7 +6,7 @@ const element = (id) => document.getElementById(id);
 const RETRY = 500; // milliseconds
 let socket = null;
 let state = null;
-let newest = 0; // counts frames, so that a late one is not drawn over a newer
+let [received, drawn] = [0, 0]; // numbers of frames, so that a late one is not drawn over a newer
 let pixelAsked = null; // the pixel that an answer is waited for
 let pixelWanted = null;
 let noticesSeen = null;
@@ -43,7 +43,7 @@ function hear(message) {
 
 // A frame: the length of its header, the header as JSON, and the PNG files that it counts.
 async function showFrame(data) {
-  const number = ++newest;
+  const number = ++received;
   const length = new DataView(data).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
   let at = 4 + length;
@@ -53,9 +53,12 @@ async function showFrame(data) {
     return [name, await createImageBitmap(blob, { colorSpaceConversion: "none" })];
   });
   const images = new Map(await Promise.all(decoded));
-  if (number !== newest) return;
+  if (number < drawn) return;
+  drawn = number;
+  const first = !picture.header;
   element("waiting").hidden = true;
   picture.show(header, images);
+  if (first && state) showProblems(state.problems);
   showProgress(header);
   readPixel(picture.cursor);
   // For whoever wants to know by script what is on the screen.
@@ -91,7 +94,7 @@ function showState(next) {
   document.title = `${next.problems.length ? "✗ " : ""}${next.scene} – wgray`;
   element("scene").textContent = next.scene;
   element("device").textContent = next.device;
-  element("shaders").textContent = next.shaders ?? "built in, not watched";
+  element("shaders").textContent = next.shaders ?? "those in the program";
   element("compile").textContent = next.compiling
     ? "compiling" : next.compile_seconds === null ? "–" : seconds(next.compile_seconds);
   element("camera-text").textContent = next.camera;
@@ -113,8 +116,8 @@ function showProblems(problems) {
     const article = document.createElement("article");
     article.append(make("h2", problem.place ?? problem.kind), make("p", problem.message));
     if (problem.excerpt) article.append(make("pre", problem.excerpt));
-    const old = element("panels").dataset.revision;
-    article.append(make("small", old ? `${problem.kind} error; the picture is the last good one` : `${problem.kind} error`));
+    const stays = picture.header ? "; the picture is the last good one" : "";
+    article.append(make("small", `${problem.kind} error${stays}`));
     return article;
   });
   element("problems").replaceChildren(...articles);

@@ -129,10 +129,8 @@ export class Picture {
     const fingers = new Map();
     canvas.addEventListener("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);
-      canvas.focus({ preventScroll: true });
       canvas.classList.add("dragging");
       fingers.set(event.pointerId, [event.offsetX, event.offsetY]);
-      event.preventDefault();
     });
     canvas.addEventListener("pointermove", (event) => {
       const now = [event.offsetX, event.offsetY];

@@ -145,6 +145,8 @@ impl Painter {
             Event::Files(snapshot, noticed) => self.take_files(*snapshot, noticed),
             Event::Built(built) => self.take_built(*built),
             Event::Command(command) => self.take_command(command),
+            #[cfg(test)]
+            Event::Lose => self.device.iter().for_each(Device::destroy),
             Event::Stop => {}
         }
         self.tell();
