@@ -241,6 +241,7 @@ impl Situation {
             normal,
             wo,
             start: position + normal * 1e-5,
+            side: random.pick(&[1.0, -1.0]),
         }
     }
 
@@ -357,12 +358,12 @@ fn material(random: &Random) -> Material {
 /// Whole numbers are small where they count something.
 fn whole(function: &str, name: &str, random: &Random) -> u32 {
     match name {
-        "bits" if function != "power_whole" => random.bits() as u32,
         "kind" | "pattern" => random.below(8),
-        "side" => 1 + random.below(16),
         "count" => 1 + random.below(256),
-        "i" => random.below(32),
-        "bits" | "exponent_bits" => random.below(14),
+        "i" if function == "block_sample" => random.below(32),
+        "exponent_bits" => random.below(14),
+        "bits" if function == "power_whole" => random.below(14),
+        "side" => 1 + random.below(16),
         _ => random.pick(&[
             0,
             1,

@@ -3,7 +3,7 @@
 
 mod adapter;
 mod against_oracle;
-mod backends;
+mod analytic;
 mod bounds;
 mod cli;
 #[cfg(feature = "dev")]
@@ -12,6 +12,7 @@ mod inputs;
 mod kernel;
 mod layout;
 mod oracle;
+mod patterns;
 mod pictures;
 mod probes;
 mod radiance;
@@ -20,5 +21,7 @@ mod render;
 mod robust;
 mod scenes;
 mod sources;
+mod statistics;
+mod textures;
 mod twins;
 mod words;

@@ -4,7 +4,8 @@
 
 use glam::{DMat4, DVec2, DVec3, DVec4};
 use wgray::scene::{
-    CameraDescription, Description, LightDescription, MaterialDescription, PhongDescription, ShapeDescription,
+    CameraDescription, ColorDescription, Description, LightDescription, MaterialDescription, PhongDescription,
+    ShapeDescription,
 };
 
 /// A mistake that the tests of the tests make on purpose.
@@ -191,7 +192,10 @@ impl<'a> Oracle<'a> {
             MaterialDescription::Phong(phong) => phong,
             other => panic!("the oracle does not know the material {other:?}"),
         };
-        let factor = |own: Option<DVec3>| own.or(phong.color).expect("a checked material");
+        let factor = |own: &Option<ColorDescription>| match own.as_ref().or(phong.color.as_ref()) {
+            Some(ColorDescription::Plain(plain)) => *plain,
+            other => panic!("the oracle does not know the colour {other:?}"),
+        };
         let point = origin + direction * meeting.t;
         let viewer = -direction;
         let normal = if meeting.normal.dot(viewer) < 0.0 {
@@ -202,7 +206,7 @@ impl<'a> Oracle<'a> {
         // "how far above the surface a shadow ray starts, relative to the largest coordinate there"
         let coordinate = point.abs().max_element().max(meeting.t);
         let above = point + normal * (render.shadow_epsilon * coordinate);
-        let mut sum = render.ambient * factor(phong.ambient);
+        let mut sum = render.ambient * factor(&phong.ambient);
         for light in &self.scene.lights {
             let samples = self.samples(light, above);
             for (to_light, distance) in &samples {
@@ -222,7 +226,7 @@ impl<'a> Oracle<'a> {
         normal: DVec3,
         viewer: DVec3,
         light: DVec3,
-        factor: impl Fn(Option<DVec3>) -> DVec3,
+        factor: impl Fn(&Option<ColorDescription>) -> DVec3,
     ) -> DVec3 {
         let cosine = normal.dot(light);
         if cosine <= 0.0 {
@@ -236,7 +240,7 @@ impl<'a> Oracle<'a> {
         };
         let highlight = mirrored.dot(viewer).max(0.0).powf(exponent);
         let diffuse = if self.flaw == Flaw::MissingCosine { 1.0 } else { cosine };
-        factor(phong.diffuse) * diffuse + factor(phong.specular) * highlight
+        factor(&phong.diffuse) * diffuse + factor(&phong.specular) * highlight
     }
 
     /// Unit directions and distances from a point to a light's samples.

@@ -1,5 +1,6 @@
 //! Pictures by every way to one: the CPU, and on the device the scene as constants, from buffers, and as plain WGSL.
 
+use glam::Vec4;
 use wgray::cpu::Cpu;
 use wgray::film::{Film, Region};
 use wgray::gpu::{Gpu, Options};
@@ -42,29 +43,70 @@ pub fn backend<'a>(packed: &'a Packed, way: Way) -> Box<dyn Backend + 'a> {
     Box::new(gpu.unwrap_or_else(|error| panic!("{way:?}: {error}")))
 }
 
-/// The whole picture of a backend, cut in some way.
-pub fn film(backend: &mut dyn Backend, packed: &Packed, cut: &Cut) -> Film {
-    let whole = Region::whole(packed.camera.width, packed.camera.height);
-    let mut film = Film {
-        region: whole,
+/// The region of a scene's whole picture.
+pub fn whole(packed: &Packed) -> Region {
+    Region::whole(packed.camera.width, packed.camera.height)
+}
+
+/// A region rendered in bands, put together.
+pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Cut) -> Film {
+    let mut all = Film {
+        region,
         sums: Vec::new(),
     };
     let mut output = |band: Film| {
-        film.sums.extend(band.sums);
+        all.sums.extend(band.sums);
         Ok(())
     };
-    wgray::job::render(backend, whole, packed.pixel_samples, cut, &mut |_| true, &mut output)
-        .unwrap_or_else(|error| panic!("{error}"));
-    film
+    let result = wgray::job::render(backend, region, packed.pixel_samples, cut, &mut |_| true, &mut output);
+    result.unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(
+        all.sums.len() as u64,
+        region.pixels(),
+        "the bands do not make up the region"
+    );
+    all
 }
 
+/// The whole picture.
 pub fn render(packed: &Packed, way: Way) -> Film {
-    film(&mut *backend(packed, way), packed, &Cut::default())
+    film(&mut *backend(packed, way), packed, whole(packed), &Cut::default())
+}
+
+/// The whole picture on the CPU.
+pub fn reference(packed: &Packed) -> Film {
+    render(packed, Way::Cpu)
 }
 
 pub fn first_hits(packed: &Packed, way: Way) -> Vec<FirstHit> {
-    let whole = Region::whole(packed.camera.width, packed.camera.height);
-    wgray::job::first_hits(&mut *backend(packed, way), whole).unwrap_or_else(|error| panic!("{way:?}: {error}"))
+    let hits = wgray::job::first_hits(&mut *backend(packed, way), whole(packed));
+    hits.unwrap_or_else(|error| panic!("{way:?}: {error}"))
+}
+
+/// How many pixels are not the same bits.
+pub fn differing(a: &Film, b: &Film) -> usize {
+    assert_eq!(
+        (a.region, a.sums.len()),
+        (b.region, b.sums.len()),
+        "films of different regions"
+    );
+    let bits = |sum: &Vec4| sum.to_array().map(f32::to_bits);
+    a.sums.iter().zip(&b.sums).filter(|(a, b)| bits(a) != bits(b)).count()
+}
+
+/// A part of a film.
+pub fn crop(film: &Film, part: Region) -> Film {
+    let (whole, width) = (film.region, film.region.width() as usize);
+    let rows = film
+        .sums
+        .chunks(width)
+        .skip((part.y0 - whole.y0) as usize)
+        .take(part.height() as usize);
+    let columns = (part.x0 - whole.x0) as usize..(part.x1 - whole.x0) as usize;
+    Film {
+        region: part,
+        sums: rows.flat_map(|row| row[columns.clone()].to_vec()).collect(),
+    }
 }
 
 /// The means of the pixels as f64.

@@ -5,7 +5,7 @@ use naga::ScalarKind;
 use wgray::cpu::camera::camera_ray;
 use wgray::cpu::ellipsoid::{ellipsoid_blocks, intersect_ellipsoid};
 use wgray::cpu::light::{Segments, segment, segments_to_light, segments_to_local};
-use wgray::cpu::math::{atan2, cross, dot, exp2, log2, max, min, normalize, power, power_whole};
+use wgray::cpu::math::{atan2, cross, dot, exp2, log2, max, min, normalize, positive_zero, power, power_whole};
 use wgray::cpu::phong::{Lobes, phong_block, phong_lobes, phong_power};
 use wgray::cpu::plane::{intersect_plane, plane_blocks};
 use wgray::cpu::ray::{
@@ -13,7 +13,10 @@ use wgray::cpu::ray::{
 };
 use wgray::cpu::rectangle::{intersect_rectangle, rectangle_blocks};
 use wgray::cpu::rng::{hash4, unit_float};
-use wgray::cpu::sampling::{grid_sample, random_sample, sample_key, sample_square};
+use wgray::cpu::sampling::{
+    grid_sample, jittered_sample, random_sample, rotated_grid_sample, sample_key, sample_square, wrap,
+};
+use wgray::cpu::sequence::{halton_sample, radical_inverse_3, scramble, shuffled_index, sobol_reversed, sobol_sample};
 use wgray::cpu::shadow::{Block, Cone, block_sample, blocks, cone_to_light, may_block, shadow_bits};
 use wgray::cpu::surface::{Surface, first_hit, primitive_normal, primitive_uv, surface_at};
 use wgray::cpu::triangle::{intersect_triangle, triangle_blocks};
@@ -59,6 +62,7 @@ probes! {
     normalize(v: Vec3) -> Vec3;
     max(a: f32, b: f32) -> f32;
     min(a: f32, b: f32) -> f32;
+    positive_zero(x: f32) -> f32;
     power_whole(x: f32, n: u32, bits: u32) -> f32;
     power(x: f32, y: f32) -> f32;
     log2(x: f32) -> f32;
@@ -68,8 +72,17 @@ probes! {
     unit_float(bits: u32) -> f32;
     sample_square(pattern: u32, side: u32, index: u32, group: u32, key: UVec2) -> Vec2;
     grid_sample(side: u32, index: u32) -> Vec2;
+    rotated_grid_sample(side: u32, index: u32) -> Vec2;
+    wrap(x: f32) -> f32;
+    jittered_sample(side: u32, index: u32, group: u32, key: UVec2) -> Vec2;
     random_sample(index: u32, group: u32, key: UVec2) -> Vec2;
     sample_key(pixel: UVec2, seed: u32, purpose: u32) -> UVec2;
+    sobol_sample(index: u32, key: UVec2) -> Vec2;
+    sobol_reversed(i: u32) -> u32;
+    scramble(digits: u32, seed: u32) -> u32;
+    shuffled_index(index: u32, seed: u32) -> u32;
+    halton_sample(index: u32, key: UVec2) -> Vec2;
+    radical_inverse_3(i: u32) -> u32;
     point_to_local(q: &Primitive, p: Vec3) -> Vec3;
     vector_to_local(q: &Primitive, v: Vec3) -> Vec3;
     plane_distance(q: &Primitive, ray: Ray) -> f32;
@@ -180,19 +193,24 @@ fn compare(device: &Device, function: &Function) -> Result<(), String> {
 fn every_shared_function_has_a_probe() {
     let source = shared_source();
     let module = parse(&source);
-    let mut names = Vec::new();
+    let (mut names, mut missing) = (Vec::new(), Vec::new());
     for (file, function) in functions(&module, &source) {
         let name = function.name();
         names.push(name.to_string());
         if EXCEPTIONS.iter().any(|(exception, _)| *exception == name) {
             continue;
         }
-        let Some(probe) = PROBES.iter().find(|probe| probe.name == name) else {
-            panic!("{file}: {name} has no probe: add it to tests/probes.rs");
-        };
         let arguments: Vec<String> = function.arguments().into_iter().map(|(name, _)| name).collect();
-        assert_eq!(arguments, probe.arguments, "{file}: {name}");
+        match PROBES.iter().find(|probe| probe.name == name) {
+            Some(probe) => assert_eq!(arguments, probe.arguments, "{file}: {name}"),
+            None => missing.push(format!("{file}: {name}({})", arguments.join(", "))),
+        }
     }
+    assert!(
+        missing.is_empty(),
+        "add probes to tests/probes.rs for\n{}",
+        missing.join("\n")
+    );
     for name in PROBES
         .iter()
         .map(|probe| probe.name)

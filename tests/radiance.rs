@@ -1,16 +1,14 @@
 //! Pictures whose values are known in closed form.
 
-use wgray::cpu::Cpu;
 use wgray::film::Film;
-use wgray::job::{Backend, Cut};
 use wgray::pack::Packed;
 
-use crate::backends::{BAKED, film, gpu, parse, whole};
+use crate::pictures::{both, render};
+use crate::scenes::parse;
 
 /// Both paths' pictures.
-fn films(scene: &Packed) -> [Film; 2] {
-    let backends: [&mut dyn Backend; 2] = [&mut Cpu::new(scene), &mut gpu(scene, BAKED)];
-    backends.map(|backend| film(backend, scene, whole(scene), &Cut::default()))
+fn films(scene: &Packed) -> Vec<Film> {
+    both().into_iter().map(|way| render(scene, way)).collect()
 }
 
 /// The camera looks straight down on the ground; a picture of 40 x 30 pixels shows 4 x 3 units.

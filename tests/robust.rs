@@ -4,7 +4,8 @@ use glam::DVec3;
 use wgray::film::Film;
 use wgray::scene::{CameraDescription, Description, LightDescription, ShapeDescription};
 
-use crate::backends::{packed, reference, scene};
+use crate::pictures::reference;
+use crate::scenes::{packed, scene};
 
 /// The scene scaled about the origin and then moved.
 fn transformed(description: &Description, scale: f64, offset: DVec3) -> Description {

@@ -3,7 +3,7 @@
 use std::fs;
 
 use wgray::pack::{Packed, pack};
-use wgray::scene::Description;
+use wgray::scene::{Assets, Description};
 
 use crate::sources;
 
@@ -23,9 +23,28 @@ pub fn descriptions() -> Vec<(String, Description)> {
     found
 }
 
+/// One scene of the project.
+pub fn scene(name: &str) -> Description {
+    descriptions()
+        .into_iter()
+        .find(|(file, _)| file == name)
+        .unwrap_or_else(|| panic!("no scene is called {name}"))
+        .1
+}
+
+/// A scene from its text.
+pub fn parse(text: &str) -> Packed {
+    packed(&Description::parse(text, "test").unwrap_or_else(|error| panic!("{error}")))
+}
+
 /// A description as the backends read it.
 pub fn packed(description: &Description) -> Packed {
-    pack(&description.validate().unwrap_or_else(|problem| panic!("{problem:?}")))
+    let assets = Assets::beside(&sources::path("scenes"));
+    pack(
+        &description
+            .validate_with(&assets)
+            .unwrap_or_else(|problem| panic!("{problem}")),
+    )
 }
 
 /// The scenes as they are.

@@ -25,6 +25,22 @@ pub fn shaders() -> &'static Shaders {
     })
 }
 
+/// The shaders with one place of a file changed.
+pub fn edited_shaders(file: &str, from: &str, to: &str) -> Shaders {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, _) in wgray::gpu::compose::BUILT_IN {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+        let mut text = shaders().text(name).to_string();
+        if *name == file {
+            assert!(text.contains(from), "{file}: '{from}' is not there to be changed");
+            text = text.replacen(from, to, 1);
+        }
+        fs::write(path, text).expect("a copy of a shader");
+    }
+    Shaders::read(folder.path()).expect("the copies")
+}
+
 /// The shared files by themselves: that naga accepts them shows that they read no binding and no override.
 pub fn shared_source() -> Source {
     let mut source = Source::default();

@@ -74,7 +74,7 @@ macro_rules! records {
 records! {
     Ray { origin, direction }
     Hit { t, primitive }
-    Surface { position, normal, wo, start }
+    Surface { position, normal, wo, start, side }
     Segments { towards, u, v }
     Lobes { diffuse, specular }
     Block { pattern, side, first, count, group, key }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use crate::backends::project;
+use crate::sources::path as project;
 
 /// What a run of the program left.
 struct Ran {

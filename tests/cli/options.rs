@@ -5,7 +5,8 @@ use wgray::image::{difference, encode, read_exr};
 use wgray::job::{self, Cut};
 
 use super::{NO_DRIVER, Place, SCENE, project_scene, read_png};
-use crate::backends::{film, parse, project, reference, whole};
+use crate::pictures::{film, reference, whole};
+use crate::scenes::parse;
 
 #[test]
 fn the_picture_has_the_scenes_name_and_is_in_the_current_folder() {
@@ -409,7 +410,7 @@ fn help_and_version_are_no_errors() {
 fn the_scenes_of_the_documents_are_good() {
     let place = Place::new();
     for document in ["README.md", "docs/scene-format.md"] {
-        let text = std::fs::read_to_string(project(document)).unwrap();
+        let text = std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(document)).unwrap();
         let scenes: Vec<&str> = text
             .split("```toml\n")
             .skip(1)

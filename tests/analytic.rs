@@ -1,0 +1,325 @@
+//! Pictures whose pixels mathematics knows: closed forms, on both paths, each with a wrong answer that must fail.
+
+use std::f64::consts::PI;
+
+use glam::{DVec2, DVec3};
+use wgray::scene::{
+    CameraDescription, ColorDescription, Description, DirectionalLightDescription, EllipsoidDescription,
+    ImageDescription, LightDescription, MaterialDescription, OrthographicDescription, Pattern, PhongDescription,
+    PlaneDescription, PointLightDescription, RectangleLightDescription, RenderDescription, SamplesDescription,
+    ShapeDescription, SphereDescription,
+};
+
+use crate::pictures::{Way, both, first_hits, means, render};
+use crate::scenes::packed;
+
+/// Side of the pictures.
+const SIDE: u32 = 64;
+
+fn grid(count: u32) -> SamplesDescription {
+    SamplesDescription {
+        pattern: Pattern::Grid,
+        count,
+    }
+}
+
+/// Nothing, seen by parallel rays from `from` towards `to`.
+fn empty(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
+    let camera = OrthographicDescription {
+        position: from,
+        look_at: to,
+        up,
+        height,
+    };
+    Description {
+        image: ImageDescription {
+            width: SIDE,
+            height: SIDE,
+        },
+        camera: CameraDescription::Orthographic(camera),
+        render: RenderDescription {
+            pixel_samples: grid(1),
+            shadow_epsilon: 1e-6,
+            ..Default::default()
+        },
+        materials: Default::default(),
+        textures: Default::default(),
+        lights: Vec::new(),
+        shapes: Vec::new(),
+    }
+}
+
+/// The plane z = 0 of a material, seen from above.
+fn floor(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shininess: f64) -> Description {
+    let mut scene = empty(from, DVec3::new(from.x, from.y, 0.0), DVec3::Y, height);
+    let factor = |x| Some(ColorDescription::Plain(DVec3::splat(x)));
+    let phong = PhongDescription {
+        color: None,
+        ambient: factor(ambient),
+        diffuse: factor(diffuse),
+        specular: factor(specular),
+        shininess,
+        normal_map: None,
+    };
+    scene.materials.insert("m".into(), MaterialDescription::Phong(phong));
+    scene.shapes.push(ShapeDescription::Plane(PlaneDescription {
+        material: "m".into(),
+        point: DVec3::ZERO,
+        normal: DVec3::Z,
+        tangent: DVec3::X,
+    }));
+    scene
+}
+
+/// The middle of a pixel of the picture of a floor, on the floor.
+fn on_floor(from: DVec3, height: f64, pixel: u32) -> DVec2 {
+    let step = height / f64::from(SIDE);
+    let (column, row) = (f64::from(pixel % SIDE) + 0.5, f64::from(pixel / SIDE) + 0.5);
+    DVec2::new(
+        from.x + column * step - height / 2.0,
+        from.y + height / 2.0 - row * step,
+    )
+}
+
+/// The largest difference of any pixel's green from its expected value.
+fn worst(scene: &Description, way: Way, expected: impl Fn(u32) -> f64) -> f64 {
+    let picture = means(&render(&packed(scene), way));
+    let difference = |(i, mean): (u32, &[f64; 3])| (mean[1] - expected(i)).abs();
+    (0..)
+        .zip(&picture)
+        .map(difference)
+        .fold(0.0, |a, b| if b <= a { a } else { b })
+}
+
+/// Integral over x and y of 1 / sqrt(x^2 + y^2 + h^2): its mixed derivative is that.
+fn corner(x: f64, y: f64, h: f64) -> f64 {
+    let r = (x * x + y * y + h * h).sqrt();
+    x * (y / (x * x + h * h).sqrt()).asinh() + y * (x / (y * y + h * h).sqrt()).asinh() - h * (x * y / (h * r)).atan()
+}
+
+/// The mean of h / r over a rectangle at height h above a plane, parallel to it, as seen from the point (x, y) relative
+/// to its middle: the mean cosine at the plane.
+fn mean_cosine([width, height]: [f64; 2], h: f64, at: DVec2) -> f64 {
+    let (x0, x1) = (-width / 2.0 - at.x, width / 2.0 - at.x);
+    let (y0, y1) = (-height / 2.0 - at.y, height / 2.0 - at.y);
+    let integral = corner(x1, y1, h) - corner(x0, y1, h) - corner(x1, y0, h) + corner(x0, y0, h);
+    h * integral / (width * height)
+}
+
+#[test]
+fn the_closed_form_of_the_mean_cosine_is_right() {
+    let (size, h) = ([1.5, 0.5], 0.8);
+    for at in [DVec2::ZERO, DVec2::new(0.3, -0.2), DVec2::new(2.0, 1.0)] {
+        let n = 1000;
+        let mut sum = 0.0;
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let place = |k: i32, size: f64| ((f64::from(k) + 0.5) / f64::from(n) - 0.5) * size;
+            let to = DVec3::new(place(i, size[0]) - at.x, place(j, size[1]) - at.y, h);
+            sum += h / to.length();
+        }
+        let mean = sum / f64::from(n * n);
+        assert!((mean - mean_cosine(size, h, at)).abs() < 1e-6, "{at}: {mean}");
+    }
+}
+
+/// A rectangle light over a matt plane: its mean cosine, up to the grid of samples, which is a midpoint rule.
+#[test]
+fn light_of_a_rectangle_on_a_plane() {
+    let (from, height) = (DVec3::new(0.3, 0.2, 0.5), 4.0);
+    let (size, h) = ([1.5, 0.5], 0.8);
+    let mut scene = floor(from, height, [0.0, 0.7, 0.0], 1.0);
+    scene.render.light_samples = grid(1024);
+    scene
+        .lights
+        .push(LightDescription::Rectangle(RectangleLightDescription {
+            center: DVec3::new(0.0, 0.0, h),
+            size,
+            normal: -DVec3::Z,
+            tangent: DVec3::X,
+            color: DVec3::splat(0.9),
+        }));
+    let swapped = [size[1], size[0]];
+    for way in both() {
+        let worst = |expected: &dyn Fn(DVec2) -> f64| {
+            worst(&scene, way, |pixel| 0.9 * 0.7 * expected(on_floor(from, height, pixel)))
+        };
+        let error = worst(&|at| mean_cosine(size, h, at));
+        println!("{way:?}: light of a rectangle within {error:.1e}");
+        assert!(error < 1e-4, "{way:?}: {error}");
+        assert!(!(worst(&|_| 1.0) < 1e-2), "a missing cosine");
+        assert!(!(worst(&|at| mean_cosine(swapped, h, at)) < 1e-2), "swapped axes");
+        let pixel = height / f64::from(SIDE);
+        assert!(
+            !(worst(&|at| mean_cosine(size, h, at + DVec2::X * pixel)) < 1e-2),
+            "a shifted pixel"
+        );
+    }
+}
+
+/// The shadow of a sphere in the light of a point is the cut of a cone: an ellipse on the plane.
+#[test]
+fn shadow_of_a_sphere() {
+    let (from, height) = (DVec3::new(1.6, 0.0, 1.0), 2.4);
+    let (center, radius, light) = (DVec3::new(0.0, 0.0, 2.0), 0.5, DVec3::new(-3.0, 0.0, 6.0));
+    let mut scene = floor(from, height, [0.0, 1.0, 0.0], 1.0);
+    scene.materials.insert("s".into(), scene.materials["m"].clone());
+    scene.shapes.push(ShapeDescription::Sphere(SphereDescription {
+        material: "s".into(),
+        center,
+        radius,
+    }));
+    let point = PointLightDescription {
+        position: light,
+        color: DVec3::ONE,
+    };
+    scene.lights.push(LightDescription::Point(point));
+    let axis = center - light;
+    let half_angle = (radius / axis.length()).asin();
+    // How far a point of the plane is inside of the cone, as an angle.
+    let inside = |at: DVec2| half_angle - (at.extend(0.0) - light).angle_between(axis);
+    for way in both() {
+        let picture = means(&render(&packed(&scene), way));
+        let lit = |pixel: u32| picture[pixel as usize][1] > 0.0;
+        let wrong = |shift: DVec2, margin: f64| {
+            let pixels = (0..SIDE * SIDE).filter(|pixel| inside(on_floor(from, height, *pixel)).abs() > margin);
+            pixels
+                .filter(|pixel| lit(*pixel) == (inside(on_floor(from, height, *pixel) + shift) > 0.0))
+                .count()
+        };
+        assert_eq!(wrong(DVec2::ZERO, 1e-5), 0, "{way:?}");
+        let pixel = height / f64::from(SIDE);
+        assert!(wrong(DVec2::X * pixel, 1e-5) > 20, "a shifted pixel");
+        assert!(wrong(DVec2::Y * pixel, 1e-5) > 20, "a shifted pixel");
+        // The ellipse's half axes: the cone's axis leans by `lean` from the vertical.
+        let lean = (axis.x / axis.z).abs().atan();
+        let long = light.z * ((lean + half_angle).tan() - (lean - half_angle).tan()) / 2.0;
+        let short = long * (1.0 - (lean.sin() / half_angle.cos()).powi(2)).sqrt();
+        let dark = (0..SIDE * SIDE).filter(|pixel| !lit(*pixel)).count() as f64 * pixel * pixel;
+        println!("{way:?}: the shadow's area is {dark:.4}, of {:.4}", PI * long * short);
+        assert!((dark / (PI * long * short) - 1.0).abs() < 0.01, "{way:?}: {dark}");
+        assert!(
+            !((dark / (PI * long * long) - 1.0).abs() < 0.05),
+            "a circle is found out"
+        );
+        // Outside of it the light arrives at the plane without falloff, by the cosine alone.
+        let worst = (0..SIDE * SIDE).filter(|pixel| lit(*pixel)).map(|pixel| {
+            let to = light - on_floor(from, height, pixel).extend(0.0);
+            (picture[pixel as usize][1] - to.z / to.length()).abs()
+        });
+        assert!(worst.fold(0.0, f64::max) < 1e-5);
+    }
+}
+
+/// An ellipsoid under parallel rays along d covers pi |((a x b).d, (b x c).d, (c x a).d)| around its middle.
+#[test]
+fn outlines_of_ellipsoids() {
+    let ellipsoids = [
+        (
+            DVec3::new(0.1, 0.2, -0.1),
+            [
+                DVec3::new(0.9, 0.3, 0.0),
+                DVec3::new(-0.2, 0.6, 0.1),
+                DVec3::new(0.1, 0.0, 0.4),
+            ],
+        ),
+        (DVec3::new(-0.3, 0.1, 0.2), [DVec3::X, DVec3::Y, DVec3::Z]),
+        (
+            DVec3::new(0.2, -0.4, 0.0),
+            [DVec3::X * 1.2, DVec3::new(0.6, 0.5, 0.0), DVec3::Z * 0.2],
+        ), // sheared
+    ];
+    let views = [
+        DVec3::new(0.0, -5.0, 0.0),
+        DVec3::new(3.0, -3.0, 2.0),
+        DVec3::new(-2.0, 1.0, 4.0),
+    ];
+    for ((center, [a, b, c]), view) in ellipsoids.into_iter().flat_map(|e| views.map(|view| (e, view))) {
+        let height = 4.0;
+        let mut scene = floor(DVec3::Z, 1.0, [1.0, 0.0, 0.0], 1.0);
+        scene.camera = empty(view, DVec3::ZERO, DVec3::Z, height).camera;
+        (scene.image.width, scene.image.height) = (256, 256);
+        scene.shapes = vec![ShapeDescription::Ellipsoid(EllipsoidDescription {
+            material: "m".into(),
+            center,
+            a,
+            b,
+            c,
+        })];
+        let forward = -view.normalize();
+        let right = forward.cross(DVec3::Z).normalize();
+        let up = right.cross(forward);
+        let shadow = DVec3::new(
+            a.cross(b).dot(forward),
+            b.cross(c).dot(forward),
+            c.cross(a).dot(forward),
+        );
+        let area = PI * shadow.length();
+        let pixel = height / 256.0;
+        // From the middle of the picture, in pixels, to the right and down.
+        let middle = DVec2::new(center.dot(right), -center.dot(up)) / pixel;
+        for way in both() {
+            let hits = first_hits(&packed(&scene), way);
+            let covered: Vec<DVec2> = (0u32..)
+                .zip(&hits)
+                .filter(|(_, hit)| hit.shape == 0)
+                .map(|(i, _)| DVec2::new(f64::from(i % 256) - 127.5, f64::from(i / 256) - 127.5))
+                .collect();
+            let seen = covered.len() as f64 * pixel * pixel;
+            let centroid = covered.iter().sum::<DVec2>() / covered.len() as f64;
+            assert!(
+                (seen / area - 1.0).abs() < 0.005,
+                "{way:?} {center} from {view}: {seen} of {area}"
+            );
+            assert!(
+                (centroid - middle).length() < 0.1,
+                "{way:?} {center} from {view}: {centroid} for {middle}"
+            );
+            assert!(!((centroid + DVec2::X - middle).length() < 0.1), "a shifted pixel");
+            // The nearest points of all: the middle's depth less the half width along the view.
+            let half = [a, b, c]
+                .map(|axis| axis.dot(forward))
+                .map(|h| h * h)
+                .iter()
+                .sum::<f64>()
+                .sqrt();
+            let expected = (center - view).dot(forward) - half;
+            let nearest = hits
+                .iter()
+                .filter(|hit| hit.shape == 0)
+                .map(|hit| f64::from(hit.depth))
+                .fold(1e9, f64::min);
+            assert!(
+                (0.0..1e-3).contains(&(nearest - expected + 1e-6)),
+                "{way:?}: {nearest} for {expected}"
+            );
+        }
+    }
+}
+
+/// A directional light on a plane is the same everywhere: kd n.l + ks (r.v)^s, seen straight from above.
+#[test]
+fn directional_light_on_a_plane() {
+    for (exponent, other) in [(16.0, 15.0), (2.5, 2.4), (0.5, 0.6), (1.0, 1.5)] {
+        let mut scene = floor(DVec3::new(5.0, -3.0, 2.0), 1.0, [0.0, 0.4, 0.6], exponent);
+        let direction = DVec3::new(0.3, -0.2, -1.0);
+        scene
+            .lights
+            .push(LightDescription::Directional(DirectionalLightDescription {
+                direction,
+                color: DVec3::ONE,
+            }));
+        let cosine = -direction.z / direction.length();
+        // Straight from above, v is the normal, so that r.v is n.l.
+        let expected = |exponent: f64| 0.4 * cosine + 0.6 * cosine.powf(exponent);
+        for way in both() {
+            let error = worst(&scene, way, |_| expected(exponent));
+            assert!(error < 1e-6, "{way:?}, shininess {exponent}: {error}");
+            assert!(!(worst(&scene, way, |_| expected(other)) < 1e-4), "another shininess");
+        }
+        // From below the plane is dark: the normal faces the viewer, and the light is behind it.
+        scene.camera = empty(-DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0).camera;
+        for way in both() {
+            assert_eq!(worst(&scene, way, |_| 0.0), 0.0, "{way:?}");
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! Every pattern of samples that a scene file can name, found in the source, so that a new one is tested at once.
+
+use serde::Deserialize as _;
+use serde::de::IntoDeserializer;
+use serde::de::value::{Error, StrDeserializer};
+use wgray::scene::{Pattern, SamplesDescription};
+
+use crate::sources;
+
+/// The patterns with the names that files have for them.
+pub fn all() -> Vec<(String, Pattern)> {
+    let file = sources::rust("src/scene/description.rs");
+    let names = file.items.iter().find_map(|item| match item {
+        syn::Item::Enum(e) if e.ident == "Pattern" => Some(e.variants.iter().map(|v| snake_case(&v.ident.to_string()))),
+        _ => None,
+    });
+    let pattern = |name: String| {
+        let deserializer: StrDeserializer<Error> = name.as_str().into_deserializer();
+        let pattern = Pattern::deserialize(deserializer).unwrap_or_else(|error| panic!("{name}: {error}"));
+        (name, pattern)
+    };
+    let all: Vec<_> = names.expect("the patterns").map(pattern).collect();
+    assert!(all.len() >= 2, "the patterns were not found");
+    all
+}
+
+fn snake_case(name: &str) -> String {
+    let mut result = String::new();
+    for c in name.chars() {
+        if c.is_uppercase() && !result.is_empty() {
+            result.push('_');
+        }
+        result.extend(c.to_lowercase());
+    }
+    result
+}
+
+/// Samples of a pattern, as near to `count` as it takes.
+pub fn samples(pattern: Pattern, count: u32) -> SamplesDescription {
+    let side = count.isqrt();
+    SamplesDescription {
+        pattern,
+        count: if pattern.needs_square() { side * side } else { count },
+    }
+}

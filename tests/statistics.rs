@@ -1,0 +1,254 @@
+//! Random patterns are uniform, together and in their projections, and pictures by them have the mean of pictures by
+//! grids. The numbers are the same in every run, so that a test that passes once passes always.
+
+use glam::Vec2;
+use wgray::pack::Packed;
+use wgray::scene::Pattern;
+
+use crate::kernel::functions;
+use crate::pictures::{means, reference};
+use crate::probes::twin;
+use crate::sources::{parse, shared_source};
+use crate::{adapter, patterns, scenes};
+
+/// The chance that a sound pattern is called unsound; each test asks some dozens of questions.
+const SIGNIFICANCE: f64 = 1e-6;
+
+/// Positions of a pattern for many pixels: `sets` sets of `count`, as the renderer asks for them. From the device, where
+/// there is one: the probes hold that the twins give the same.
+fn positions(pattern: Pattern, count: u32, sets: u32) -> Vec<Vec<Vec2>> {
+    let mut description = scenes::scene("cornell.toml");
+    description.render.pixel_samples = patterns::samples(pattern, count);
+    let packed: Packed = scenes::packed(&description);
+    let s = &packed.specialization;
+    let keys = evaluate("sample_key", (0..sets).flat_map(|i| [i % 97, i / 97, 5, 0]).collect());
+    let calls = keys.chunks_exact(2).flat_map(|key| {
+        (0..packed.pixel_samples).flat_map(|index| [s.pixel_pattern, s.pixel_side, index, 0, key[0], key[1]])
+    });
+    let places = evaluate("sample_square", calls.collect());
+    let place = |words: &[u32]| Vec2::new(f32::from_bits(words[0]), f32::from_bits(words[1]));
+    let places: Vec<Vec2> = places.chunks_exact(2).map(place).collect();
+    places
+        .chunks_exact(packed.pixel_samples as usize)
+        .map(<[Vec2]>::to_vec)
+        .collect()
+}
+
+/// A shared function with two words of a result, over the words of many calls.
+fn evaluate(name: &str, words: Vec<u32>) -> Vec<u32> {
+    let Some(device) = adapter::device() else {
+        return twin(name).results(&words, 2);
+    };
+    let source = shared_source();
+    let module = parse(&source);
+    let functions = functions(&module, &source);
+    let (_, function) = functions.iter().find(|(_, f)| f.name() == name).expect("the function");
+    function.run(device, &words)
+}
+
+/// Whether the pattern is the same in every pixel.
+fn fixed(pattern: Pattern) -> bool {
+    let sets = positions(pattern, 16, 2);
+    sets[0] == sets[1]
+}
+
+/// The chance of a chi-square value as large as this or larger, by the cube-root approximation of Wilson and Hilferty,
+/// "The Distribution of Chi-Square", 1931.
+fn chance(chi_square: f64, freedom: f64) -> f64 {
+    let spread = 2.0 / (9.0 * freedom);
+    let z = ((chi_square / freedom).cbrt() - (1.0 - spread)) / spread.sqrt();
+    upper_tail(z)
+}
+
+/// The chance of a normal deviate above z: Abramowitz and Stegun, 26.2.17.
+fn upper_tail(z: f64) -> f64 {
+    if z < 0.0 {
+        return 1.0 - upper_tail(-z);
+    }
+    let t = 1.0 / (1.0 + 0.231_641_9 * z);
+    let series = [
+        0.319_381_530,
+        -0.356_563_782,
+        1.781_477_937,
+        -1.821_255_978,
+        1.330_274_429,
+    ];
+    let sum: f64 = series.iter().rev().fold(0.0, |sum, c| (sum + c) * t);
+    (-z * z / 2.0).exp() / std::f64::consts::TAU.sqrt() * sum
+}
+
+/// Pearson's chi-square of counts that should be equal.
+fn chi_square(counts: &[u32]) -> f64 {
+    let expected = f64::from(counts.iter().sum::<u32>()) / counts.len() as f64;
+    counts
+        .iter()
+        .map(|count| (f64::from(*count) - expected).powi(2) / expected)
+        .sum()
+}
+
+/// What is not uniform in a list of independent positions: the square, either coordinate, or two sums of them.
+fn flaw(positions: &[Vec2]) -> Option<String> {
+    const CELLS: usize = 16;
+    let cell = |x: f32| ((x * CELLS as f32) as usize).min(CELLS - 1);
+    type Place = fn(Vec2) -> f32;
+    let projections: [(&str, Place); 4] = [
+        ("x", |p| p.x),
+        ("y", |p| p.y),
+        ("x + y modulo 1", |p| (p.x + p.y).fract()),
+        ("fine digits of x + 3 y", |p| ((p.x + 3.0 * p.y) * 1024.0).fract()),
+    ];
+    let mut square = vec![0; CELLS * CELLS];
+    positions
+        .iter()
+        .for_each(|p| square[cell(p.y) * CELLS + cell(p.x)] += 1);
+    let mut tests = vec![("the square", square)];
+    for (name, place) in projections {
+        let mut line = vec![0; CELLS];
+        positions.iter().for_each(|p| line[cell(place(*p))] += 1);
+        tests.push((name, line));
+    }
+    tests.iter().find_map(|(name, counts)| {
+        let chance = chance(chi_square(counts), counts.len() as f64 - 1.0);
+        (chance < SIGNIFICANCE).then(|| format!("{name} is not uniform: a chance of {chance:.1e}"))
+    })
+}
+
+#[test]
+fn the_chances_are_those_of_the_tables() {
+    for (z, expected) in [(0.0, 0.5), (1.0, 0.158_655), (3.0, 0.001_349_9), (-1.0, 0.841_345)] {
+        assert!((upper_tail(z) - expected).abs() < 1e-6, "{z}");
+    }
+    // Abramowitz and Stegun, table 26.8
+    for (chi_square, freedom, expected) in [(24.996, 15.0, 0.05), (37.697, 15.0, 0.001), (124.342, 100.0, 0.05)] {
+        assert!(
+            (chance(chi_square, freedom) / expected - 1.0).abs() < 0.05,
+            "{chi_square} {freedom}"
+        );
+    }
+}
+
+#[test]
+fn positions_are_on_the_unit_square() {
+    for (name, pattern) in patterns::all() {
+        for count in [1, 4, 16, 100, 1024] {
+            for p in positions(pattern, count, 20).into_iter().flatten() {
+                let inside = (0.0..1.0).contains(&p.x) & (0.0..1.0).contains(&p.y);
+                assert!(inside, "{name}, {count} samples: {p}");
+            }
+        }
+    }
+}
+
+/// One position of each set alone is uniform over the sets, whichever it is.
+#[test]
+fn random_patterns_are_uniform_over_pixels() {
+    let mut tested = 0;
+    for (name, pattern) in patterns::all().into_iter().filter(|(_, pattern)| !fixed(*pattern)) {
+        let sets = positions(pattern, 16, 40_000);
+        // A position may be confined to a cell of a grid; all of a set together are not.
+        for (first, last) in [(0, 0), (7, 7), (15, 15), (0, 15)] {
+            let confined = first == last
+                && sets
+                    .iter()
+                    .take(100)
+                    .all(|set| set[first].distance(sets[0][first]) < 0.36);
+            let list: Vec<Vec2> = sets.iter().flat_map(|set| set[first..=last].iter().copied()).collect();
+            let problem = if confined { None } else { flaw(&list) };
+            assert!(problem.is_none(), "{name}, positions {first} to {last}: {problem:?}");
+        }
+        tested += 1;
+    }
+    assert!(tested >= 1, "no pattern is random");
+}
+
+/// The mean of a set's positions is the middle of the square, over all sets.
+#[test]
+fn all_patterns_are_centred() {
+    for (name, pattern) in patterns::all() {
+        let sets = positions(pattern, 16, 10_000);
+        let n = (sets.len() * sets[0].len()) as f64;
+        let mean = sets.iter().flatten().map(|p| p.as_dvec2()).sum::<glam::DVec2>() / n;
+        // No pattern is worse than independent positions, whose standard error this is.
+        let error = (1.0 / 12.0 / n).sqrt();
+        assert!(((mean - 0.5) / error).abs().max_element() < 5.0, "{name}: {mean}");
+    }
+}
+
+#[test]
+fn a_biased_pattern_is_found() {
+    let sets = positions(Pattern::Random, 16, 10_000);
+    let sound: Vec<Vec2> = sets.into_iter().flatten().collect();
+    assert_eq!(flaw(&sound), None);
+    type Change = fn(usize, Vec2) -> Vec2;
+    let changes: [(&str, Change); 6] = [
+        ("a little to the left", |_, p| Vec2::new(p.x.powf(1.03), p.y)),
+        ("a little up", |_, p| Vec2::new(p.x, p.y * 0.99)),
+        ("both the same", |_, p| Vec2::splat(p.x)),
+        ("y follows x", |i, p| if i % 8 == 0 { Vec2::splat(p.x) } else { p }),
+        ("a number from -0.5 to 0.5", |_, p| (p - 0.5).abs()),
+        ("seven bits only", |_, p| (p * 128.0).floor() / 128.0),
+    ];
+    for (name, change) in changes {
+        let biased: Vec<Vec2> = sound.iter().enumerate().map(|(i, p)| change(i, *p)).collect();
+        assert!(flaw(&biased).is_some(), "{name}");
+    }
+}
+
+/// The scene with these samples, so small that edges are everywhere.
+fn noisy(pattern: Pattern, seed: u32, counts: (u32, u32)) -> Packed {
+    let mut d = scenes::scene("cornell.toml");
+    (d.image.width, d.image.height) = (20, 20);
+    d.render.seed = seed;
+    d.render.pixel_samples = patterns::samples(pattern, counts.0);
+    d.render.light_samples = patterns::samples(pattern, counts.1);
+    scenes::packed(&d)
+}
+
+/// For each pixel, how many standard errors the mean over the seeds is from the truth.
+fn deviations(pictures: &[Vec<[f64; 3]>], truth: &[[f64; 3]]) -> Vec<f64> {
+    let n = pictures.len() as f64;
+    let pixel = |i: usize| {
+        let values: Vec<f64> = pictures.iter().map(|p| p[i].iter().sum()).collect();
+        let mean = values.iter().sum::<f64>() / n;
+        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        let expected: f64 = truth[i].iter().sum();
+        // The truth is a fine grid, and has an error of its own.
+        (mean - expected) / ((variance / n).sqrt() + 1e-3 * expected)
+    };
+    (0..truth.len()).map(pixel).collect()
+}
+
+/// The mean and the mean square of the deviations are those of a normal distribution, or nearer to 0.
+fn unbiased(deviations: &[f64]) -> Result<(), String> {
+    let n = deviations.len() as f64;
+    let mean = deviations.iter().sum::<f64>() / n;
+    let square = deviations.iter().map(|z| z * z).sum::<f64>() / n;
+    if mean.abs() * n.sqrt() < 4.0 && square < 1.3 {
+        Ok(())
+    } else {
+        Err(format!("mean {mean:.3}, mean square {square:.3}, of {n} pixels"))
+    }
+}
+
+#[test]
+fn pictures_of_random_patterns_have_the_mean_of_grids() {
+    let truth = means(&reference(&noisy(Pattern::Grid, 0, (256, 256))));
+    for (name, pattern) in patterns::all().into_iter().filter(|(_, pattern)| !fixed(*pattern)) {
+        let picture = |seed| means(&reference(&noisy(pattern, seed, (4, 4))));
+        let pictures: Vec<_> = (0..48).map(picture).collect();
+        let result = unbiased(&deviations(&pictures, &truth));
+        assert!(result.is_ok(), "{name}: {}", result.unwrap_err());
+        // A picture that is two per cent too bright, or one of another camera, is not its mean.
+        let brighter: Vec<[f64; 3]> = truth.iter().map(|pixel| pixel.map(|v| v * 1.02)).collect();
+        assert!(
+            unbiased(&deviations(&pictures, &brighter)).is_err(),
+            "{name}: a bias is not found"
+        );
+        let mut shifted = truth.clone();
+        shifted.rotate_right(1);
+        assert!(
+            unbiased(&deviations(&pictures, &shifted)).is_err(),
+            "{name}: a shift is not found"
+        );
+    }
+}
