@@ -20,6 +20,10 @@ pub trait Backend {
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError>;
     /// The largest film that it can have, in pixels.
     fn largest_film(&self) -> u64;
+    /// How many samples all pixels get; further ones are left out where they are not needed.
+    fn samples_of_all(&self) -> u32 {
+        u32::MAX
+    }
 }
 
 /// How long one call of [`Backend::render`] aims to take: long enough to hide what a call costs, short enough for
@@ -118,7 +122,11 @@ impl Steps {
     pub fn new(cut: &Cut, call: Duration) -> Steps {
         Steps {
             cut: *cut,
-            pace: Pace { call, speed: None },
+            pace: Pace {
+                call,
+                speed: None,
+                speed_of_all: 0.0,
+            },
             region: Region::whole(0, 0),
             samples: 0,
             pass: 0..0,
@@ -130,6 +138,7 @@ impl Steps {
     pub fn start(&mut self, region: Region, samples: u32) {
         self.region = region;
         self.samples = samples;
+        self.pace.start_film();
         self.begin_pass(0);
     }
 
@@ -156,7 +165,8 @@ impl Steps {
         let start = Instant::now();
         backend.render(tile, self.pass.clone())?;
         let work = tile.pixels() as f64 * f64::from(count);
-        self.pace.took(work, start.elapsed());
+        let of_all = self.pass.end <= backend.samples_of_all();
+        self.pace.took(work, start.elapsed(), of_all);
         self.y = tile.y1;
         if self.y >= self.region.y1 {
             self.begin_pass(self.pass.end);
@@ -172,6 +182,11 @@ impl Steps {
     /// The samples that every pixel has.
     pub fn samples(&self) -> u32 {
         self.pass.start
+    }
+
+    /// The samples that the pixels of a row have.
+    pub fn samples_of_row(&self, y: u32) -> u32 {
+        if y < self.y { self.pass.end } else { self.pass.start }
     }
 
     /// Samples of pixels per second, once a call has been made.
@@ -196,15 +211,28 @@ struct Pace {
     call: Duration,
     /// Samples of pixels per second.
     speed: Option<f64>,
+    /// The same where no pixel leaves samples out.
+    speed_of_all: f64,
 }
 
 impl Pace {
     /// A first call is small enough for the slowest device and scene.
     const FIRST_CALL: f64 = 16384.0;
+    /// How much faster work may seem where pixels leave samples out: the next tile may have none that does.
+    const MOST_LEFT_OUT: f64 = 8.0;
 
-    fn took(&mut self, work: f64, time: Duration) {
+    fn took(&mut self, work: f64, time: Duration, of_all: bool) {
         let speed = work / time.as_secs_f64().max(1e-6);
-        self.speed = Some(self.speed.map_or(speed, |known| speed.min(2.0 * known)));
+        let speed = self.speed.map_or(speed, |known| speed.min(2.0 * known));
+        if of_all {
+            self.speed_of_all = speed;
+        }
+        self.speed = Some(speed.min(Self::MOST_LEFT_OUT * self.speed_of_all));
+    }
+
+    /// No pixel of a new film leaves samples out at first.
+    fn start_film(&mut self) {
+        self.speed = self.speed.map(|speed| speed.min(self.speed_of_all));
     }
 
     /// Pixel samples that fit a call.

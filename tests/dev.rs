@@ -117,7 +117,10 @@ impl Files {
     fn tint(&self, factor: f64) {
         let kernel = Shaders::built_in().text("kernels/render.wgsl").to_string();
         assert!(kernel.contains(RADIANCE));
-        self.write(KERNEL, &kernel.replace(RADIANCE, &format!("({RADIANCE} * {factor:?})")));
+        self.write(
+            KERNEL,
+            &kernel.replace(RADIANCE, &format!("({RADIANCE} * vec4f(vec3f({factor:?}), 1.0))")),
+        );
     }
 
     fn sources(&self) -> Sources {
@@ -421,7 +424,9 @@ fn saves_by_rename_and_links_are_seen() {
     running.wait_rendered(&files);
     files.save_by_rename("scene.toml", &SCENE.replace("fov = 40", "fov = 50"));
     running.wait_rendered(&files);
-    let kernel = files.read(KERNEL).replace(RADIANCE, &format!("({RADIANCE} * 0.25)"));
+    let kernel = files
+        .read(KERNEL)
+        .replace(RADIANCE, &format!("({RADIANCE} * vec4f(vec3f(0.25), 1.0))"));
     files.save_by_rename(KERNEL, &kernel);
     running.wait_rendered(&files);
     #[cfg(unix)]
@@ -611,7 +616,7 @@ fn the_cpu_agrees_until_a_shader_is_changed() {
             .and_then(|frame| frame.header.differing)
     };
     assert_eq!(running.wait("a comparison", compared), (0, 0.0));
-    files.edit(KERNEL, RADIANCE, &format!("({RADIANCE} + vec3f(0.25, 0.0, 0.0))"));
+    files.edit(KERNEL, RADIANCE, &format!("({RADIANCE} + vec4f(0.25, 0.0, 0.0, 0.0))"));
     let (pixels, largest) = running.wait("a difference", |running| {
         compared(running).filter(|(pixels, _)| *pixels > 0)
     });

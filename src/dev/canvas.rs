@@ -164,7 +164,9 @@ impl Canvas {
         self.gpu.set_camera(&self.scene.camera)?;
         self.gpu.begin(region)?;
         if self.compare {
-            self.cpu = Film::new(region);
+            let mut cpu = Cpu::new(&self.scene);
+            cpu.begin(region)?;
+            self.cpu = cpu.film()?;
         }
         self.steps
             .start(region, if scale > 1 { 1 } else { self.scene.pixel_samples });
@@ -236,17 +238,15 @@ impl Canvas {
 
     fn gpu_pixels(&mut self) -> Result<Pixels, RenderError> {
         let film = self.gpu.film()?;
-        Ok(means(
-            self.stage.width,
-            self.stage.height,
-            &film.sums,
-            self.under.as_ref().map(|(gpu, _)| gpu),
-        ))
+        Ok(self.pixels(&film, self.under.as_ref().map(|(gpu, _)| gpu)))
     }
 
     fn cpu_pixels(&self) -> Pixels {
-        let under = self.under.as_ref().and_then(|(_, cpu)| cpu.as_ref());
-        means(self.stage.width, self.stage.height, &self.cpu.sums, under)
+        self.pixels(&self.cpu, self.under.as_ref().and_then(|(_, cpu)| cpu.as_ref()))
+    }
+
+    fn pixels(&self, film: &Film, under: Option<&Pixels>) -> Pixels {
+        means(film, under, &|y| self.steps.samples_of_row(y) > 0)
     }
 
     /// The picture as it is now, and its width and height.
@@ -257,7 +257,12 @@ impl Canvas {
         let size = [self.stage.width, self.stage.height];
         if view == View::Samples {
             let film = self.gpu.film()?;
-            let counts = film.sums.iter().map(|sum| sum.w as u32).collect();
+            let counts = match self.scene.adaptive {
+                true => film.sample_counts().collect(),
+                false => (0..self.stage.height)
+                    .flat_map(|y| std::iter::repeat_n(self.steps.samples_of_row(y), self.stage.width as usize))
+                    .collect(),
+            };
             return Ok((Content::Samples(counts, self.scene.pixel_samples), size));
         }
         // Before the next stage has anything the last one is sent, which is smaller.

@@ -84,7 +84,9 @@ pub fn measure(sources: &Sources, device: Choice) -> Result<Vec<Measured>, Strin
         ));
     }
     // Every run has kernels of its own: factors that are not the same as f32.
-    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |time| time.as_millis() % 65_536);
+    let now = SystemTime::now()
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .map_or(0, |time| time.as_millis() % 65_536);
     Ok(vec![
         clock.all("scene save", &mut |i, _| {
             fs::write(scene.path(), brighter(&text, i)).map_err(told)
@@ -97,7 +99,7 @@ pub fn measure(sources: &Sources, device: Choice) -> Result<Vec<Measured>, Strin
             let factor = 1.0 + (now as f64 * ROUNDS as f64 + i as f64) / f64::from(1 << 21);
             fs::write(
                 &kernel,
-                kernel_text.replace(PLACE, &format!("({PLACE} * {factor:?})")),
+                kernel_text.replace(PLACE, &format!("({PLACE} * vec4f(vec3f({factor:?}), 1.0))")),
             )
             .map_err(told)
         })?,

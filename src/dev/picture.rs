@@ -4,7 +4,7 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::film::mean;
+use crate::film::{Film, mean};
 use crate::image::{Aov, Pixels, difference, encode};
 use crate::pack::{FirstHit, NOTHING};
 
@@ -42,10 +42,11 @@ impl View {
     }
 }
 
-/// The means of a film's sums. Where it has no samples yet, `under` shows through, a smaller picture of the same.
-pub fn means(width: u32, height: u32, sums: &[Vec4], under: Option<&Pixels>) -> Pixels {
+/// The means of a film's sums. In rows that have no samples yet `under` shows through, a smaller picture of the same.
+pub fn means(film: &Film, under: Option<&Pixels>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> Pixels {
+    let (width, height) = (film.region.width(), film.region.height());
     let color = |(i, sum): (usize, &Vec4)| match under {
-        Some(under) if sum.w == 0.0 => {
+        Some(under) if !has_samples(i as u32 / width) => {
             let at = Scaled {
                 from: [width, height],
                 to: [under.width, under.height],
@@ -60,7 +61,7 @@ pub fn means(width: u32, height: u32, sums: &[Vec4], under: Option<&Pixels>) -> 
     Pixels {
         width,
         height,
-        colors: sums.par_iter().enumerate().map(color).collect(),
+        colors: film.sums.par_iter().enumerate().map(color).collect(),
     }
 }
 
@@ -160,7 +161,7 @@ impl Frame {
             Content::Hits(aov, hits) => {
                 let middle = hits.get((height / 2 * width + width / 2) as usize);
                 let middle_depth = middle.filter(|hit| hit.shape != NOTHING).map_or(1.0, |hit| hit.depth);
-                vec![("picture", bytes(hits, |hit| aov.color(hit, middle_depth)))]
+                vec![("picture", bytes(hits, |hit| aov.color_of_hit(hit, middle_depth)))]
             }
             Content::Compare(gpu, cpu) => {
                 header.differing = difference(gpu, cpu, 0.0).map(|found| (found.unequal, found.largest));
@@ -224,7 +225,7 @@ impl Frame {
             Aov::Normal => vec![("normal", numbers(hit.normal.into()))],
             Aov::Depth => vec![("depth", numbers([hit.depth]))],
             Aov::Uv => vec![("uv", numbers(hit.uv.into()))],
-            Aov::Primitive => Vec::new(),
+            _ => Vec::new(),
         };
         known.push(("on", shape));
         known.extend(
@@ -303,6 +304,7 @@ fn png(width: u32, height: u32, rgb: &[u8]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Region;
 
     fn pixels(colors: &[[f32; 3]]) -> Pixels {
         Pixels {
@@ -332,11 +334,12 @@ mod tests {
     #[test]
     fn a_coarse_picture_shows_where_the_film_is_empty() {
         let under = pixels(&[[1.0, 0.0, 0.0]]);
-        let sums = [Vec4::ZERO, Vec4::new(0.0, 2.0, 4.0, 2.0)];
+        let mut film = Film::new(Region::whole(1, 2));
+        film.sums[0] = Vec4::new(0.0, 2.0, 4.0, 2.0);
         assert_eq!(
-            means(2, 1, &sums, Some(&under)).colors,
-            [[1.0, 0.0, 0.0], [0.0, 1.0, 2.0]]
+            means(&film, Some(&under), &|y| y < 1).colors,
+            [[0.0, 1.0, 2.0], [1.0, 0.0, 0.0]]
         );
-        assert_eq!(means(2, 1, &sums, None).colors[0], [0.0; 3]);
+        assert_eq!(means(&film, None, &|y| y < 1).colors[1], [0.0; 3]);
     }
 }

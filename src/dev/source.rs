@@ -7,7 +7,7 @@ use std::time::SystemTime;
 
 use super::diagnostic::Diagnostic;
 use crate::gpu::compose::{BUILT_IN, Shaders};
-use crate::pack::{Packed, pack};
+use crate::pack::{Packed, Specialization, pack};
 use crate::scene::{CameraDescription, Description, Overrides, Scene, TextureDescription};
 
 /// Where the files are.
@@ -32,6 +32,14 @@ pub struct Loaded {
     pub scene: Scene,
     /// What the backends read.
     pub packed: Packed,
+}
+
+/// What a kernel is compiled for: its constants, and whether sampling is adaptive.
+pub type Constants = (Specialization, bool);
+
+/// What a scene's kernel is compiled for.
+pub fn constants(packed: &Packed) -> Constants {
+    (packed.specialization, packed.adaptive)
 }
 
 /// What the files say at one moment.

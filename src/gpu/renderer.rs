@@ -41,9 +41,10 @@ pub struct Gpu {
     render: wgpu::ComputePipeline,
     /// The kernel of first hits, once it was asked for.
     aov: Option<wgpu::ComputePipeline>,
-    scene: [wgpu::Buffer; 8],
+    scene: [wgpu::Buffer; 9],
     work: wgpu::Buffer,
     film: Option<Target>,
+    adaptive: bool,
 }
 
 /// What it takes to compile another kernel for the same scene.
@@ -73,7 +74,10 @@ impl Gpu {
             layout: bind_group_layout(device),
             exact: options.exact,
         };
-        let render = kernels.compile(device, Kernel::Render)?;
+        let render = match packed.adaptive {
+            true => kernels.compile(device, Kernel::Adaptive)?,
+            false => kernels.compile(device, Kernel::Render)?,
+        };
         let scene = upload(device, packed)?;
         let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         let mut gpu = Gpu {
@@ -84,6 +88,7 @@ impl Gpu {
             scene,
             work,
             film: None,
+            adaptive: packed.adaptive,
         };
         let nothing = Region {
             x0: 0,
@@ -104,7 +109,8 @@ impl Gpu {
     /// Uploads a changed scene that needs no other kernel. Returns whether it does not; if it does, nothing is done.
     /// The film is lost.
     pub fn update(&mut self, packed: &Packed) -> Result<bool, RenderError> {
-        let same_kernel = self.kernels.baked.is_none() && self.kernels.constants == packed.specialization;
+        let same_kernel = self.kernels.baked.is_none()
+            && (self.kernels.constants, self.adaptive) == (packed.specialization, packed.adaptive);
         if same_kernel {
             self.film = None;
             self.scene = upload(&self.device, packed)?;
@@ -131,6 +137,7 @@ impl Gpu {
                 lights,
                 textures,
                 texels,
+                filter_table,
             ] = &self.scene;
             let buffers = [
                 &self.work,
@@ -142,6 +149,7 @@ impl Gpu {
                 lights,
                 textures,
                 texels,
+                filter_table,
                 &buffer,
             ];
             let entries: Vec<wgpu::BindGroupEntry> = (0..)
@@ -193,7 +201,10 @@ impl Gpu {
 impl Backend for Gpu {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
         self.film = None; // before the next one: the two together may not fit
-        self.film = Some(self.target::<Vec4>(region)?);
+        self.film = Some(match self.adaptive {
+            true => self.target::<[Vec4; 2]>(region)?,
+            false => self.target::<Vec4>(region)?,
+        });
         Ok(())
     }
 
@@ -208,9 +219,12 @@ impl Backend for Gpu {
         let Some(film) = &self.film else {
             return Ok(Film::new(Region::whole(0, 0)));
         };
+        let mut sums: Vec<Vec4> = self.device.download(&film.buffer)?;
+        let moments = sums.split_off(film.region.pixels() as usize);
         Ok(Film {
             region: film.region,
-            sums: self.device.download(&film.buffer)?,
+            sums,
+            moments,
         })
     }
 
@@ -225,6 +239,10 @@ impl Backend for Gpu {
         self.device.download(&target.buffer)
     }
 
+    fn samples_of_all(&self) -> u32 {
+        self.kernels.constants.pixel_samples
+    }
+
     fn largest_film(&self) -> u64 {
         let info = &self.device.info;
         info.largest_binding.min(info.largest_buffer) / size_of::<FirstHit>() as u64
@@ -232,7 +250,7 @@ impl Backend for Gpu {
 }
 
 /// The buffers of a scene, in the order of their bindings.
-fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 8], RenderError> {
+fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 9], RenderError> {
     device.checked(|| {
         [
             device.upload(BufferUsages::UNIFORM | BufferUsages::COPY_DST, &[packed.camera]),
@@ -243,6 +261,7 @@ fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 8], RenderE
             device.upload(BufferUsages::STORAGE, &packed.lights),
             device.upload(BufferUsages::STORAGE, &packed.textures),
             device.upload(BufferUsages::STORAGE, &packed.texels),
+            device.upload(BufferUsages::STORAGE, &packed.filter_table),
         ]
     })
 }

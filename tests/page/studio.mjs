@@ -93,7 +93,7 @@ export class Studio {
 
   // Saves a shader so that the picture is red alone.
   redden() {
-    this.edit(KERNEL, RADIANCE, `(${RADIANCE} * vec3f(1.0, 0.0, 0.0))`);
+    this.edit(KERNEL, RADIANCE, `(${RADIANCE} * vec4f(1.0, 0.0, 0.0, 1.0))`);
   }
 
   breakShader() {

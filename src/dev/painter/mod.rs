@@ -15,11 +15,10 @@ use super::canvas::Canvas;
 use super::diagnostic::Diagnostic;
 use super::picture::{Frame, View};
 use super::session::{Event, Report, State};
-use super::source::{Loaded, Snapshot, Sources};
+use super::source::{Constants, Loaded, Snapshot, Sources, constants};
 use crate::error::{RenderError, ShaderError};
 use crate::gpu::compose::Shaders;
 use crate::gpu::{Device, Gpu};
-use crate::pack::Specialization;
 use crate::scene::CameraDescription;
 
 /// Pictures of more samples are shown no more often than this, and a tenth of the time is spent on them at most.
@@ -47,8 +46,8 @@ pub struct Painter {
     shaders: Option<Arc<Shaders>>,
     /// The last shaders that could be rendered with.
     good: Option<Arc<Shaders>>,
-    /// Shaders that were refused for a specialisation.
-    refused: Vec<(Arc<Shaders>, Specialization)>,
+    /// Shaders that were refused for these constants.
+    refused: Vec<(Arc<Shaders>, Constants)>,
     device: Option<Device>,
     running: Option<Running>,
     pending: Option<Pending>,
@@ -79,13 +78,13 @@ pub struct Painter {
 struct Running {
     canvas: Canvas,
     shaders: Arc<Shaders>,
-    specialization: Specialization,
+    constants: Constants,
 }
 
 struct Pending {
     id: u64,
     shaders: Arc<Shaders>,
-    specialization: Specialization,
+    constants: Constants,
 }
 
 impl Painter {
@@ -181,9 +180,9 @@ impl Painter {
     /// it the last good ones.
     fn wanted(&self) -> Option<(Arc<Loaded>, Arc<Shaders>)> {
         let (loaded, newest) = (self.loaded.clone()?, self.shaders.clone()?);
-        let specialization = loaded.packed.specialization;
+        let constants = constants(&loaded.packed);
         let mut candidates = [Some(newest), self.good.clone()].into_iter().flatten();
-        let shaders = candidates.find(|shaders| !self.refused.contains(&(shaders.clone(), specialization)))?;
+        let shaders = candidates.find(|shaders| !self.refused.contains(&(shaders.clone(), constants)))?;
         Some((loaded, shaders))
     }
 
@@ -193,23 +192,23 @@ impl Painter {
         if self.shaders.as_ref() == Some(&shaders) {
             self.problems.shader = None;
         }
-        let specialization = loaded.packed.specialization;
-        let fits = |known: &Arc<Shaders>, constants| *known == shaders && specialization == constants;
+        let constants = constants(&loaded.packed);
+        let fits = |known: &Arc<Shaders>, of| *known == shaders && constants == of;
         let running = self.running.as_ref();
-        if running.is_some_and(|running| fits(&running.shaders, running.specialization)) {
+        if running.is_some_and(|running| fits(&running.shaders, running.constants)) {
             self.pending = None;
             self.draw_scene(since);
-        } else if !(self.pending.as_ref()).is_some_and(|pending| fits(&pending.shaders, pending.specialization)) {
+        } else if !(self.pending.as_ref()).is_some_and(|pending| fits(&pending.shaders, pending.constants)) {
             self.since.get_or_insert(since);
             self.request(&loaded, shaders);
         }
     }
 
     fn request(&mut self, loaded: &Loaded, shaders: Arc<Shaders>) {
-        let specialization = loaded.packed.specialization;
+        let constants = constants(&loaded.packed);
         // A running kernel that fits the scene stays if the new one is wrong; else the last good shaders are compiled.
         let running = self.running.as_ref();
-        let stays = running.is_some_and(|running| running.specialization == specialization);
+        let stays = running.is_some_and(|running| running.constants == constants);
         let fallback = self.good.clone().filter(|good| !stays && *good != shaders);
         self.requests += 1;
         self.builder.request(Request {
@@ -222,7 +221,7 @@ impl Painter {
         self.pending = Some(Pending {
             id: self.requests,
             shaders,
-            specialization,
+            constants,
         });
     }
 
@@ -270,7 +269,7 @@ impl Painter {
             Ok((gpu, shaders)) => {
                 self.state.compile_seconds = Some(built.took.as_secs_f64());
                 self.compiled = self.state.compile_seconds;
-                self.run(*gpu, shaders, pending.specialization);
+                self.run(*gpu, shaders, pending.constants);
             }
             Err(RenderError::Shader(error)) => {
                 self.refuse(&pending, Some(&error));
@@ -294,7 +293,7 @@ impl Painter {
     }
 
     /// Starts to render with a kernel.
-    fn run(&mut self, mut gpu: Gpu, shaders: Arc<Shaders>, specialization: Specialization) {
+    fn run(&mut self, mut gpu: Gpu, shaders: Arc<Shaders>, constants: Constants) {
         let Some(loaded) = self.loaded.clone() else { return };
         let info = &gpu.device().info;
         self.state.device = format!("{}, {}", info.name, info.driver);
@@ -311,7 +310,7 @@ impl Painter {
                 self.running = Some(Running {
                     canvas,
                     shaders,
-                    specialization,
+                    constants,
                 });
                 self.problems.device = None;
                 self.begun((Instant::now(), true));
@@ -322,7 +321,7 @@ impl Painter {
 
     /// Remembers that shaders are wrong for a scene like this, so that they are not tried again.
     fn refuse(&mut self, pending: &Pending, error: Option<&ShaderError>) {
-        self.refused.push((pending.shaders.clone(), pending.specialization));
+        self.refused.push((pending.shaders.clone(), pending.constants));
         self.problems.shader = error.map(|error| self.of_shader(error));
     }
 
