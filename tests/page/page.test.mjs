@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import http from "node:http";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { LONGEST, SCENE, Studio, decoded, finished, launch, open, revision, shown, showsRendered } from "./studio.mjs";
+import { LONGEST, SCENE, Studio, decoded, finished, launch, open, revision, settled, shown, showsRendered } from "./studio.mjs";
 
 let browser;
 let studio;
@@ -92,10 +92,9 @@ test("drags move the camera, and saving writes what the page shows", async () =>
   assert.ok(await page.locator("#save").isDisabled());
   let last = start;
   for (const [modifier, dx, dy] of [[null, 90, 30], ["Shift", 30, -20], ["Control", 0, 40]]) {
-    const old = await revision(page);
     await drag(page, dx, dy, modifier);
-    await finished(page, old);
-    await page.waitForFunction((last) => document.getElementById("camera-text").innerText !== last, last);
+    await settled(page);
+    assert.notEqual(await text(page, "#camera-text"), last);
     last = await text(page, "#camera-text");
   }
   const seen = await shown(page);
@@ -119,8 +118,7 @@ test("the camera is copied as text and reset", async () => {
   const start = await text(page, "#camera-text");
   await drag(page, 60, 0);
   await page.locator("#reset:enabled").waitFor();
-  await finished(page, await revision(page) - 1);
-  await page.waitForTimeout(200);
+  await settled(page);
   await page.click("#copy");
   await page.locator("#notice", { hasText: "camera copied" }).waitFor();
   const copied = await page.evaluate(() => navigator.clipboard.readText());
@@ -169,7 +167,7 @@ test("the views show what they say, the GPU agrees with the CPU", async () => {
   const faint = await shown(page, "difference");
   await page.selectOption("#gain", "4096");
   await page.waitForFunction(() => document.getElementById("gain-shown").textContent === "× 4096");
-  await page.waitForTimeout(500);
+  await settled(page);
   assert.notDeepEqual(await shown(page, "difference"), faint);
   assert.deepEqual(page.faults, []);
 });
@@ -181,10 +179,9 @@ test("a second viewer sees the same, and what the first does", async () => {
   await drag(first, 80, 10);
   await finished(second, old);
   await second.locator("#moved").waitFor();
-  await first.waitForTimeout(500);
-  const text_of = (page) => text(page, "#camera-text");
-  assert.equal(await text_of(second), await text_of(first));
-  await finished(first, old);
+  await settled(first);
+  await settled(second);
+  assert.equal(await text(second, "#camera-text"), await text(first, "#camera-text"));
   assert.deepEqual(await shown(second), await shown(first));
 });
 

@@ -186,6 +186,24 @@ export async function finished(page, after = 0) {
   return handle.jsonValue();
 }
 
+// Waits until nothing on the page changes any more and the picture is finished.
+export async function settled(page) {
+  const now = () =>
+    page.evaluate(() => {
+      const { revision, done } = document.getElementById("panels").dataset;
+      return [revision, done, document.getElementById("camera-text").innerText].join();
+    });
+  const deadline = Date.now() + LONGEST;
+  let [last, alike] = ["", 0];
+  while (alike < 5) {
+    assert.ok(Date.now() < deadline, "the page does not settle");
+    await page.waitForTimeout(80);
+    const seen = await now();
+    alike = seen === last && seen.includes("true") ? alike + 1 : 0;
+    last = seen;
+  }
+}
+
 export function revision(page) {
   return page.evaluate(() => Number(document.getElementById("panels").dataset.revision));
 }
