@@ -30,6 +30,41 @@ fn scene(path: &str, size: u32) -> Packed {
     pack(&Scene::load(&path, &overrides).expect("the project's scenes are valid"))
 }
 
+/// The machine's arithmetic limit: multiplications and additions of eight f32 at a time, without any memory, on one core.
+/// The throughput is in operations.
+#[cfg(target_arch = "x86_64")]
+fn peak(criterion: &mut Criterion) {
+    use std::arch::x86_64::{__m256, _mm256_add_ps, _mm256_mul_ps, _mm256_set1_ps};
+
+    const ROUNDS: u64 = 10_000;
+    const CHAINS: usize = 12;
+
+    #[target_feature(enable = "avx2")]
+    fn chains(factor: __m256) -> [__m256; CHAINS] {
+        let mut values = [_mm256_set1_ps(1.0); CHAINS];
+        for _ in 0..ROUNDS {
+            for value in &mut values {
+                *value = _mm256_add_ps(_mm256_mul_ps(*value, factor), factor);
+            }
+        }
+        values
+    }
+
+    if !std::arch::is_x86_feature_detected!("avx2") {
+        return;
+    }
+    let mut group = criterion.benchmark_group("peak");
+    group.throughput(Throughput::Elements(ROUNDS * CHAINS as u64 * 8 * 2));
+    group.bench_function("multiply and add", |b| {
+        // SAFETY: the processor has AVX2.
+        b.iter(|| unsafe { chains(black_box(_mm256_set1_ps(0.5))) })
+    });
+    group.finish();
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn peak(_: &mut Criterion) {}
+
 /// One call of each function that a picture spends its time in.
 fn twins(criterion: &mut Criterion) {
     let scene = scene("scenes/cornell.toml", 400);
@@ -132,5 +167,5 @@ fn pictures(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, twins, pictures);
+criterion_group!(benches, peak, twins, pictures);
 criterion_main!(benches);

@@ -15,12 +15,24 @@ const TOLERANCE: f64 = 1e-5;
 /// The share of pixels that may not agree: on edges, where one of a pixel's samples falls on the other side.
 const EDGES: f64 = 0.0005;
 
+/// Scenes with more edges than that, their share, and why.
+const MORE_EDGES: &[(&str, f64, &str)] = &[(
+    "balls-checker.toml",
+    0.003,
+    "a checker without filter up to the horizon",
+)];
+
+fn edges(scene: &str) -> f64 {
+    MORE_EDGES
+        .iter()
+        .find(|(name, ..)| *name == scene)
+        .map_or(EDGES, |(_, share, _)| *share)
+}
+
 /// Scenes that the oracle does not know enough for, and why.
 const BEYOND: &[(&str, &str)] = &[
-    ("balls-checker.toml", "a mirror and a texture"),
-    ("ground-grid.toml", "a texture"),
-    ("mirror-glass.toml", "a mirror and glass"),
-    ("textures.toml", "textures"),
+    ("textures.toml", "images and normal maps"),
+    ("ground-grid.toml", "an image"),
 ];
 
 /// The scene, small, with grids of samples.
@@ -33,6 +45,9 @@ fn small(description: &Description) -> Description {
         pattern: Pattern::Grid,
         count: 4,
     };
+    // The oracle knows textures at points, and follows both branches of every path through glass: so do the first two.
+    d.render.ray_differentials = false;
+    d.render.max_depth = 2;
     d.render.light_samples = SamplesDescription {
         pattern: Pattern::Grid,
         count: 16,
@@ -79,10 +94,11 @@ fn pictures_are_the_oracles() {
                 worst.fold(0.0, f64::max),
                 mean(&picture) / mean(&truth) - 1.0
             );
-            assert!(share <= EDGES, "{name}, {way:?}: {share} of the pixels differ");
+            assert!(share <= edges(&name), "{name}, {way:?}: {share} of the pixels differ");
+            let drift = (mean(&picture) / mean(&truth) - 1.0).abs();
             assert!(
-                (mean(&picture) / mean(&truth) - 1.0).abs() < 1e-4,
-                "{name}, {way:?}: the mean differs"
+                drift < 0.2 * edges(&name),
+                "{name}, {way:?}: the mean differs by {drift}"
             );
         }
     }
@@ -102,6 +118,8 @@ fn a_flawed_oracle_is_found() {
             Flaw::CornerSamples,
             Flaw::NoShadows,
             Flaw::Exponent,
+            Flaw::InvertedIndex,
+            Flaw::TransposedTexture,
         ] {
             let share = differing(&picture, &Oracle::new(&description, flaw).picture());
             if share > 10.0 * EDGES {
@@ -114,7 +132,13 @@ fn a_flawed_oracle_is_found() {
             );
         }
     }
-    for flaw in [Flaw::SwappedAxes, Flaw::NoShadows, Flaw::Exponent] {
+    for flaw in [
+        Flaw::SwappedAxes,
+        Flaw::NoShadows,
+        Flaw::Exponent,
+        Flaw::InvertedIndex,
+        Flaw::TransposedTexture,
+    ] {
         assert!(found.contains(&flaw), "{flaw:?} is found in no scene");
     }
 }

@@ -42,8 +42,8 @@ fn empty(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
             shadow_epsilon: 1e-6,
             ..Default::default()
         },
-        materials: Default::default(),
         textures: Default::default(),
+        materials: Default::default(),
         lights: Vec::new(),
         shapes: Vec::new(),
     }

@@ -2,14 +2,17 @@
 //! point of it, in its inside, on its edge or past it. Some of these have single numbers replaced by edge values, and
 //! some are random bits of all magnitudes.
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
 use naga::{Handle, Module, ScalarKind, Type};
+use wgray::cpu::differential::{Arrival, Derivative, Differential};
+use wgray::cpu::footprint::Footprint;
 use wgray::cpu::light::Segments;
+use wgray::cpu::path::Path;
 use wgray::cpu::phong::Lobes;
 use wgray::cpu::ray::{Hit, Ray};
 use wgray::cpu::shadow::{Block, cone_to_light};
 use wgray::cpu::surface::Surface;
-use wgray::pack::{Camera, FAR, Light, Material, NOTHING, Primitive, Sphere};
+use wgray::pack::{Camera, FAR, Light, Material, NOTHING, Primitive, Sphere, Texture};
 
 use crate::kernel::{Function, scalars};
 use crate::random::Random;
@@ -186,6 +189,13 @@ impl Situation {
                 .write(words);
             }
             "Block" => block(random).write(words),
+            "Path" => self.path(random).write(words),
+            "Derivative" => derivative(random).write(words),
+            "Differential" => differential(random).write(words),
+            "Arrival" => arrival(random).write(words),
+            "Footprint" => footprint(random).write(words),
+            "Texture" => texture(random).write(words),
+            "i32" => words.push((random.pick(&[random.below(20), random.below(40_000)]) as i32 - 20) as u32),
             "Sphere" => self.sphere(random).write(words),
             "Cone" => cone_to_light(&self.light, self.start.as_vec3()).write(words),
             "Material" => material(random).write(words),
@@ -245,6 +255,16 @@ impl Situation {
         }
     }
 
+    fn path(&self, random: &Random) -> Path {
+        Path {
+            ray: self.ray(random),
+            differential: differential(random),
+            throughput: color(random),
+            depth: random.below(10),
+            branch: random.below(4),
+        }
+    }
+
     /// About the way to the light, or off it.
     fn sphere(&self, random: &Random) -> Sphere {
         let away = self.direction.length() * random.pick(&[0.0, 0.1, 0.5, 2.0]);
@@ -285,6 +305,8 @@ impl Situation {
             "limit" => random.pick(&[FAR, FAR, self.t() as f32, (2.0 * self.t()) as f32]),
             "t" => random.pick(&[self.t() as f32, FAR]),
             "reach" => random.pick(&[self.light.reach, 1.0 - 1e-5, 1e10, 1.0]),
+            "cosine" | "cosine_i" | "cosine_t" | "random" | "line_width" => random.unit() as f32,
+            "eta" | "anisotropy" => random.magnitude(-1.0, 1.0) as f32,
             "epsilon" => random.pick(&[1e-5, 1e-4, 0.0]),
             _ => {
                 let (unit, sign) = (random.unit(), random.pick(&[1.0, -1.0]));
@@ -328,6 +350,65 @@ fn local_point(random: &Random) -> DVec3 {
     }
 }
 
+fn derivative(random: &Random) -> Derivative {
+    let any = || (vector(random) * random.pick(&[0.0, 1e-3, 1e-3, 1.0])).as_vec3();
+    Derivative {
+        position: any(),
+        direction: any(),
+    }
+}
+
+fn differential(random: &Random) -> Differential {
+    Differential {
+        x: derivative(random),
+        y: derivative(random),
+    }
+}
+
+fn arrival(random: &Random) -> Arrival {
+    let Differential { x, y } = differential(random);
+    Arrival {
+        x,
+        y,
+        normal_x: derivative(random).position,
+        normal_y: derivative(random).direction,
+    }
+}
+
+/// From a point to many repetitions of a texture, long and short, along its axes and across.
+fn footprint(random: &Random) -> Footprint {
+    let uv = Vec2::new(random.between(-3.0, 3.0) as f32, random.between(-3.0, 3.0) as f32);
+    let size = random.magnitude(-4.0, 1.5);
+    let edge = |size: f64| {
+        let v = vector(random) * size;
+        random
+            .pick(&[v.truncate(), v.truncate(), DVec2::new(v.x, 0.0), DVec2::ZERO])
+            .as_vec2()
+    };
+    Footprint {
+        uv,
+        dx: edge(size),
+        dy: edge(size * random.pick(&[1.0, 0.1, 0.01])),
+    }
+}
+
+fn texture(random: &Random) -> Texture {
+    Texture {
+        first: color(random),
+        kind: random.below(6),
+        second: color(random),
+        parameter: random.unit() as f32,
+        u: vector(random).as_vec3(),
+        format: random.below(3),
+        v: vector(random).as_vec3(),
+        wrap: random.below(3),
+        texels: 0,
+        width: 1 + random.below(300),
+        height: 1 + random.below(300),
+        levels: 1 + random.below(9),
+    }
+}
+
 fn block(random: &Random) -> Block {
     Block {
         pattern: whole("block_sample", "pattern", random),
@@ -343,7 +424,7 @@ fn material(random: &Random) -> Material {
     let exponent = random.pick(&[0, 1, 2, 16, 50, 4096]);
     let mut material: Material = bytemuck::Zeroable::zeroed();
     material.ambient = color(random);
-    material.kind = random.below(2);
+    material.kind = random.below(4);
     material.diffuse = color(random);
     material.specular = color(random);
     material.exponent = exponent;
@@ -358,7 +439,9 @@ fn material(random: &Random) -> Material {
 /// Whole numbers are small where they count something.
 fn whole(function: &str, name: &str, random: &Random) -> u32 {
     match name {
-        "kind" | "pattern" => random.below(8),
+        "kind" | "pattern" | "wrap" | "format" => random.below(8),
+        "size" => 1 + random.pick(&[random.below(20), random.below(16_384)]),
+        "level" => random.below(15),
         "count" => 1 + random.below(256),
         "i" if function == "block_sample" => random.below(32),
         "exponent_bits" => random.below(14),

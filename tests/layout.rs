@@ -133,8 +133,8 @@ fn every_uploaded_record_is_known_to_have_no_padding() {
 #[test]
 fn a_changed_record_is_found() {
     let changes = [
-        ("dropped", "    determinant: f32, ", "    // determinant: f32, "),
-        ("renamed", "    determinant: f32, ", "    determinants: f32, "),
+        ("dropped", "    number: u32, ", "    // number: u32, "),
+        ("renamed", "    number: u32, ", "    numbers: u32, "),
         ("of another type", "    seed: u32,", "    seed: i32,"),
         ("at another offset", "    reach: f32, ", "    @align(16) reach: f32, "),
         ("added", "    seed: u32,", "    seed: u32,\n    seed2: u32,"),
@@ -322,7 +322,7 @@ fn override_differences(source: &Source, given: &[&str]) -> Vec<String> {
 fn overrides_are_the_fields_of_the_specialization() {
     let constants = Specialization::default().constants();
     let names: Vec<&str> = constants.iter().map(|(name, _)| *name).collect();
-    for kernel in [Kernel::Render, Kernel::Aov] {
+    for kernel in [Kernel::Render, Kernel::Adaptive, Kernel::Aov] {
         let source = sources::shaders().compose(kernel, None);
         assert_eq!(override_differences(&source, &names), Vec::<String>::new());
         // negative controls

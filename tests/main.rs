@@ -19,6 +19,7 @@ mod radiance;
 mod random;
 mod render;
 mod robust;
+mod sampling;
 mod scenes;
 mod sources;
 mod statistics;

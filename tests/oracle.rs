@@ -2,10 +2,10 @@
 //! the twins, which could share a mistake: ellipsoids are quadrics, triangles Moeller and Trumbore's, rectangles are
 //! cut out of their planes by projection, and Phong's model is the formula of `docs/scene-format.md` with unit vectors.
 
-use glam::{DMat4, DVec2, DVec3, DVec4};
+use glam::{DMat4, DVec2, DVec3, DVec4, Vec2Swizzles};
 use wgray::scene::{
-    CameraDescription, ColorDescription, Description, LightDescription, MaterialDescription, PhongDescription,
-    ShapeDescription,
+    CameraDescription, ColorDescription, Description, LightDescription, MaterialDescription, PhongDescription, Shadows,
+    ShapeDescription, TextureDescription,
 };
 
 /// A mistake that the tests of the tests make on purpose.
@@ -24,6 +24,10 @@ pub enum Flaw {
     NoShadows,
     /// The specular exponent one too low.
     Exponent,
+    /// Glass and what is before it confused.
+    InvertedIndex,
+    /// Rows of a texture confused with columns.
+    TransposedTexture,
 }
 
 pub struct Oracle<'a> {
@@ -100,7 +104,7 @@ impl<'a> Oracle<'a> {
             let corner = DVec2::new(f64::from(i % width), f64::from(i / width));
             let sum: DVec3 = places
                 .iter()
-                .map(|place| self.radiance(self.camera_ray(corner + *place)))
+                .map(|place| self.radiance(self.camera_ray(corner + *place), 0))
                 .sum();
             (sum / places.len() as f64).to_array()
         };
@@ -180,7 +184,8 @@ impl<'a> Oracle<'a> {
         })
     }
 
-    fn radiance(&self, (origin, direction): (DVec3, DVec3)) -> DVec3 {
+    /// `bounces` by mirrors and glass lie behind.
+    fn radiance(&self, (origin, direction): (DVec3, DVec3), bounces: u32) -> DVec3 {
         let render = &self.scene.render;
         let Some(meeting) = self.nearest(origin, direction) else {
             return render.background;
@@ -188,29 +193,56 @@ impl<'a> Oracle<'a> {
         let Some(material) = &self.solids[meeting.solid].material else {
             return light_color(&self.scene.lights[meeting.shape - self.scene.shapes.len()]);
         };
-        let phong = match &self.scene.materials[material] {
-            MaterialDescription::Phong(phong) => phong,
-            other => panic!("the oracle does not know the material {other:?}"),
-        };
-        let factor = |own: &Option<ColorDescription>| match own.as_ref().or(phong.color.as_ref()) {
-            Some(ColorDescription::Plain(plain)) => *plain,
-            other => panic!("the oracle does not know the colour {other:?}"),
-        };
         let point = origin + direction * meeting.t;
-        let viewer = -direction;
-        let normal = if meeting.normal.dot(viewer) < 0.0 {
-            -meeting.normal
-        } else {
-            meeting.normal
-        };
+        let facing = meeting.normal.dot(direction) < 0.0;
+        let normal = if facing { meeting.normal } else { -meeting.normal };
         // "how far above the surface a shadow ray starts, relative to the largest coordinate there"
-        let coordinate = point.abs().max_element().max(meeting.t);
-        let above = point + normal * (render.shadow_epsilon * coordinate);
-        let mut sum = render.ambient * factor(&phong.ambient);
+        let offset = normal * (render.shadow_epsilon * point.abs().max_element().max(meeting.t));
+        let follow = |origin: DVec3, direction: DVec3| self.radiance((origin, direction), bounces + 1);
+        match &self.scene.materials[material] {
+            MaterialDescription::Phong(phong) => self.direct(phong, &meeting, normal, point + offset, -direction),
+            _ if bounces == render.max_depth => render.background,
+            MaterialDescription::Mirror(mirror) => {
+                assert!(mirror.normal_map.is_none(), "the oracle knows no normal maps");
+                self.color(&mirror.tint, meeting.uv) * follow(point + offset, direction.reflect(normal))
+            }
+            MaterialDescription::Glass(glass) => {
+                assert!(glass.normal_map.is_none(), "the oracle knows no normal maps");
+                let outside_in = facing != (self.flaw == Flaw::InvertedIndex);
+                let (n1, n2) = if outside_in { (1.0, glass.ior) } else { (glass.ior, 1.0) };
+                let reflected = follow(point + offset, direction.reflect(normal));
+                // Snell's law by sines, in the plane of incidence
+                let along = direction - normal * direction.dot(normal);
+                let sine = along.length() * n1 / n2;
+                if sine >= 1.0 {
+                    return reflected;
+                }
+                let (cosine1, cosine2) = (-direction.dot(normal), (1.0 - sine * sine).sqrt());
+                let refracted = along * (n1 / n2) - normal * cosine2;
+                // Fresnel's equations with both indices: Hecht, "Optics", 4.6.2
+                let perpendicular = (n1 * cosine1 - n2 * cosine2) / (n1 * cosine1 + n2 * cosine2);
+                let parallel = (n2 * cosine1 - n1 * cosine2) / (n2 * cosine1 + n1 * cosine2);
+                let share = (perpendicular.powi(2) + parallel.powi(2)) / 2.0;
+                let through = self.color(&glass.tint, meeting.uv) * follow(point - offset, refracted);
+                reflected * share + through * (1.0 - share)
+            }
+            other => panic!("the oracle does not know the material {other:?}"),
+        }
+    }
+
+    /// What a surface reflects of the lights, and of ambient light; `above` is where its shadow rays start.
+    fn direct(&self, phong: &PhongDescription, meeting: &Meeting, normal: DVec3, above: DVec3, viewer: DVec3) -> DVec3 {
+        assert!(phong.normal_map.is_none(), "the oracle knows no normal maps");
+        let factor = |own: &Option<ColorDescription>| {
+            let color = own.as_ref().or(phong.color.as_ref()).expect("a checked material");
+            self.color(color, meeting.uv)
+        };
+        let (diffuse, specular) = (factor(&phong.diffuse), factor(&phong.specular));
+        let mut sum = self.scene.render.ambient * factor(&phong.ambient);
         for light in &self.scene.lights {
             let samples = self.samples(light, above);
             for (to_light, distance) in &samples {
-                let reflected = self.reflected(phong, normal, viewer, *to_light, factor);
+                let reflected = self.reflected(diffuse, specular, phong.shininess, normal, viewer, *to_light);
                 if self.flaw == Flaw::NoShadows || !self.hidden(above, *to_light, *distance) {
                     sum += light_color(light) * reflected / samples.len() as f64;
                 }
@@ -219,14 +251,46 @@ impl<'a> Oracle<'a> {
         sum
     }
 
+    /// A colour of a material, of textures at the point alone.
+    fn color(&self, color: &ColorDescription, uv: DVec2) -> DVec3 {
+        let name = match color {
+            ColorDescription::Plain(color) => return *color,
+            ColorDescription::Texture(reference) => &reference.texture,
+        };
+        let uv = if self.flaw == Flaw::TransposedTexture {
+            uv.yx()
+        } else {
+            uv
+        };
+        let place = |scale: [f64; 2], rotate: f64, offset: [f64; 2]| {
+            let turned = DVec2::from_angle(rotate.to_radians()).rotate(DVec2::from_array(scale) * uv);
+            turned + DVec2::from_array(offset)
+        };
+        match &self.scene.textures[name] {
+            TextureDescription::Constant(texture) => texture.color,
+            TextureDescription::Checker(texture) => {
+                let square = place(texture.scale, texture.rotate, texture.offset).floor();
+                let even = (square.x + square.y).rem_euclid(2.0) == 0.0;
+                if even { texture.even } else { texture.odd }
+            }
+            TextureDescription::Grid(texture) => {
+                let at = place(texture.scale, texture.rotate, texture.offset);
+                let on_line = (at - at.round()).abs().min_element() < texture.line_width / 2.0;
+                if on_line { texture.line } else { texture.cell }
+            }
+            other => panic!("the oracle does not know the texture {other:?}"),
+        }
+    }
+
     /// kd max(0, n.l) + ks max(0, r.v)^shininess; nothing where n.l <= 0.
     fn reflected(
         &self,
-        phong: &PhongDescription,
+        diffuse: DVec3,
+        specular: DVec3,
+        shininess: f64,
         normal: DVec3,
         viewer: DVec3,
         light: DVec3,
-        factor: impl Fn(&Option<ColorDescription>) -> DVec3,
     ) -> DVec3 {
         let cosine = normal.dot(light);
         if cosine <= 0.0 {
@@ -234,13 +298,12 @@ impl<'a> Oracle<'a> {
         }
         let mirrored = (-light).reflect(normal);
         let exponent = if self.flaw == Flaw::Exponent {
-            phong.shininess - 1.0
+            shininess - 1.0
         } else {
-            phong.shininess
+            shininess
         };
         let highlight = mirrored.dot(viewer).max(0.0).powf(exponent);
-        let diffuse = if self.flaw == Flaw::MissingCosine { 1.0 } else { cosine };
-        factor(&phong.diffuse) * diffuse + factor(&phong.specular) * highlight
+        diffuse * if self.flaw == Flaw::MissingCosine { 1.0 } else { cosine } + specular * highlight
     }
 
     /// Unit directions and distances from a point to a light's samples.
@@ -266,7 +329,15 @@ impl<'a> Oracle<'a> {
     /// Whether a shape, not a light, is between a point and a light.
     fn hidden(&self, from: DVec3, direction: DVec3, distance: f64) -> bool {
         let end = distance * (1.0 - self.scene.render.shadow_epsilon);
-        let shapes = self.solids.iter().filter(|solid| solid.material.is_some());
+        let transparent = self.scene.render.shadows == Shadows::Transparent;
+        let glass = |name: &String| matches!(self.scene.materials[name], MaterialDescription::Glass(_));
+        let blocks = |solid: &&Solid| {
+            solid
+                .material
+                .as_ref()
+                .is_some_and(|name| !(transparent && glass(name)))
+        };
+        let shapes = self.solids.iter().filter(blocks);
         shapes
             .flat_map(|solid| crossings(&solid.form, from, direction))
             .any(|t| t > 0.0 && t < end)

@@ -85,32 +85,31 @@ pub fn first_hits(packed: &Packed, way: Way) -> Vec<FirstHit> {
     hits.unwrap_or_else(|error| panic!("{way:?}: {error}"))
 }
 
-/// How many pixels are not the same bits.
+/// How many pixels are not the same bits; moments count as further pixels.
 pub fn differing(a: &Film, b: &Film) -> usize {
     assert_eq!(
-        (a.region, a.sums.len()),
-        (b.region, b.sums.len()),
+        (a.region, a.sums.len(), a.moments.len()),
+        (b.region, b.sums.len(), b.moments.len()),
         "films of different regions"
     );
     let bits = |sum: &Vec4| sum.to_array().map(f32::to_bits);
-    let unequal = |a: &[Vec4], b: &[Vec4]| a.iter().zip(b).filter(|(a, b)| bits(a) != bits(b)).count();
-    assert_eq!(a.moments.len(), b.moments.len(), "only one is adaptive");
-    unequal(&a.sums, &b.sums).max(unequal(&a.moments, &b.moments))
+    let records = a.sums.iter().chain(&a.moments).zip(b.sums.iter().chain(&b.moments));
+    records.filter(|(a, b)| bits(a) != bits(b)).count()
 }
 
 /// A part of a film.
 pub fn crop(film: &Film, part: Region) -> Film {
     let (whole, width) = (film.region, film.region.width() as usize);
     let columns = (part.x0 - whole.x0) as usize..(part.x1 - whole.x0) as usize;
-    let cut = |all: &[Vec4]| {
-        let rows = all.chunks(width).skip((part.y0 - whole.y0) as usize);
+    let of_part = |records: &[Vec4]| {
+        let rows = records.chunks(width).skip((part.y0 - whole.y0) as usize);
         let rows = rows.take(part.height() as usize);
         rows.flat_map(|row| row[columns.clone()].to_vec()).collect()
     };
     Film {
         region: part,
-        sums: cut(&film.sums),
-        moments: cut(&film.moments),
+        sums: of_part(&film.sums),
+        moments: of_part(&film.moments),
     }
 }
 

@@ -2,10 +2,21 @@
 
 use glam::{UVec2, UVec4, Vec2, Vec3};
 use naga::ScalarKind;
-use wgray::cpu::camera::camera_ray;
+use wgray::cpu::camera::{camera_derivative, camera_differential, camera_ray, image_plane_offset};
+use wgray::cpu::differential::{
+    Arrival, Derivative, Differential, arrival, normal_derivative, reflected_derivative, reflected_differential,
+    refracted_derivative, refracted_differential, transferred,
+};
 use wgray::cpu::ellipsoid::{ellipsoid_blocks, intersect_ellipsoid};
+use wgray::cpu::footprint::{
+    Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint, uv_derivative,
+};
 use wgray::cpu::light::{Segments, segment, segments_to_light, segments_to_local};
-use wgray::cpu::math::{atan2, cross, dot, exp2, log2, max, min, normalize, positive_zero, power, power_whole};
+use wgray::cpu::math::{atan2, cross, dot, exp2, floor, log2, max, min, normalize, positive_zero, power, power_whole};
+use wgray::cpu::path::{Path, Scattered, glass_path, mirrored_path, reflected_path, refracted_path, usable_normal};
+use wgray::cpu::pattern::{
+    checker_in_box, lines_in_box, pattern_share, pulse, pulse_integral, square_wave, square_wave_integral,
+};
 use wgray::cpu::phong::{Lobes, phong_block, phong_lobes, phong_power};
 use wgray::cpu::plane::{intersect_plane, plane_blocks};
 use wgray::cpu::ray::{
@@ -18,10 +29,13 @@ use wgray::cpu::sampling::{
 };
 use wgray::cpu::sequence::{halton_sample, radical_inverse_3, scramble, shuffled_index, sobol_reversed, sobol_sample};
 use wgray::cpu::shadow::{Block, Cone, block_sample, blocks, cone_to_light, may_block, shadow_bits};
+use wgray::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
 use wgray::cpu::surface::{Surface, first_hit, primitive_normal, primitive_uv, surface_at};
+use wgray::cpu::tangent::{Tangents, local_tangents, mapped_normal, vector_to_world};
+use wgray::cpu::texel::{gaussian_weight, level_size, near_coordinate, srgb_to_linear, unpacked_color, wrapped_index};
 use wgray::cpu::triangle::{intersect_triangle, triangle_blocks};
 use wgray::gpu::Device;
-use wgray::pack::{Camera, FirstHit, Light, Material, Primitive, Sphere};
+use wgray::pack::{Camera, FirstHit, Light, Material, Primitive, Sphere, Texture};
 
 use crate::adapter::{self, allowed, judge};
 use crate::inputs::inputs;
@@ -63,6 +77,7 @@ probes! {
     max(a: f32, b: f32) -> f32;
     min(a: f32, b: f32) -> f32;
     positive_zero(x: f32) -> f32;
+    floor(x: f32) -> f32;
     power_whole(x: f32, n: u32, bits: u32) -> f32;
     power(x: f32, y: f32) -> f32;
     log2(x: f32) -> f32;
@@ -114,6 +129,46 @@ probes! {
     phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32;
     phong_block(surface: Surface, material: &Material, to: Segments, block: Block, hidden: u32, exponent_bits: u32,
                 sum: Lobes) -> Lobes;
+    camera_differential(camera: &Camera, at: Vec2, spacing: f32) -> Differential;
+    camera_derivative(camera: &Camera, at: Vec2, step: Vec3) -> Derivative;
+    image_plane_offset(camera: &Camera, at: Vec2) -> Vec3;
+    transferred(derivative: Derivative, ray: Ray, t: f32, normal: Vec3) -> Derivative;
+    normal_derivative(q: &Primitive, local: Vec3, dp: Vec3) -> Vec3;
+    reflected_derivative(derivative: Derivative, d: Vec3, n: Vec3, dn: Vec3) -> Derivative;
+    refracted_derivative(derivative: Derivative, d: Vec3, n: Vec3, dn: Vec3, eta: f32, cosine: f32) -> Derivative;
+    arrival(q: &Primitive, differential: Differential, ray: Ray, t: f32, surface: Surface) -> Arrival;
+    reflected_differential(at: Arrival, d: Vec3, n: Vec3) -> Differential;
+    refracted_differential(at: Arrival, d: Vec3, n: Vec3, eta: f32, cosine: f32) -> Differential;
+    reflected_direction(d: Vec3, n: Vec3) -> Vec3;
+    refracted_direction(d: Vec3, n: Vec3, eta: f32, cosine_i: f32, cosine_t: f32) -> Vec3;
+    refracted_cosine(cosine_i: f32, eta: f32) -> f32;
+    fresnel(cosine_i: f32, cosine_t: f32, eta: f32) -> f32;
+    mirrored_path(path: Path, surface: Surface, at: Arrival, material: &Material) -> Scattered;
+    usable_normal(surface: Surface, normal: Vec3) -> Vec3;
+    glass_path(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Scattered;
+    reflected_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3) -> Path;
+    refracted_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3, eta: f32, cosine_i: f32,
+                   cosine_t: f32) -> Path;
+    surface_footprint(q: &Primitive, local: Vec3, dx: Vec3, dy: Vec3) -> Footprint;
+    uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2;
+    texture_footprint(t: &Texture, f: Footprint) -> Footprint;
+    footprint_ellipse(dx: Vec2, dy: Vec2, anisotropy: f32) -> Ellipse;
+    pattern_share(kind: u32, line_width: f32, f: Footprint) -> f32;
+    checker_in_box(at: Vec2, width: Vec2) -> f32;
+    square_wave(x: f32, width: f32) -> f32;
+    square_wave_integral(x: f32) -> f32;
+    lines_in_box(at: Vec2, width: Vec2, line_width: f32) -> f32;
+    pulse(x: f32, width: f32, line_width: f32) -> f32;
+    pulse_integral(x: f32, line_width: f32) -> f32;
+    near_coordinate(u: f32, wrap: u32) -> f32;
+    wrapped_index(i: i32, size: u32, wrap: u32) -> u32;
+    level_size(size: u32, level: u32) -> u32;
+    unpacked_color(word: u32, format: u32) -> Vec3;
+    srgb_to_linear(x: f32) -> f32;
+    gaussian_weight(r2: f32) -> f32;
+    vector_to_world(q: &Primitive, v: Vec3) -> Vec3;
+    local_tangents(q: &Primitive, local: Vec3) -> Tangents;
+    mapped_normal(q: &Primitive, local: Vec3, surface: Surface, t: &Texture, n: Vec3) -> Vec3;
 }
 
 /// Shared functions that are not probed, and why.

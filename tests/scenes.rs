@@ -39,10 +39,10 @@ pub fn parse(text: &str) -> Packed {
 
 /// A description as the backends read it.
 pub fn packed(description: &Description) -> Packed {
-    let assets = Assets::beside(&sources::path("scenes"));
+    let beside = Assets::beside(&sources::path("scenes"));
     pack(
         &description
-            .validate_with(&assets)
+            .validate_with(&beside)
             .unwrap_or_else(|problem| panic!("{problem}")),
     )
 }

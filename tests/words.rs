@@ -1,12 +1,16 @@
 //! Values as the 32-bit words of their scalars, in the order of their fields: how they travel to a kernel and back.
 
 use glam::{IVec2, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
+use wgray::cpu::differential::{Arrival, Derivative, Differential};
+use wgray::cpu::footprint::{Ellipse, Footprint};
 use wgray::cpu::light::Segments;
+use wgray::cpu::path::{Path, Scattered};
 use wgray::cpu::phong::Lobes;
 use wgray::cpu::ray::{Hit, Ray};
 use wgray::cpu::shadow::{Block, Cone};
 use wgray::cpu::surface::Surface;
-use wgray::pack::{Camera, Environment, FirstHit, Light, Material, Primitive, Sphere};
+use wgray::cpu::tangent::Tangents;
+use wgray::pack::{Camera, Environment, FirstHit, Light, Material, Primitive, Sphere, Texture};
 
 pub trait Words: Sized {
     /// Takes its words from the front.
@@ -54,7 +58,16 @@ macro_rules! pod {
     )*};
 }
 pod![Vec2, Vec3, Vec4, UVec2, UVec3, UVec4, IVec2];
-pod![Camera, Environment, Primitive, Material, Light, FirstHit, Sphere];
+pod![
+    Camera,
+    Environment,
+    Primitive,
+    Material,
+    Light,
+    FirstHit,
+    Sphere,
+    Texture
+];
 
 /// Records of `src/cpu/`; a field that is missing here does not compile.
 macro_rules! records {
@@ -75,6 +88,14 @@ records! {
     Ray { origin, direction }
     Hit { t, primitive }
     Surface { position, normal, wo, start, side }
+    Derivative { position, direction }
+    Differential { x, y }
+    Arrival { x, y, normal_x, normal_y }
+    Footprint { uv, dx, dy }
+    Ellipse { m, major, minor }
+    Tangents { u, v }
+    Path { ray, differential, throughput, depth, branch }
+    Scattered { onward, other, splits }
     Segments { towards, u, v }
     Lobes { diffuse, specular }
     Block { pattern, side, first, count, group, key }
@@ -104,4 +125,4 @@ macro_rules! by_reference {
         }
     )*};
 }
-by_reference![Camera, Environment, Primitive, Material, Light, Sphere, Cone];
+by_reference![Camera, Environment, Primitive, Material, Light, Sphere, Cone, Texture];

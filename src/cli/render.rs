@@ -79,10 +79,9 @@ pub struct Args {
 
     /// What else to write, of the first hit through each pixel's centre. In an EXR these are further layers: normal.X,
     /// .Y, .Z; depth.Z; uv.U, .V; primitive.ID. Beside a PNG they are further files, NAME.normal.png and so on: normals
-    /// moved to 0..1, depth bright where near (half bright at the picture's middle), fractions of
-    /// texture coordinates in red and green, shapes in colours.
-    /// Under adaptive sampling also what it is like: sample_count.N; variance.R, .G, .B of the pixel's value. Beside a
-    /// PNG counts are shown on a logarithmic scale, variances by their square root
+    /// moved to 0..1, depth bright where near (half bright at the picture's middle), fractions of texture coordinates in
+    /// red and green, shapes in colours. Under adaptive sampling also what it is like: sample_count.N; variance.R, .G, .B
+    /// of the pixel's value. Beside a PNG counts are shown on a logarithmic scale, variances by their square root
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = aov_parser())]
     aov: Vec<Aov>,
 

@@ -116,12 +116,12 @@ pub enum Pattern {
     /// The centres of n x n cells.
     #[default]
     Grid,
-    /// Independent and uniform.
-    Random,
     /// The grid, turned by atan(1/2).
     RotatedGrid,
     /// A uniform position in each of n x n cells.
     Jittered,
+    /// Independent and uniform.
+    Random,
     /// Halton's sequence in bases 2 and 3, randomly rotated.
     Halton,
     /// Sobol's sequence, Owen-scrambled.

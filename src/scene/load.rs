@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::{At, Problem, SceneError};
 use super::parse::{invalid, syntax_error};
-use super::validate::{adaptive, sample_count, side};
+use super::validate::{adaptive, adaptive_error, sample_count, side};
 use super::{AdaptiveDescription, Assets, Description, Pattern, SamplesDescription, Scene};
 
 /// The largest scene file in bytes: far above what anyone writes, far below what fills the memory.
@@ -46,6 +46,7 @@ impl Overrides {
         set_count(&mut render.light_samples, self.light_samples).at("--light-samples")?;
         render.seed = self.seed.unwrap_or(render.seed);
         if let Some(error) = self.adaptive {
+            adaptive_error(error).at("--adaptive")?;
             let max_samples = (render.adaptive.as_ref()).and_then(|adaptive| adaptive.max_samples);
             let description = AdaptiveDescription { error, max_samples };
             adaptive(&description, &render.pixel_samples).at("--adaptive")?;
@@ -137,7 +138,9 @@ light_samples = { pattern = 'random', count = 5 }
             pixel_samples: Some(9),
             light_samples: Some(8),
             seed: Some(3),
-            ..Overrides::default()
+            pixel_pattern: None,
+            adaptive: None,
+            asset_root: None,
         };
         let scene = Scene::parse(SCENE, "s.toml", &overrides).unwrap();
         let render = scene.render;

@@ -144,13 +144,18 @@ fn filter(description: &PixelFilterDescription) -> Checked<PixelFilter> {
     Ok(PixelFilter { kind, radius })
 }
 
+/// The error that adaptive sampling aims at.
+pub(super) fn adaptive_error(error: f64) -> Checked<f64> {
+    between(error, 0.0, 1.0)
+}
+
 /// Adaptive sampling, of pixels with these samples.
 pub(super) fn adaptive(description: &AdaptiveDescription, pixel_samples: &SamplesDescription) -> Checked<Adaptive> {
     let SamplesDescription { pattern, count } = *pixel_samples;
     check(pattern.goes_on(), || {
         "the pattern of pixel_samples must not be a grid, which has no further samples".to_owned()
     })?;
-    let error = between(description.error, 0.0, 1.0).at("error")?;
+    let error = adaptive_error(description.error).at("error")?;
     let most = description.max_samples;
     let most = most.unwrap_or(count.saturating_mul(16).min(MOST));
     let least = count.max(2); // one sample tells nothing of an error

@@ -178,7 +178,7 @@ fn ewa_of_a_round_footprint_is_a_gaussian_mean() {
     let mut narrower_differs = false;
     for _ in 0..200 {
         let uv = Vec2::new(numbers.next() as f32, numbers.next() as f32);
-        let angle = numbers.between(0.0, 6.28) as f32;
+        let angle = numbers.between(0.0, std::f64::consts::TAU) as f32;
         let (dx, dy) = (Vec2::from_angle(angle) * texel, Vec2::from_angle(angle).perp() * texel);
         let found = f64::from(color(&scene, uv, dx, dy).x);
         let (u, v) = (f64::from(uv.x), f64::from(uv.y));

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::write_png;
 
-const SIDE: u32 = 256;
+const SIDE: u32 = 512;
 
 /// Tiles of 64 texels with dark joints, ruled finely, some of them coloured.
 fn grid(x: u32, y: u32) -> [u8; 3] {

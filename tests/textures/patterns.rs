@@ -58,7 +58,7 @@ fn slanted_footprints_have_nearly_the_mean() {
     let count = 300;
     for i in 0..count {
         let kind = [CHECKER, LINES][i % 2];
-        let angle = numbers.between(0.0, 6.28) as f32;
+        let angle = numbers.between(0.0, std::f64::consts::TAU) as f32;
         let long = Vec2::from_angle(angle) * numbers.between(0.2, 4.0) as f32;
         let short = long.perp() * numbers.between(0.05, 1.0) as f32;
         let uv = Vec2::new(numbers.between(-9.0, 9.0) as f32, numbers.between(-9.0, 9.0) as f32);

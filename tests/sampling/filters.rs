@@ -1,0 +1,189 @@
+//! Reconstruction filters: integrals and moments of their tables, the positions and weights that come of them, and pictures.
+
+use glam::Vec2;
+use wgray::cpu::integrator::filtered;
+use wgray::cpu::sequence::sobol_sample;
+use wgray::film::mean;
+use wgray::pack::Packed;
+use wgray::pack::filter::{BINS, height, table};
+use wgray::scene::{Pattern, PixelFilterDescription, PixelFilterKind};
+
+use super::cornell;
+use crate::pictures::{Way, both, differing, render};
+use crate::scenes;
+
+const KINDS: [PixelFilterKind; 5] = [
+    PixelFilterKind::Box,
+    PixelFilterKind::Triangle,
+    PixelFilterKind::Gaussian,
+    PixelFilterKind::Mitchell,
+    PixelFilterKind::BlackmanHarris,
+];
+
+fn filtered_scene(kind: PixelFilterKind, radius: f64) -> Packed {
+    cornell(Pattern::Sobol, 16, |description| {
+        let radius = Some(radius);
+        description.render.filter = PixelFilterDescription { kind, radius };
+    })
+}
+
+/// A filter with the checks of a scene.
+fn checked(kind: PixelFilterKind, radius: f64) -> wgray::scene::PixelFilter {
+    let mut description = scenes::scene("cornell.toml");
+    let radius = Some(radius);
+    description.render.filter = PixelFilterDescription { kind, radius };
+    description.validate().expect("a sound scene").render.filter
+}
+
+/// The integral of a filter times x^power from -radius to radius, by the midpoint rule, over a filter of radius 1.
+fn moment(kind: PixelFilterKind, power: i32) -> f64 {
+    let steps = 200_000;
+    let filter = checked(kind, 1.0);
+    let at = |i: i32| (f64::from(i) + 0.5) / f64::from(steps);
+    (0..steps)
+        .map(|i| 2.0 * height(filter, at(i)) * at(i).powi(power))
+        .sum::<f64>()
+        / f64::from(steps)
+}
+
+#[test]
+fn filters_have_their_integrals() {
+    // Mitchell's are those of a partition of unity over 4 radii / 2; cosines of the window integrate to nothing.
+    let gaussian = 0.833_287 - 2.0 * (-4.5f64).exp(); // sqrt(2 pi) / 3 erf(3 / sqrt 2), and what is taken off
+    let expected = [2.0, 1.0, gaussian, 0.5, 2.0 * 0.35875];
+    for (kind, expected) in KINDS.into_iter().zip(expected) {
+        let found = moment(kind, 0);
+        let error = (found - expected).abs();
+        assert!(error < 1e-5, "{kind:?}: {found}, not {expected}");
+    }
+    // Mitchell's filter gives 1 at whole distances, wherever the sum starts: B = C = 1/3 are its definition's.
+    let mitchell = checked(PixelFilterKind::Mitchell, 2.0);
+    for i in 0..10 {
+        let sum: f64 = (-3..=3)
+            .map(|k| height(mitchell, f64::from(k) + f64::from(i) / 10.0))
+            .sum();
+        assert!((sum - 1.0).abs() < 1e-12, "{sum}");
+    }
+    assert!((height(mitchell, 0.0) - 8.0 / 9.0).abs() < 1e-12 && height(mitchell, 1.5) < 0.0);
+}
+
+/// The weighted mean of x^power over a table's bins, each uniform and met equally often.
+fn table_moment(table: &[Vec2], power: i32) -> f64 {
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for bin in table.windows(2) {
+        let [a, b] = [bin[0].x, bin[1].x].map(f64::from);
+        let weight = f64::from(bin[0].y);
+        let n = power + 1;
+        sum += weight * (b.powi(n) - a.powi(n)) / (f64::from(n) * (b - a));
+        weights += weight;
+    }
+    sum / weights
+}
+
+#[test]
+fn tables_have_the_moments_of_their_filters() {
+    for kind in KINDS {
+        for radius in [0.3, 1.0, 2.5] {
+            let table = table(checked(kind, radius));
+            assert_eq!(table.len(), BINS as usize + 1);
+            assert_eq!((table[0].x, table[BINS as usize].x), (0.0, radius as f32));
+            assert!(table.windows(2).all(|bin| bin[0].x < bin[1].x), "{kind:?}");
+            let weights = &table[..BINS as usize];
+            assert!(weights.iter().all(|bin| (0.9..1.1).contains(&bin.y.abs())), "{kind:?}");
+            let negative = weights.iter().filter(|bin| bin.y < 0.0).count();
+            assert_eq!(negative > 0, kind == PixelFilterKind::Mitchell);
+            for power in [1, 2, 4] {
+                let expected = moment(kind, power) / moment(kind, 0) * radius.powi(power);
+                let found = table_moment(&table, power);
+                assert!(
+                    (found - expected).abs() < 3e-3 * radius.powi(power),
+                    "{kind:?} of radius {radius}, moment {power}: {found}, not {expected}"
+                );
+                // negative control: no two filters are the same
+                for other in KINDS.into_iter().filter(|other| *other != kind) {
+                    let expected = moment(other, power) / moment(other, 0) * radius.powi(power);
+                    assert!(
+                        (found - expected).abs() > 3e-3 * radius.powi(power),
+                        "{kind:?} or {other:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn positions_and_weights_have_the_moments_of_their_filters() {
+    for kind in KINDS {
+        let packed = filtered_scene(kind, 1.25);
+        let (mut weights, mut x2, mut y4) = (0.0, 0.0, 0.0);
+        for i in 0..1 << 14 {
+            let at = filtered(&packed, sobol_sample(i, [1, 2].into())).as_dvec3();
+            let (x, y) = (at.x - 0.5, at.y - 0.5);
+            assert!(x.abs() <= 1.25001 && y.abs() <= 1.25001);
+            weights += at.z;
+            x2 += at.z * x.powi(2);
+            y4 += at.z * y.powi(4);
+        }
+        for (found, power) in [(x2 / weights, 2), (y4 / weights, 4)] {
+            let expected = moment(kind, power) / moment(kind, 0) * 1.25f64.powi(power);
+            assert!(
+                (found - expected).abs() < 6e-3,
+                "{kind:?}, {power}: {found}, not {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_pixel_as_a_filter_costs_nothing_and_a_table_of_it_is_the_same() {
+    let plain = filtered_scene(PixelFilterKind::Box, 0.5);
+    assert_eq!((plain.specialization.filter_bins, plain.filter_table.len()), (0, 0));
+    let by_table = Packed {
+        filter_table: table(checked(PixelFilterKind::Box, 0.5)),
+        ..filtered_scene(PixelFilterKind::Box, 0.51)
+    };
+    assert_eq!(by_table.specialization.filter_bins, BINS);
+    for i in 0..1000 {
+        let u = sobol_sample(i, [5, 6].into());
+        let (plain, by_table) = (filtered(&plain, u), filtered(&by_table, u));
+        assert!((plain - by_table).length() < 2e-6, "{plain} {by_table}");
+    }
+}
+
+#[test]
+fn a_constant_picture_stays_so_under_every_filter() {
+    for kind in KINDS {
+        let mut packed = filtered_scene(kind, 1.5);
+        packed.primitives.clear();
+        packed.bounds.clear();
+        let s = &mut packed.specialization;
+        (s.rectangles, s.triangles, s.ellipsoids) = (0, 0, 0);
+        (s.blocking_rectangles, s.blocking_triangles, s.blocking_ellipsoids) = (0, 0, 0);
+        packed.environment.background = glam::Vec3::new(0.25, 0.5, 0.75);
+        for sum in render(&packed, Way::Cpu).sums {
+            let [r, g, b] = mean(sum);
+            assert!(
+                (r - 0.25).abs() < 1e-5 && (g - 0.5).abs() < 1e-5 && (b - 0.75).abs() < 1e-5,
+                "{kind:?} {sum}"
+            );
+        }
+    }
+}
+
+#[test]
+fn pictures_by_every_filter_are_the_same_on_both_paths() {
+    let mut films = Vec::new();
+    for kind in KINDS {
+        let packed = filtered_scene(kind, 1.25);
+        let expected = render(&packed, Way::Cpu);
+        for way in both() {
+            assert_eq!(differing(&render(&packed, way), &expected), 0, "{kind:?}, {way:?}");
+        }
+        films.push(expected);
+    }
+    // negative control
+    for (i, film) in films.iter().enumerate() {
+        assert!(films[..i].iter().all(|other| differing(film, other) > 100));
+    }
+}

@@ -1,0 +1,315 @@
+//! The sequences are the published ones; scrambling keeps what makes them even; how even the patterns are.
+
+use glam::{UVec2, Vec2};
+use wgray::cpu::sampling::{sample_key, sample_square};
+use wgray::cpu::sequence::{halton_sample, radical_inverse_3, shuffled_index, sobol_reversed, sobol_sample};
+use wgray::pack::{GRID, HALTON, JITTERED, RANDOM, ROTATED_GRID, SOBOL};
+
+/// The first points of Sobol's sequence in two dimensions, times 32: scipy 1.17.1, `qmc.Sobol(2, scramble=False)`, which
+/// has the direction numbers of Joe and Kuo, 2008.
+const SOBOL_POINTS: [[u32; 2]; 32] = [
+    [0, 0],
+    [16, 16],
+    [24, 8],
+    [8, 24],
+    [12, 12],
+    [28, 28],
+    [20, 4],
+    [4, 20],
+    [6, 10],
+    [22, 26],
+    [30, 2],
+    [14, 18],
+    [10, 6],
+    [26, 22],
+    [18, 14],
+    [2, 30],
+    [3, 15],
+    [19, 31],
+    [27, 7],
+    [11, 23],
+    [15, 3],
+    [31, 19],
+    [23, 11],
+    [7, 27],
+    [5, 5],
+    [21, 21],
+    [29, 13],
+    [13, 29],
+    [9, 9],
+    [25, 25],
+    [17, 1],
+    [1, 17],
+];
+/// Where scipy's sequence, which is in the order of Gray's code, has the point `i` of the sequence in Sobol's order.
+fn gray(i: u32) -> u32 {
+    i ^ (i >> 1)
+}
+
+/// The first numbers of Halton's sequence in base 3, times 3^15: scipy 1.17.1, `qmc.Halton(2, scramble=False)`.
+const HALTON_3: [u32; 12] = [
+    0, 4782969, 9565938, 1594323, 6377292, 11160261, 3188646, 7971615, 12754584, 531441, 5314410, 10097379,
+];
+
+/// Keys of many pixels.
+fn keys(count: u32) -> impl Iterator<Item = UVec2> {
+    (0..count).map(|i| sample_key(UVec2::new(i % 13, i / 13), 3, i % 5))
+}
+
+fn whole(x: f32) -> u32 {
+    (x * (1 << 24) as f32) as u32
+}
+
+#[test]
+fn sequences_are_the_published_ones() {
+    for i in 0..32 {
+        let j = gray(i);
+        let point = [j.reverse_bits() >> 27, sobol_reversed(j).reverse_bits() >> 27];
+        assert_eq!(point, SOBOL_POINTS[i as usize], "Sobol's point {j}");
+    }
+    for (i, expected) in (0..).zip(HALTON_3) {
+        assert_eq!(radical_inverse_3(i), expected, "{i} in base 3");
+    }
+    assert_eq!(
+        radical_inverse_3(u32::MAX) % 3,
+        radical_inverse_3(u32::MAX % 14_348_907) % 3
+    );
+}
+
+#[test]
+fn the_second_coordinate_of_sobols_points_is_the_product_with_pascals_matrix() {
+    // Direction numbers by their recurrence: v_1 = 1/2, v_k = v_(k-1) XOR v_(k-1) / 2 (polynomial x + 1).
+    for i in (0..1 << 16).map(|i: u32| i.wrapping_mul(0x9e37_79b9)) {
+        let mut direction = 1u32 << 31;
+        let mut y = 0;
+        for k in 0..32 {
+            y ^= if (i >> k) & 1 == 1 { direction } else { 0 };
+            direction ^= direction >> 1;
+        }
+        assert_eq!(sobol_reversed(i).reverse_bits(), y, "{i}");
+    }
+}
+
+/// Whether 2^m points are a (0, m, 2)-net in base 2: one in each elementary interval.
+fn is_net(points: &[Vec2]) -> bool {
+    let m = points.len().ilog2();
+    (0..=m).all(|across| {
+        let mut met = vec![false; points.len()];
+        for p in points {
+            let (column, row) = (whole(p.x) >> (24 - across), whole(p.y) >> (24 - (m - across)));
+            met[((column << (m - across)) | row) as usize] = true;
+        }
+        met.into_iter().all(|met| met)
+    })
+}
+
+#[test]
+fn scrambled_sobol_points_are_nets() {
+    for key in keys(40) {
+        for m in 0..=8 {
+            for run in [0, 1, 5, 1000] {
+                let points: Vec<Vec2> = (run << m..(run + 1) << m).map(|i| sobol_sample(i, key)).collect();
+                assert!(is_net(&points), "run {run} of 2^{m}, key {key}");
+            }
+        }
+    }
+    // negative controls: other patterns are not, nor are runs that are not aligned, nor points one of which is moved
+    for key in keys(5) {
+        for pattern in [RANDOM, HALTON] {
+            let points: Vec<Vec2> = (0..64).map(|i| sample_square(pattern, 64, i, 0, key)).collect();
+            assert!(!is_net(&points));
+        }
+        let points: Vec<Vec2> = (32..96).map(|i| sobol_sample(i, key)).collect();
+        assert!(!is_net(&points));
+        let mut points: Vec<Vec2> = (0..64).map(|i| sobol_sample(i, key)).collect();
+        points[0] = points[1];
+        assert!(!is_net(&points));
+    }
+}
+
+#[test]
+fn samples_of_lights_go_on_where_those_of_the_sample_before_ended() {
+    for key in keys(5) {
+        for pattern in [SOBOL, HALTON] {
+            let one: Vec<Vec2> = (0..64).map(|i| sample_square(pattern, 64, i, 0, key)).collect();
+            let groups: Vec<Vec2> = (0..64)
+                .map(|i| sample_square(pattern, 16, i % 16, i / 16, key))
+                .collect();
+            assert_eq!(one, groups);
+        }
+    }
+}
+
+#[test]
+fn shuffling_takes_aligned_runs_to_aligned_runs() {
+    for key in keys(20) {
+        for m in 0..12u32 {
+            let mut run: Vec<u32> = (3 << m..4 << m).map(|i| shuffled_index(i, key.x)).collect();
+            run.sort_unstable();
+            let first = run[0];
+            assert_eq!(first % (1 << m), 0);
+            assert!(run.iter().zip(first..).all(|(found, expected)| *found == expected));
+        }
+    }
+    let shuffled: Vec<u32> = keys(20).map(|key| shuffled_index(0, key.x)).collect();
+    assert!(
+        shuffled
+            .iter()
+            .all(|i| shuffled.iter().filter(|j| i == *j).count() == 1)
+    );
+}
+
+#[test]
+fn halton_points_have_one_in_each_third_of_a_third() {
+    for key in keys(20) {
+        for digits in 1..=5u32 {
+            let count = 3u32.pow(digits);
+            // 256 consecutive numbers become 256 others: take as many of them, in order, as there are parts.
+            let mut run: Vec<u32> = (512..768).map(|i| shuffled_index(i, key.x ^ key.y)).collect();
+            run.sort_unstable();
+            let mut parts: Vec<u32> = (run[..count as usize].iter())
+                .map(|i| radical_inverse_3(*i) / 3u32.pow(15 - digits))
+                .collect();
+            parts.sort_unstable();
+            assert!(parts.into_iter().eq(0..count), "{digits} digits");
+        }
+        for i in 0..1000 {
+            let p = halton_sample(i * 4_294_967, key);
+            assert!((0.0..1.0).contains(&p.x) & (0.0..1.0).contains(&p.y));
+        }
+    }
+    // The largest number of base 3 stays below 1.
+    assert!(14_348_906f32 * 6.969_171_6e-8 < 1.0);
+}
+
+/// The star discrepancy: how far the share of the points in [0, a) x [0, b) is from a b, at most. Boxes that end at
+/// points' coordinates, counted with and without their far sides, suffice.
+fn star_discrepancy(points: &[Vec2]) -> f64 {
+    let n = points.len() as f64;
+    let mut by_x: Vec<Vec2> = points.to_vec();
+    by_x.sort_by(|p, q| p.x.total_cmp(&q.x));
+    let ends = |values: Vec<f32>| {
+        let mut ends: Vec<f64> = values.into_iter().map(f64::from).collect();
+        ends.push(1.0);
+        ends.sort_by(f64::total_cmp);
+        ends.dedup();
+        ends
+    };
+    let ys = ends(points.iter().map(|p| p.y).collect());
+    let mut worst = 0.0f64;
+    for a in ends(points.iter().map(|p| p.x).collect()) {
+        let count = |keep: &dyn Fn(f64) -> bool| {
+            let mut inside: Vec<f64> = by_x
+                .iter()
+                .filter(|p| keep(f64::from(p.x)))
+                .map(|p| f64::from(p.y))
+                .collect();
+            inside.sort_by(f64::total_cmp);
+            inside
+        };
+        let (open, closed) = (count(&|x| x < a), count(&|x| x <= a));
+        for &b in &ys {
+            let below = open.partition_point(|y| *y < b) as f64 / n;
+            let at = closed.partition_point(|y| *y <= b) as f64 / n;
+            worst = worst.max(a * b - below).max(at - a * b);
+        }
+    }
+    worst
+}
+
+fn discrepancies(pattern: u32, side: u32, count: u32) -> Vec<f64> {
+    let set = |key| {
+        (0..count)
+            .map(|i| sample_square(pattern, side, i, 0, key))
+            .collect::<Vec<Vec2>>()
+    };
+    keys(8).map(|key| star_discrepancy(&set(key))).collect()
+}
+
+#[test]
+fn star_discrepancies_keep_their_bounds() {
+    let most = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
+    let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+    let n = 32.0;
+    // A grid of cell centres: 1/n - 1/(4 n^2), the box without its last column and row.
+    let grid = star_discrepancy(
+        &(0..1024)
+            .map(|i| sample_square(GRID, 32, i, 0, UVec2::ZERO))
+            .collect::<Vec<_>>(),
+    );
+    assert!((grid - (1.0 / n - 0.25 / (n * n))).abs() < 1e-6, "{grid}");
+    // One point in a cell: only the 2n - 1 cells that a box cuts can be wrong, by one point each.
+    assert!(most(discrepancies(JITTERED, 32, 1024)) <= (2.0 * n - 1.0) / (n * n));
+    // A (0, m, 2)-net in base 2: (m + 1) / 2^m (Niederreiter, "Random Number Generation and Quasi-Monte Carlo Methods",
+    // 1992, theorem 4.6).
+    let bound = 11.0 / 1024.0;
+    let sobol = most(discrepancies(SOBOL, 1024, 1024));
+    assert!(sobol <= bound, "{sobol}");
+    // Independent points lie above it, and about 1/sqrt(N); the sequences are far below that.
+    let random = mean(discrepancies(RANDOM, 32, 1024));
+    assert!(random > bound && (0.7..1.6).contains(&(random * n)), "{random}");
+    let halton = mean(discrepancies(HALTON, 1024, 1024));
+    assert!(halton < 0.4 * random, "{halton}");
+}
+
+#[test]
+fn a_rotated_grid_has_more_columns_than_the_grid() {
+    let columns = |pattern, side: u32| {
+        let mut xs: Vec<f32> = (0..side * side)
+            .map(|i| sample_square(pattern, side, i, 0, UVec2::ZERO).x)
+            .collect();
+        xs.sort_by(f32::total_cmp);
+        xs.dedup_by(|a, b| (*a - *b).abs() < 1e-5);
+        xs.len()
+    };
+    assert_eq!((columns(GRID, 4), columns(ROTATED_GRID, 4)), (4, 10));
+    assert_eq!((columns(GRID, 2), columns(ROTATED_GRID, 2)), (2, 4));
+    // Turned back, and moved by whole pixels where it left the square, it is the grid.
+    let (c, s) = (2.0 / 5f64.sqrt(), 1.0 / 5f64.sqrt());
+    for side in [1, 2, 4, 7, 16] {
+        for i in 0..side * side {
+            let p = sample_square(ROTATED_GRID, side, i, 0, UVec2::ZERO).as_dvec2() - 0.5;
+            assert!(p.x.abs() <= 0.5 && p.y.abs() <= 0.5);
+            let q = sample_square(GRID, side, i, 0, UVec2::ZERO).as_dvec2() - 0.5;
+            let moved = glam::DVec2::new(c * q.x - s * q.y, s * q.x + c * q.y) - p;
+            assert!((moved - moved.round()).length() < 1e-6, "{side}, {i}: {moved}");
+        }
+    }
+}
+
+/// How far from independent two sets of numbers from 0 to 1 are: the chi-square of 8 x 8 cells, less its mean, in its
+/// standard deviations.
+fn dependence(pairs: impl Iterator<Item = (f32, f32)>) -> f64 {
+    let mut cells = [0.0; 64];
+    for (a, b) in pairs {
+        cells[(8.0 * a) as usize * 8 + (8.0 * b) as usize] += 1.0;
+    }
+    let expected = cells.iter().sum::<f64>() / 64.0;
+    let chi_square: f64 = cells.iter().map(|n| (n - expected) * (n - expected) / expected).sum();
+    (chi_square - 63.0) / (2.0f64 * 63.0).sqrt()
+}
+
+#[test]
+fn samples_of_pixels_and_lights_are_independent() {
+    for pattern in [RANDOM, HALTON, SOBOL] {
+        let at = |pixel: u32, purpose, sample: u32| {
+            let key = sample_key(UVec2::new(pixel % 64, pixel / 64), 1, purpose);
+            sample_square(pattern, 16, sample % 16, sample / 16, key)
+        };
+        // Over the pixels for one sample; over the samples of one pixel; of neighbours.
+        let pixels = dependence((0..4096).map(|i| (at(i, 0, 5).x, at(i, 1, 5).x)));
+        let samples = dependence((0..4096).map(|i| (at(7, 0, i).x, at(7, 1, i).x)));
+        let crossed = dependence((0..4096).map(|i| (at(7, 0, i).y, at(7, 2, i).x)));
+        let neighbours = dependence((0..4096).map(|i| (at(i, 0, 3).x, at(i + 1, 0, 3).x)));
+        for (what, found) in [pixels, samples, crossed, neighbours].into_iter().enumerate() {
+            assert!(found < 6.0, "pattern {pattern}, pairs {what}: {found}");
+        }
+    }
+    // negative control: sequences in one order, even if scrambled or rotated differently
+    let one_order = |purpose| {
+        let key = sample_key(UVec2::ZERO, 1, purpose);
+        move |i: u32| i.reverse_bits().wrapping_add(key.x) as f32 / 4_294_967_296.0 * 0.999_999
+    };
+    let (a, b) = (one_order(0), one_order(1));
+    assert!(dependence((0..4096).map(|i| (a(i), b(i)))) > 100.0);
+}
