@@ -6,6 +6,8 @@ mod against_oracle;
 mod analytic;
 mod bounds;
 mod cli;
+#[cfg(feature = "dev")]
+mod dev;
 mod inputs;
 mod kernel;
 mod layout;
