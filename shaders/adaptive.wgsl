@@ -10,7 +10,7 @@ fn moments_with(moments: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
 }
 
 fn mean_of(sum: vec4f) -> vec3f {
-    return select(vec3f(0.0), sum.rgb / sum.w, sum.w != 0.0);
+    return select(vec3f(0.0), sum.rgb / sum.w, abs(sum.w) > 0.0);
 }
 
 // The variance of a pixel's value, if its samples were independent.

@@ -4,7 +4,7 @@
 
 // The bin of a uniform number: bins go from the pixel's centre outwards, the same to both sides.
 fn filter_bin(u: f32, bins: u32) -> u32 {
-    let bin = u32(abs(2.0 * u - 1.0) * f32(bins));
+    let bin = u32(max(abs(2.0 * u - 1.0) * f32(bins), 0.0)); // not a number: 0
     return select(bins - 1u, bin, bin < bins);
 }
 

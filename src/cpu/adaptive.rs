@@ -11,7 +11,11 @@ pub fn moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4 {
 }
 
 pub fn mean_of(sum: Vec4) -> Vec3 {
-    if sum.w != 0.0 { sum.xyz() / sum.w } else { Vec3::ZERO }
+    if sum.w.abs() > 0.0 {
+        sum.xyz() / sum.w
+    } else {
+        Vec3::ZERO
+    }
 }
 
 pub fn variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3 {

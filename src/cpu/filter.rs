@@ -1,7 +1,9 @@
 //! Twin of `shaders/filter.wgsl`: reconstruction filters by importance sampling.
 
+use super::math::max;
+
 pub fn filter_bin(u: f32, bins: u32) -> u32 {
-    let bin = ((2.0 * u - 1.0).abs() * bins as f32) as u32;
+    let bin = max((2.0 * u - 1.0).abs() * bins as f32, 0.0) as u32;
     if bin < bins { bin } else { bins - 1 }
 }
 
