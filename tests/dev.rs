@@ -535,6 +535,16 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
         running.session.send(Command::Move(by));
         running.wait_done(revision);
     }
+    // Moved and at once seen otherwise: neither is forgotten.
+    running.session.send(Command::Move(Move::Orbit(-0.1, 0.0)));
+    running.session.send(Command::View(View::Normal));
+    running.session.send(Command::View(View::Color));
+    let settled = |running: &Running| {
+        let frame = running.frame()?;
+        (frame.header.done && frame.header.view == View::Color).then_some(frame.header.revision)
+    };
+    std::thread::sleep(SETTLED);
+    running.wait("a finished picture", settled);
     let state = running.state();
     assert!(state.camera_moved);
     // The text is that of a scene file: put into one it gives the picture that is shown.
@@ -825,6 +835,12 @@ fn the_server_answers_its_own_pages_only() {
     };
     assert_eq!(full, *b"HTTP/1.1 503");
     assert!(open.len() >= 15, "{}", open.len());
+    // None of them reads anything: that holds up nobody.
+    for _ in 0..20 {
+        let revision = session.revision();
+        session.session.send(Command::Move(Move::Orbit(0.1, 0.0)));
+        session.wait_done(revision);
+    }
     // A message that is too large ends the connection: 5,000 bytes of text, masked with zeros.
     let mut large = vec![0x81, 0x80 | 126, 0x13, 0x88, 0, 0, 0, 0];
     large.resize(8 + 5000, b' ');

@@ -9,7 +9,7 @@ use anyhow::anyhow;
 use clap::builder::NonEmptyStringValueParser;
 use wgray::dev::{Diagnostic, Listener, Report, Session, Settings, Sources, StartError, measure};
 use wgray::gpu::Choice;
-use wgray::scene::Overrides;
+use wgray::scene::{Overrides, SceneError};
 
 use super::Usage;
 use super::render::parse_size;
@@ -38,6 +38,10 @@ pub struct Args {
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
 
+    /// Folder that the files named by the scene, such as textures, must lie in, instead of the scene's own
+    #[arg(long, value_name = "DIR")]
+    asset_root: Option<PathBuf>,
+
     /// Picture to write after each reload, once every pixel has a sample and again when all are there
     #[arg(short, long, value_name = "FILE.png")]
     out: Option<PathBuf>,
@@ -56,6 +60,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         scene: args.scene,
         overrides: Overrides {
             size: args.size,
+            asset_root: args.asset_root,
             ..Overrides::default()
         },
         shaders: shaders(args.shaders)?,
@@ -87,7 +92,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Some(Listener::open(&args.listen).map_err(|error| anyhow!("--listen: {error}"))?)
     };
     let terminal = Terminal::new();
-    terminal.line("", &format!("{}: watched", watched(&sources)));
+    let what = format!("{}: watched", watched(&sources));
     let session = Session::start(Settings {
         sources,
         device,
@@ -96,8 +101,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     })
     .map_err(|error| match error {
         StartError::Device(error) => anyhow::Error::from(error),
+        StartError::NoScene(path, error) => SceneError::Read { path, error }.into(),
         error => anyhow::Error::from(error),
     })?;
+    terminal.line("", &what);
     let Some(listener) = listener else {
         Terminal::new().line("", &format!("{}: the picture", args.out.unwrap_or_default().display()));
         loop {

@@ -25,7 +25,7 @@ impl Painter {
                 self.view = view;
                 if let Some(running) = &mut self.running {
                     match guarded(|| running.canvas.change_view(view)) {
-                        Ok(()) => self.begun((Instant::now(), false)),
+                        Ok(()) => self.changed((Instant::now(), false)), // the camera may have moved meanwhile
                         Err(error) => return self.fail(&error),
                     }
                     if self.is_done() {

@@ -70,7 +70,8 @@ pub struct Painter {
     latency: Option<f64>,
     /// What compiling took, if the next frame needed it.
     compiled: Option<f64>,
-    first_frame: Instant,
+    /// When the first picture of a saved file was shown, until it is finished.
+    first_frame: Option<Instant>,
     last_frame: Instant,
     frame_cost: Duration,
 }
@@ -132,7 +133,7 @@ impl Painter {
             since: None,
             latency: None,
             compiled: None,
-            first_frame: Instant::now(),
+            first_frame: None,
             last_frame: Instant::now(),
             frame_cost: Duration::ZERO,
         }
@@ -243,10 +244,15 @@ impl Painter {
         }
     }
 
-    /// A picture has been begun.
+    /// A picture has been begun, by the camera as it is now.
     fn begun(&mut self, since: (Instant, bool)) {
-        self.revision += 1;
         self.camera_waits = false;
+        self.changed(since);
+    }
+
+    /// Another picture is shown from now on.
+    fn changed(&mut self, since: (Instant, bool)) {
+        self.revision += 1;
         self.since.get_or_insert(since);
     }
 

@@ -78,7 +78,7 @@ impl Painter {
         self.frame_cost = start.elapsed();
         self.failures = 0;
         if let Some((noticed, saved)) = since {
-            self.first_frame = self.last_frame;
+            self.first_frame = saved.then_some(self.last_frame);
             if saved {
                 let compiled = self.compiled.take();
                 (self.report)(Report::Reloaded {
@@ -87,9 +87,9 @@ impl Painter {
                 });
             }
         }
-        if done && view == View::Color {
+        if let Some(first) = self.first_frame.take_if(|_| done && view == View::Color) {
             (self.report)(Report::Finished {
-                seconds: self.first_frame.elapsed().as_secs_f64(),
+                seconds: first.elapsed().as_secs_f64(),
             });
         }
         self.tell();
