@@ -85,11 +85,11 @@ pub fn first_hits(packed: &Packed, way: Way) -> Vec<FirstHit> {
     hits.unwrap_or_else(|error| panic!("{way:?}: {error}"))
 }
 
-/// How many pixels are not the same bits.
+/// How many pixels are not the same bits; moments count as further pixels.
 pub fn differing(a: &Film, b: &Film) -> usize {
     assert_eq!(
-        (a.region, a.sums.len()),
-        (b.region, b.sums.len()),
+        (a.region, a.sums.len(), a.moments.len()),
+        (b.region, b.sums.len(), b.moments.len()),
         "films of different regions"
     );
     let bits = |sum: &Vec4| sum.to_array().map(f32::to_bits);
