@@ -55,3 +55,5 @@ const FAR: f32 = 3.4028234663852886e38;
 const NOTHING: u32 = 0xffffffffu;
 // Shadow rays are traced in blocks of so many, a bit of a word for each.
 const BLOCK: u32 = 32u;
+// Rays through a pixel's corners, under adaptive sampling.
+const CORNERS: u32 = 4u;

@@ -117,15 +117,56 @@ fn reflected(material: Material, light: Light, lobes: Lobes, weight: f32) -> vec
     return light_color * (material.diffuse * lobes.diffuse + material.specular * lobes.specular);
 }
 
-// The radiance of one sample of a pixel.
-fn pixel_radiance(pixel: vec2u, sample: u32) -> vec3f {
-    let at = sample_square(PIXEL_PATTERN, PIXEL_SIDE, sample, 0u, sample_key(pixel, camera.seed, 0u));
-    let place = vec2f(pixel) + at;
+// One sample of a pixel: its radiance times its weight, and its weight.
+fn pixel_radiance(pixel: vec2u, sample: u32) -> vec4f {
+    let round = sample / PIXEL_SAMPLES;
+    let index = sample % PIXEL_SAMPLES;
+    let u = sample_square(PIXEL_PATTERN, PIXEL_SIDE, index, round, sample_key(pixel, camera.seed, 0u));
+    let at = filtered(u);
+    return vec4f(radiance(camera_path(vec2f(pixel) + at.xy), pixel, sample) * at.z, at.z);
+}
+
+// The path through a place of the picture.
+fn camera_path(place: vec2f) -> Path {
     var differential = Differential();
     if DIFFERENTIALS == 1u {
         differential = camera_differential(camera, place, 1.0 / sqrt(f32(PIXEL_SAMPLES)));
     }
-    return radiance(Path(camera_ray(camera, place), differential, vec3f(1.0), 0u, 0u), pixel, sample);
+    return Path(camera_ray(camera, place), differential, vec3f(1.0), 0u, 0u);
+}
+
+// A uniform position as one that is distributed like the filter, from the pixel's corner, and its weight.
+fn filtered(u: vec2f) -> vec3f {
+    if FILTER_BINS == 0u {
+        return vec3f(u, 1.0);
+    }
+    let i = filter_bin(u.x, FILTER_BINS);
+    let j = filter_bin(u.y, FILTER_BINS);
+    let x = filter_offset(u.x, i, FILTER_BINS, filter_table[i].x, filter_table[i + 1u].x);
+    let y = filter_offset(u.y, j, FILTER_BINS, filter_table[j].x, filter_table[j + 1u].x);
+    return vec3f(0.5 + x, 0.5 + y, filter_table[i].y * filter_table[j].y);
+}
+
+// The moments of a pixel before its first sample: the spread of the radiances at its four corners. An edge that cuts off
+// a part of the pixel so small that no sample of the first round lies in it has a corner behind it.
+fn pixel_corners(pixel: vec2u) -> vec4f {
+    var sum = vec4f(0.0);
+    var moments = vec4f(0.0);
+    for (var i = 0u; i < CORNERS; i++) {
+        let corner = pixel + vec2u(i & 1u, i >> 1u);
+        let value = vec4f(radiance(camera_path(vec2f(corner)), pixel, NOTHING - i), 1.0);
+        moments = moments_with(moments, sum, value);
+        sum += value;
+    }
+    return vec4f(moments.rgb, 0.0);
+}
+
+// Whether a pixel, before its sample of this number, needs no more: it has stopped before, or it does so now, at the end
+// of a round.
+fn is_done(sum: vec4f, moments: vec4f, sample: u32) -> bool {
+    let stopped = !(moments.w == f32(sample));
+    let round_ends = (sample % PIXEL_SAMPLES == 0u) & (sample > 0u);
+    return stopped | (round_ends & (display_variance(sum, moments) <= bitcast<f32>(SQUARED_ERROR)));
 }
 
 // What the ray through a pixel's centre meets.

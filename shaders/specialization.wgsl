@@ -23,6 +23,12 @@ override LIGHT_PATTERN: u32;
 override LIGHT_SIDE: u32;
 override LIGHT_SAMPLES: u32;
 
+// Bins of the filter's table; 0 if it is the box of the pixel.
+override FILTER_BINS: u32;
+
+// The bits of the square of the error that adaptive sampling aims at.
+override SQUARED_ERROR: u32;
+
 // Bits of the largest shininess if all are whole numbers, else 0.
 override EXPONENT_BITS: u32;
 

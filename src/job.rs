@@ -20,6 +20,10 @@ pub trait Backend {
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError>;
     /// The largest film that it can have, in pixels.
     fn largest_film(&self) -> u64;
+    /// How many samples all pixels get; further ones are left out where they are not needed.
+    fn samples_of_all(&self) -> u32 {
+        u32::MAX
+    }
 }
 
 /// How long one call of [`Backend::render`] aims to take: long enough to hide what a call costs, short enough for
@@ -108,7 +112,8 @@ pub fn render(
                 let start = Instant::now();
                 backend.render(tile, first..first + count)?;
                 let work = tile.pixels() as f64 * f64::from(count);
-                pace.took(work, start.elapsed());
+                let of_all = first + count <= backend.samples_of_all();
+                pace.took(work, start.elapsed(), of_all);
                 done += work;
                 if !progress(done / total) {
                     return Err(RenderError::Cancelled);
@@ -127,15 +132,23 @@ pub fn render(
 struct Pace {
     /// Samples of pixels per second.
     speed: Option<f64>,
+    /// The same where no pixel leaves samples out.
+    speed_of_all: f64,
 }
 
 impl Pace {
     /// A first call is small enough for the slowest device and scene.
     const FIRST_CALL: f64 = 16384.0;
+    /// How much faster work may seem where pixels leave samples out: the next tile may have none that does.
+    const MOST_LEFT_OUT: f64 = 8.0;
 
-    fn took(&mut self, work: f64, time: Duration) {
+    fn took(&mut self, work: f64, time: Duration, of_all: bool) {
         let speed = work / time.as_secs_f64().max(1e-6);
-        self.speed = Some(self.speed.map_or(speed, |known| speed.min(2.0 * known)));
+        let speed = self.speed.map_or(speed, |known| speed.min(2.0 * known));
+        if of_all {
+            self.speed_of_all = speed;
+        }
+        self.speed = Some(speed.min(Self::MOST_LEFT_OUT * self.speed_of_all));
     }
 
     /// Pixel samples that fit a call.

@@ -5,13 +5,14 @@
 mod appearance;
 mod blocking;
 mod bounds;
+pub mod filter;
 mod pyramid;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3, UVec2, UVec4, Vec2, Vec3};
 
 use self::appearance::Appearances;
-use crate::scene::{self, Geometry, Parallelogram, Pattern, Projection, Samples, Scene};
+use crate::scene::{self, Geometry, Parallelogram, Pattern, PixelFilter, PixelFilterKind, Projection, Samples, Scene};
 
 /// [`Camera::projection`] of a camera whose rays start at one point.
 pub const PERSPECTIVE: u32 = 0;
@@ -98,6 +99,9 @@ pub const FAR: f32 = f32::MAX;
 pub const NOTHING: u32 = u32::MAX;
 /// Shadow rays are traced in blocks of so many, a bit of a word for each.
 pub const BLOCK: u32 = 32;
+
+/// Rays through a pixel's corners, under adaptive sampling.
+pub const CORNERS: u32 = 4;
 
 /// How far shadow rays to a directional light go: beyond any scene, yet small enough to be squared.
 const DISTANT: f32 = 1e10;
@@ -315,7 +319,7 @@ specialization! {
     pixel_pattern = "PIXEL_PATTERN",
     /// Side of their grid of cells; how many there are in patterns without cells.
     pixel_side = "PIXEL_SIDE",
-    /// How many samples a pixel has.
+    /// How many samples a pixel has; under adaptive sampling in every round.
     pixel_samples = "PIXEL_SAMPLES",
     /// How the samples of an area light are laid out.
     light_pattern = "LIGHT_PATTERN",
@@ -323,6 +327,10 @@ specialization! {
     light_side = "LIGHT_SIDE",
     /// How many there are.
     light_samples = "LIGHT_SAMPLES",
+    /// Bins of the filter's table; 0 if it is the box of the pixel.
+    filter_bins = "FILTER_BINS",
+    /// The bits, as an f32, of the square of the error that adaptive sampling aims at.
+    squared_error = "SQUARED_ERROR",
     /// Bits of the largest shininess if all are whole numbers, else 0.
     exponent_bits = "EXPONENT_BITS",
     /// Most bounces of a path, 0 where nothing mirrors or refracts.
@@ -360,8 +368,12 @@ pub struct Packed {
     pub textures: Vec<Texture>,
     /// Their images: tables of places, and texels.
     pub texels: Vec<u32>,
-    /// Samples of every pixel.
+    /// The filter's bins ([`filter::table`]); none if it is the box of the pixel.
+    pub filter_table: Vec<Vec2>,
+    /// Samples of every pixel; under adaptive sampling the most that one gets.
     pub pixel_samples: u32,
+    /// Whether sampling is adaptive.
+    pub adaptive: bool,
     /// The constants.
     pub specialization: Specialization,
 }
@@ -406,6 +418,11 @@ pub fn pack(scene: &Scene) -> Packed {
     };
     let area_lights = lights.iter().filter(|light| light.area > 0.0).count() as u32;
     let (pixels, light_samples) = (scene.render.pixel_samples, scene.render.light_samples);
+    let adaptive = scene.render.adaptive;
+    let filter_table = match is_pixel(scene.render.filter) {
+        true => Vec::new(),
+        false => filter::table(scene.render.filter),
+    };
     let specialization = Specialization {
         rectangles: count(RECTANGLE, false),
         blocking_rectangles: count(RECTANGLE, true),
@@ -423,6 +440,10 @@ pub fn pack(scene: &Scene) -> Packed {
         light_pattern: pattern(light_samples),
         light_side: side(light_samples),
         light_samples: light_samples.count,
+        filter_bins: (filter_table.len() as u32).saturating_sub(1),
+        squared_error: adaptive
+            .map_or(0.0, |adaptive| (adaptive.error * adaptive.error) as f32)
+            .to_bits(),
         exponent_bits,
         bounces: if scene.materials.iter().any(is_specular) {
             scene.render.max_depth
@@ -451,9 +472,16 @@ pub fn pack(scene: &Scene) -> Packed {
         lights,
         textures: appearances.textures,
         texels: appearances.texels,
-        pixel_samples: pixels.count,
+        filter_table,
+        pixel_samples: adaptive.map_or(pixels.count, |adaptive| adaptive.max_samples),
+        adaptive: adaptive.is_some(),
         specialization,
     }
+}
+
+/// Whether a filter is the pixel itself: the same weight for all samples inside.
+fn is_pixel(filter: PixelFilter) -> bool {
+    filter.kind == PixelFilterKind::Box && filter.radius == 0.5
 }
 
 fn pattern(samples: Samples) -> u32 {

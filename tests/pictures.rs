@@ -53,9 +53,11 @@ pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Cu
     let mut all = Film {
         region,
         sums: Vec::new(),
+        moments: Vec::new(),
     };
     let mut output = |band: Film| {
         all.sums.extend(band.sums);
+        all.moments.extend(band.moments);
         Ok(())
     };
     let result = wgray::job::render(backend, region, packed.pixel_samples, cut, &mut |_| true, &mut output);
@@ -91,21 +93,24 @@ pub fn differing(a: &Film, b: &Film) -> usize {
         "films of different regions"
     );
     let bits = |sum: &Vec4| sum.to_array().map(f32::to_bits);
-    a.sums.iter().zip(&b.sums).filter(|(a, b)| bits(a) != bits(b)).count()
+    let unequal = |a: &[Vec4], b: &[Vec4]| a.iter().zip(b).filter(|(a, b)| bits(a) != bits(b)).count();
+    assert_eq!(a.moments.len(), b.moments.len(), "only one is adaptive");
+    unequal(&a.sums, &b.sums).max(unequal(&a.moments, &b.moments))
 }
 
 /// A part of a film.
 pub fn crop(film: &Film, part: Region) -> Film {
     let (whole, width) = (film.region, film.region.width() as usize);
-    let rows = film
-        .sums
-        .chunks(width)
-        .skip((part.y0 - whole.y0) as usize)
-        .take(part.height() as usize);
     let columns = (part.x0 - whole.x0) as usize..(part.x1 - whole.x0) as usize;
+    let cut = |all: &[Vec4]| {
+        let rows = all.chunks(width).skip((part.y0 - whole.y0) as usize);
+        let rows = rows.take(part.height() as usize);
+        rows.flat_map(|row| row[columns.clone()].to_vec()).collect()
+    };
     Film {
         region: part,
-        sums: rows.flat_map(|row| row[columns.clone()].to_vec()).collect(),
+        sums: cut(&film.sums),
+        moments: cut(&film.moments),
     }
 }
 

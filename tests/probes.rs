@@ -1,13 +1,15 @@
 //! Every shared function, run on the device and on the CPU over thousands of inputs: the same bits.
 
-use glam::{UVec2, UVec4, Vec2, Vec3};
+use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 use naga::ScalarKind;
+use wgray::cpu::adaptive::{display_slope_squared, display_variance, mean_of, moments_with, variance_of_mean};
 use wgray::cpu::camera::{camera_derivative, camera_differential, camera_ray, image_plane_offset};
 use wgray::cpu::differential::{
     Arrival, Derivative, Differential, arrival, normal_derivative, reflected_derivative, reflected_differential,
     refracted_derivative, refracted_differential, transferred,
 };
 use wgray::cpu::ellipsoid::{ellipsoid_blocks, intersect_ellipsoid};
+use wgray::cpu::filter::{filter_bin, filter_offset};
 use wgray::cpu::footprint::{
     Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint, uv_derivative,
 };
@@ -169,6 +171,13 @@ probes! {
     vector_to_world(q: &Primitive, v: Vec3) -> Vec3;
     local_tangents(q: &Primitive, local: Vec3) -> Tangents;
     mapped_normal(q: &Primitive, local: Vec3, surface: Surface, t: &Texture, n: Vec3) -> Vec3;
+    filter_bin(u: f32, bins: u32) -> u32;
+    filter_offset(u: f32, bin: u32, bins: u32, low: f32, high: f32) -> f32;
+    moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
+    mean_of(sum: Vec4) -> Vec3;
+    variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3;
+    display_variance(sum: Vec4, moments: Vec4) -> f32;
+    display_slope_squared(value: f32) -> f32;
 }
 
 /// Shared functions that are not probed, and why.

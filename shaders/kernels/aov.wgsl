@@ -1,6 +1,6 @@
 // Writes what the ray through each pixel's centre meets first.
 
-@group(0) @binding(9) var<storage, read_write> first_hits: array<FirstHit>;
+@group(0) @binding(10) var<storage, read_write> first_hits: array<FirstHit>;
 
 @compute @workgroup_size(8, 8)
 fn aov(@builtin(global_invocation_id) id: vec3u) {

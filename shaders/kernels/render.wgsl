@@ -1,7 +1,8 @@
-// Renders a range of samples of a rectangle of pixels into the film: rgb the sum of radiances, a the number of them.
+// Renders a range of samples of a rectangle of pixels into the film: rgb the sum of weighted radiances, a that of the
+// weights.
 // The sum goes on from the film's own value, one sample after the other, so that every cut of the work gives the same.
 
-@group(0) @binding(9) var<storage, read_write> film: array<vec4f>;
+@group(0) @binding(10) var<storage, read_write> film: array<vec4f>;
 
 @compute @workgroup_size(8, 8)
 fn render(@builtin(global_invocation_id) id: vec3u) {
@@ -13,7 +14,7 @@ fn render(@builtin(global_invocation_id) id: vec3u) {
     let index = place.y * work.film_size.x + place.x;
     var sum = film[index];
     for (var sample = work.samples.x; sample < work.samples.y; sample++) {
-        sum += vec4f(pixel_radiance(pixel, sample), 1.0);
+        sum += pixel_radiance(pixel, sample);
     }
     film[index] = sum;
 }

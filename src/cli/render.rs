@@ -16,8 +16,8 @@ use wgray::film::{Film, Region, mean};
 use wgray::gpu::{self, Gpu, compose::Shaders};
 use wgray::image::{self, Aov, Band, Format, Layout};
 use wgray::job::{self, Backend, Cut};
-use wgray::pack::{Packed, pack};
-use wgray::scene::{Overrides, Scene};
+use wgray::pack::{CORNERS, Packed, pack};
+use wgray::scene::{Overrides, Pattern, Scene};
 
 use super::Usage;
 use super::progress::{Mode, Progress};
@@ -42,6 +42,15 @@ pub struct Args {
     /// Samples of every pixel, in place of the scene's; a square number for some patterns
     #[arg(long, visible_alias = "spp", value_name = "N")]
     pixel_samples: Option<u32>,
+
+    /// Layout of a pixel's samples, in place of the scene's
+    #[arg(long, value_name = "PATTERN", value_parser = pattern_parser())]
+    pixel_pattern: Option<Pattern>,
+
+    /// Gives the pixels whose displayed value, 0 to 1, has a larger standard error than this further rounds of
+    /// --pixel-samples samples, 16 rounds at most if the scene names no other number
+    #[arg(long, value_name = "ERROR")]
+    adaptive: Option<f64>,
 
     /// Samples of every area light at every hit, in place of the scene's
     #[arg(long, value_name = "N")]
@@ -70,7 +79,10 @@ pub struct Args {
 
     /// What else to write, of the first hit through each pixel's centre. In an EXR these are further layers: normal.X,
     /// .Y, .Z; depth.Z; uv.U, .V; primitive.ID. Beside a PNG they are further files, NAME.normal.png and so on: normals
-    /// moved to 0..1, depth bright where near, fractions of texture coordinates in red and green, shapes in colours
+    /// moved to 0..1, depth bright where near (half bright at the picture's middle), fractions of
+    /// texture coordinates in red and green, shapes in colours.
+    /// Under adaptive sampling also what it is like: sample_count.N; variance.R, .G, .B of the pixel's value. Beside a
+    /// PNG counts are shown on a logarithmic scale, variances by their square root
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = aov_parser())]
     aov: Vec<Aov>,
 
@@ -89,6 +101,13 @@ pub struct Args {
     /// Says what takes how long, on standard error
     #[arg(short, long)]
     verbose: bool,
+}
+
+fn pattern_parser() -> impl clap::builder::TypedValueParser<Value = Pattern> {
+    PossibleValuesParser::new(Pattern::ALL.map(Pattern::name)).try_map(|name| {
+        let found = Pattern::ALL.into_iter().find(|pattern| pattern.name() == name);
+        found.ok_or(format!("no such pattern: {name}"))
+    })
 }
 
 fn aov_parser() -> impl clap::builder::TypedValueParser<Value = Aov> {
@@ -152,6 +171,8 @@ impl Plan {
             pixel_samples: args.pixel_samples,
             light_samples: args.light_samples,
             seed: args.seed,
+            pixel_pattern: args.pixel_pattern,
+            adaptive: args.adaptive,
             asset_root: args.asset_root,
         };
         let scene = pack(&Scene::load(&args.scene, &overrides)?);
@@ -169,6 +190,13 @@ impl Plan {
             if !aovs.contains(&aov) {
                 aovs.push(aov);
             }
+        }
+        if let Some(aov) = aovs.iter().find(|aov| aov.is_of_film() && !scene.adaptive) {
+            return Err(Usage(format!(
+                "--aov {}: is known under adaptive sampling alone; --adaptive 0 gives all pixels the most samples",
+                aov.name()
+            ))
+            .into());
         }
         Ok(Plan {
             scene,
@@ -251,7 +279,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
     let (mut backend, described) = plan.backend()?;
     let setup = start.elapsed();
     info!(seconds = setup.as_secs_f64(), "ready");
-    let render = write_picture(&plan, backend.as_mut(), &stopped)?;
+    let (render, camera_rays) = write_picture(&plan, backend.as_mut(), &stopped)?;
     let total = start.elapsed();
     info!(
         render = render.as_secs_f64(),
@@ -272,26 +300,28 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
             setup_s: setup.as_secs_f64(),
             render_s: render.as_secs_f64(),
             total_s: total.as_secs_f64(),
-            camera_rays: Some(plan.region.pixels() * u64::from(pixel_samples)),
+            camera_rays,
             shadow_rays: None,
-            nominal_mrays_per_s: Stats::nominal(width, height, pixel_samples, light_samples, render.as_secs_f64()),
+            nominal_mrays_per_s: Stats::nominal(camera_rays, light_samples, render.as_secs_f64()),
         };
         stats.write(path).map_err(RenderError::Output)?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Renders band by band into the picture's files; returns the time it took without writing.
-fn write_picture(plan: &Plan, backend: &mut dyn Backend, stopped: &AtomicBool) -> anyhow::Result<Duration> {
+/// Renders band by band into the picture's files; returns the time it took without writing, and the camera's rays.
+fn write_picture(plan: &Plan, backend: &mut dyn Backend, stopped: &AtomicBool) -> anyhow::Result<(Duration, u64)> {
     let layout = Layout {
         picture: (plan.scene.camera.width, plan.scene.camera.height),
         region: plan.region,
         aovs: plan.aovs.clone(),
         middle_depth: middle_depth(plan, backend)?,
+        most_samples: plan.scene.pixel_samples,
     };
     let mut progress = Progress::new(plan.progress);
     let mut time = Duration::ZERO;
     let mut strange = 0;
+    let mut camera_rays = 0;
     image::save(&plan.output, plan.format, &layout, &mut |sink| {
         let cut = Cut::default();
         let mut done = 0;
@@ -308,10 +338,13 @@ fn write_picture(plan: &Plan, backend: &mut dyn Backend, stopped: &AtomicBool) -
             };
             job::render(backend, band, plan.scene.pixel_samples, &cut, &mut update, &mut take)?;
             time += start.elapsed();
-            let hits = if plan.aovs.is_empty() {
-                Vec::new()
-            } else {
-                job::first_hits(backend, band)?
+            camera_rays += match plan.scene.adaptive {
+                true => film.sample_counts().map(|count| u64::from(count + CORNERS)).sum(),
+                false => band.pixels() * u64::from(plan.scene.pixel_samples),
+            };
+            let hits = match plan.aovs.iter().any(|aov| !aov.is_of_film()) {
+                true => job::first_hits(backend, band)?,
+                false => Vec::new(),
             };
             strange += film
                 .sums
@@ -333,7 +366,7 @@ fn write_picture(plan: &Plan, backend: &mut dyn Backend, stopped: &AtomicBool) -
             plan.output.display()
         );
     }
-    Ok(time)
+    Ok((time, camera_rays))
 }
 
 /// What depth looks half bright: that in the middle of the whole picture, or 1 where nothing is.

@@ -19,7 +19,7 @@ pub struct Stats {
     pub width: u32,
     /// Rows that were rendered.
     pub height: u32,
-    /// Samples of every pixel.
+    /// Samples of every pixel; under adaptive sampling the most of one.
     pub pixel_samples: u32,
     /// Samples of light at every hit, over all lights.
     pub light_samples: u64,
@@ -29,19 +29,18 @@ pub struct Stats {
     pub render_s: f64,
     /// From the start of the process to the written picture.
     pub total_s: f64,
-    /// Rays from the camera for the picture's samples.
-    pub camera_rays: Option<u64>,
+    /// Rays from the camera for the picture's samples; under adaptive sampling those through pixels' corners too.
+    pub camera_rays: u64,
     /// Rays to lights; the kernels do not count them.
     pub shadow_rays: Option<u64>,
-    /// width * height * pixel_samples * (1 + light_samples) / render_s / 1e6
+    /// camera_rays * (1 + light_samples) / render_s / 1e6
     pub nominal_mrays_per_s: f64,
 }
 
 impl Stats {
     /// Millions of rays per second, if every camera ray hits a surface and every light sample takes a ray.
-    pub fn nominal(width: u32, height: u32, pixel_samples: u32, light_samples: u64, render_s: f64) -> f64 {
-        let camera_rays = f64::from(width) * f64::from(height) * f64::from(pixel_samples);
-        camera_rays * (1.0 + light_samples as f64) / render_s / 1e6
+    pub fn nominal(camera_rays: u64, light_samples: u64, render_s: f64) -> f64 {
+        camera_rays as f64 * (1.0 + light_samples as f64) / render_s / 1e6
     }
 
     pub fn write(&self, path: &Path) -> io::Result<()> {

@@ -1,10 +1,12 @@
 //! Twin of `shaders/integrator.wgsl`: radiance along a path.
 
 use bytemuck::Zeroable;
-use glam::{UVec2, UVec4, Vec3};
+use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 
+use super::adaptive::{display_variance, moments_with};
 use super::camera::{camera_differential, camera_ray};
 use super::differential::{Arrival, Differential, arrival};
+use super::filter::{filter_bin, filter_offset};
 use super::light::segments_to_light;
 use super::path::{Path, Scattered, glass_path, mirrored_path, usable_normal};
 use super::phong::{Lobes, phong_block};
@@ -16,7 +18,8 @@ use super::surface::{Surface, first_hit, surface_at};
 use super::texture::appearance;
 use super::traverse::{closest_hit, hidden_samples};
 use crate::pack::{
-    BLOCK, EMITTER, FAR, FirstHit, GLASS, GRID, LEAVES, Light, MIRROR, Material, NOTHING, Packed, Primitive, SPLITS,
+    BLOCK, CORNERS, EMITTER, FAR, FirstHit, GLASS, GRID, LEAVES, Light, MIRROR, Material, NOTHING, Packed, Primitive,
+    SPLITS,
 };
 
 pub fn radiance(scene: &Packed, camera_path: Path, pixel: UVec2, sample: u32) -> Vec3 {
@@ -167,24 +170,63 @@ pub fn reflected(material: &Material, light: &Light, lobes: Lobes, weight: f32) 
     light_color * (material.diffuse * lobes.diffuse + material.specular * lobes.specular)
 }
 
-pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> Vec3 {
+pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> Vec4 {
     let s = &scene.specialization;
+    let (round, index) = (sample / s.pixel_samples, sample % s.pixel_samples);
     let key = sample_key(pixel, scene.camera.seed, 0);
-    let at = sample_square(s.pixel_pattern, s.pixel_side, sample, 0, key);
-    let place = pixel.as_vec2() + at;
+    let u = sample_square(s.pixel_pattern, s.pixel_side, index, round, key);
+    let at = filtered(scene, u);
+    let path = camera_path(scene, pixel.as_vec2() + at.truncate());
+    (radiance(scene, path, pixel, sample) * at.z).extend(at.z)
+}
+
+pub fn camera_path(scene: &Packed, place: Vec2) -> Path {
+    let s = &scene.specialization;
     let mut differential = Differential::default();
     if s.differentials == 1 {
         differential = camera_differential(&scene.camera, place, 1.0 / (s.pixel_samples as f32).sqrt());
     }
-    let ray = camera_ray(&scene.camera, place);
-    let path = Path {
-        ray,
+    Path {
+        ray: camera_ray(&scene.camera, place),
         differential,
         throughput: Vec3::ONE,
         depth: 0,
         branch: 0,
-    };
-    radiance(scene, path, pixel, sample)
+    }
+}
+
+pub fn filtered(scene: &Packed, u: Vec2) -> Vec3 {
+    let (bins, table) = (scene.specialization.filter_bins, &scene.filter_table);
+    if bins == 0 {
+        return u.extend(1.0);
+    }
+    let (i, j) = (filter_bin(u.x, bins), filter_bin(u.y, bins));
+    let edges = |bin: u32| (table[bin as usize], table[bin as usize + 1]);
+    let ((x0, x1), (y0, y1)) = (edges(i), edges(j));
+    let x = filter_offset(u.x, i, bins, x0.x, x1.x);
+    let y = filter_offset(u.y, j, bins, y0.x, y1.x);
+    Vec3::new(0.5 + x, 0.5 + y, x0.y * y0.y)
+}
+
+pub fn pixel_corners(scene: &Packed, pixel: UVec2) -> Vec4 {
+    let mut sum = Vec4::ZERO;
+    let mut moments = Vec4::ZERO;
+    for i in 0..CORNERS {
+        let corner = pixel + UVec2::new(i & 1, i >> 1);
+        let path = camera_path(scene, corner.as_vec2());
+        let value = radiance(scene, path, pixel, NOTHING - i).extend(1.0);
+        moments = moments_with(moments, sum, value);
+        sum += value;
+    }
+    moments.truncate().extend(0.0)
+}
+
+pub fn is_done(scene: &Packed, sum: Vec4, moments: Vec4, sample: u32) -> bool {
+    let s = &scene.specialization;
+    #[expect(clippy::nonminimal_bool, reason = "naga's != is false where a number is none")]
+    let stopped = !(moments.w == sample as f32);
+    let round_ends = (sample % s.pixel_samples == 0) & (sample > 0);
+    stopped | (round_ends & (display_variance(sum, moments) <= f32::from_bits(s.squared_error)))
 }
 
 pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {

@@ -4,9 +4,11 @@
 //! What a function does is said in its WGSL file.
 #![allow(missing_docs, reason = "documented in the WGSL files")]
 
+pub mod adaptive;
 pub mod camera;
 pub mod differential;
 pub mod ellipsoid;
+pub mod filter;
 pub mod footprint;
 pub mod integrator;
 pub mod light;

@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use glam::UVec2;
+use glam::{UVec2, Vec4};
 use rayon::prelude::*;
 
-use super::integrator::{pixel_first_hit, pixel_radiance};
+use super::adaptive::moments_with;
+use super::integrator::{is_done, pixel_corners, pixel_first_hit, pixel_radiance};
 use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::job::Backend;
@@ -32,29 +33,33 @@ const RUN: usize = 32;
 
 impl Backend for Cpu<'_> {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
-        self.film = Film::new(region);
+        self.film = match self.scene.adaptive {
+            true => Film::adaptive(region),
+            false => Film::new(region),
+        };
         Ok(())
     }
 
     fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
-        let (region, sums) = (self.film.region, &mut self.film.sums);
         let scene = self.scene;
-        let rows = sums.chunks_mut(region.width() as usize).enumerate();
-        let rows = rows.skip((tile.y0 - region.y0) as usize).take(tile.height() as usize);
-        let columns = (tile.x0 - region.x0) as usize..(tile.x1 - region.x0) as usize;
-        let runs: Vec<_> = rows
-            .flat_map(|(y, row)| {
-                let runs = row[columns.clone()].chunks_mut(RUN).enumerate();
-                runs.map(move |(i, run)| (UVec2::new(tile.x0 + (i * RUN) as u32, region.y0 + y as u32), run))
-            })
-            .collect();
-        runs.into_par_iter().for_each(|(first, run)| {
-            for (x, sum) in (first.x..).zip(run) {
-                for sample in samples.clone() {
-                    *sum += pixel_radiance(scene, UVec2::new(x, first.y), sample).extend(1.0);
+        let Film { region, sums, moments } = &mut self.film;
+        let sums = runs(*region, sums, tile);
+        if scene.adaptive {
+            let both = sums.into_par_iter().zip(runs(*region, moments, tile));
+            both.for_each(|((first, sums), (_, moments))| {
+                for ((x, sum), moments) in (first.x..).zip(sums).zip(moments) {
+                    adaptive(scene, UVec2::new(x, first.y), samples.clone(), sum, moments);
                 }
-            }
-        });
+            });
+        } else {
+            sums.into_par_iter().for_each(|(first, sums)| {
+                for (x, sum) in (first.x..).zip(sums) {
+                    for sample in samples.clone() {
+                        *sum += pixel_radiance(scene, UVec2::new(x, first.y), sample);
+                    }
+                }
+            });
+        }
         Ok(())
     }
 
@@ -68,7 +73,38 @@ impl Backend for Cpu<'_> {
         Ok(pixels.map(|pixel| pixel_first_hit(self.scene, pixel)).collect())
     }
 
+    fn samples_of_all(&self) -> u32 {
+        self.scene.specialization.pixel_samples
+    }
+
     fn largest_film(&self) -> u64 {
         u64::MAX
+    }
+}
+
+/// The records of a tile's pixels, of a film's region, in pieces of a row, each with its first pixel.
+fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut [Vec4])> {
+    let rows = records.chunks_mut(region.width() as usize).enumerate();
+    let rows = rows.skip((tile.y0 - region.y0) as usize).take(tile.height() as usize);
+    let columns = (tile.x0 - region.x0) as usize..(tile.x1 - region.x0) as usize;
+    rows.flat_map(|(y, row)| {
+        let runs = row[columns.clone()].chunks_mut(RUN).enumerate();
+        runs.map(move |(i, run)| (UVec2::new(tile.x0 + (i * RUN) as u32, region.y0 + y as u32), run))
+    })
+    .collect()
+}
+
+/// What `shaders/kernels/adaptive.wgsl` does to a pixel.
+fn adaptive(scene: &Packed, pixel: UVec2, samples: Range<u32>, sum: &mut Vec4, moments: &mut Vec4) {
+    if samples.start == 0 && samples.end > 0 {
+        *moments = pixel_corners(scene, pixel);
+    }
+    for sample in samples {
+        if is_done(scene, *sum, *moments, sample) {
+            break;
+        }
+        let value = pixel_radiance(scene, pixel, sample);
+        *moments = moments_with(*moments, *sum, value);
+        *sum += value;
     }
 }

@@ -20,7 +20,7 @@ pub fn near_coordinate(u: f32, wrap: u32) -> f32 {
 pub fn wrapped_index(i: i32, size: u32, wrap: u32) -> u32 {
     let n = size as i32;
     if wrap == CLAMP {
-        return i.clamp(0, n - 1) as u32;
+        return if i < 0 { 0 } else { i.min(n - 1) as u32 };
     }
     let period = if wrap == MIRRORED { 2 * n } else { n };
     let whole = floor((i as f32 + 0.5) / period as f32) as i32;

@@ -25,8 +25,10 @@ pub fn check(source: &Source) -> Result<Checked, ShaderError> {
     Ok(Checked { module, info })
 }
 
-fn validate(module: &Module) -> Result<ModuleInfo, WithSpan<ValidationError>> {
-    Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(module)
+fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>>> {
+    Validator::new(ValidationFlags::all(), Capabilities::empty())
+        .validate(module)
+        .map_err(Box::new)
 }
 
 impl Checked {

@@ -10,13 +10,16 @@ macro_rules! files {
 
 /// Every file of `shaders/`, as it was when the program was built.
 pub const BUILT_IN: &[(&str, &str)] = files![
+    "adaptive.wgsl",
     "bindings.wgsl",
     "camera.wgsl",
     "constants.wgsl",
     "differential.wgsl",
     "ellipsoid.wgsl",
+    "filter.wgsl",
     "footprint.wgsl",
     "integrator.wgsl",
+    "kernels/adaptive.wgsl",
     "kernels/aov.wgsl",
     "kernels/render.wgsl",
     "layout.wgsl",
@@ -68,6 +71,8 @@ pub const SHARED: &[&str] = &[
     "pattern.wgsl",
     "texel.wgsl",
     "tangent.wgsl",
+    "filter.wgsl",
+    "adaptive.wgsl",
 ];
 
 /// What every kernel adds to [`SHARED`]: its constants, its buffers and the way through the scene.
@@ -86,6 +91,8 @@ const FROM_BUFFERS: &str = "scene.wgsl";
 pub enum Kernel {
     /// Accumulates samples in the film.
     Render,
+    /// The same, as long as a pixel needs them.
+    Adaptive,
     /// Writes what the first hit of each pixel's centre is like.
     Aov,
 }
@@ -95,6 +102,7 @@ impl Kernel {
     pub fn entry_point(self) -> &'static str {
         match self {
             Kernel::Render => "render",
+            Kernel::Adaptive => "adaptive",
             Kernel::Aov => "aov",
         }
     }
@@ -102,6 +110,7 @@ impl Kernel {
     fn file(self) -> &'static str {
         match self {
             Kernel::Render => "kernels/render.wgsl",
+            Kernel::Adaptive => "kernels/adaptive.wgsl",
             Kernel::Aov => "kernels/aov.wgsl",
         }
     }

@@ -19,7 +19,9 @@ pub fn bind_group_layout(device: &Device) -> wgpu::BindGroupLayout {
     let read = BufferBindingType::Storage { read_only: true };
     let write = BufferBindingType::Storage { read_only: false };
     let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
-        .zip([uniform, uniform, uniform, read, read, read, read, read, read, write])
+        .zip([
+            uniform, uniform, uniform, read, read, read, read, read, read, read, write,
+        ])
         .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: wgpu::ShaderStages::COMPUTE,

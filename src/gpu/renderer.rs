@@ -41,9 +41,10 @@ pub struct Gpu {
     render: wgpu::ComputePipeline,
     /// The kernel of first hits, once it was asked for.
     aov: Option<wgpu::ComputePipeline>,
-    scene: [wgpu::Buffer; 8],
+    scene: [wgpu::Buffer; 9],
     work: wgpu::Buffer,
     film: Option<Target>,
+    adaptive: bool,
 }
 
 /// What it takes to compile another kernel for the same scene.
@@ -73,7 +74,10 @@ impl Gpu {
             layout: bind_group_layout(device),
             exact: options.exact,
         };
-        let render = kernels.compile(device, Kernel::Render)?;
+        let render = match packed.adaptive {
+            true => kernels.compile(device, Kernel::Adaptive)?,
+            false => kernels.compile(device, Kernel::Render)?,
+        };
         let scene = device.checked(|| {
             [
                 device.upload(BufferUsages::UNIFORM, &[packed.camera]),
@@ -84,6 +88,7 @@ impl Gpu {
                 device.upload(BufferUsages::STORAGE, &packed.lights),
                 device.upload(BufferUsages::STORAGE, &packed.textures),
                 device.upload(BufferUsages::STORAGE, &packed.texels),
+                device.upload(BufferUsages::STORAGE, &packed.filter_table),
             ]
         })?;
         let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
@@ -95,6 +100,7 @@ impl Gpu {
             scene,
             work,
             film: None,
+            adaptive: packed.adaptive,
         };
         let nothing = Region {
             x0: 0,
@@ -120,6 +126,7 @@ impl Gpu {
                 lights,
                 textures,
                 texels,
+                filter_table,
             ] = &self.scene;
             let buffers = [
                 &self.work,
@@ -131,6 +138,7 @@ impl Gpu {
                 lights,
                 textures,
                 texels,
+                filter_table,
                 &buffer,
             ];
             let entries: Vec<wgpu::BindGroupEntry> = (0..)
@@ -182,7 +190,10 @@ impl Gpu {
 impl Backend for Gpu {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
         self.film = None; // before the next one: the two together may not fit
-        self.film = Some(self.target::<Vec4>(region)?);
+        self.film = Some(match self.adaptive {
+            true => self.target::<[Vec4; 2]>(region)?,
+            false => self.target::<Vec4>(region)?,
+        });
         Ok(())
     }
 
@@ -197,9 +208,12 @@ impl Backend for Gpu {
         let Some(film) = &self.film else {
             return Ok(Film::new(Region::whole(0, 0)));
         };
+        let mut sums: Vec<Vec4> = self.device.download(&film.buffer)?;
+        let moments = sums.split_off(film.region.pixels() as usize);
         Ok(Film {
             region: film.region,
-            sums: self.device.download(&film.buffer)?,
+            sums,
+            moments,
         })
     }
 
@@ -212,6 +226,10 @@ impl Backend for Gpu {
         self.dispatch(&pipeline, &target, region, 0..0)?;
         self.aov = Some(pipeline);
         self.device.download(&target.buffer)
+    }
+
+    fn samples_of_all(&self) -> u32 {
+        self.kernels.constants.pixel_samples
     }
 
     fn largest_film(&self) -> u64 {

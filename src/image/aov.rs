@@ -1,11 +1,13 @@
-//! What a picture can show besides radiance ("arbitrary output variables"): the first hit through each pixel's centre.
+//! What a picture can show besides radiance ("arbitrary output variables"): the first hit through each pixel's centre, and
+//! what adaptive sampling knows of the pixel.
 
 use glam::{UVec4, Vec3};
 
+use super::{Band, Layout};
 use crate::cpu::rng::hash4;
 use crate::pack::{FirstHit, NOTHING};
 
-/// A value of the first hit.
+/// A value of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aov {
     /// The outward normal.
@@ -16,6 +18,10 @@ pub enum Aov {
     Uv,
     /// The number of the shape in the scene file; lights follow the shapes.
     Primitive,
+    /// The number of samples.
+    SampleCount,
+    /// The variance of the pixel's value, as [`Film::variance`](crate::film::Film::variance) estimates it.
+    Variance,
 }
 
 /// One channel of a layer.
@@ -24,11 +30,51 @@ pub enum Channel {
     Float(&'static str, fn(&FirstHit) -> f32),
     /// A whole number for each first hit.
     Whole(&'static str, fn(&FirstHit) -> u32),
+    /// The number of samples.
+    Count(&'static str),
+    /// The variance of a colour channel.
+    Variance(&'static str, usize),
+}
+
+impl Channel {
+    pub fn name(&self) -> &'static str {
+        match self {
+            Channel::Float(name, _) | Channel::Whole(name, _) | Channel::Count(name) | Channel::Variance(name, _) => {
+                name
+            }
+        }
+    }
+
+    pub fn is_whole(&self) -> bool {
+        matches!(self, Channel::Whole(..) | Channel::Count(_))
+    }
+
+    /// The bytes of pixel `i` of a band.
+    pub fn bytes(&self, band: Band, i: usize) -> [u8; 4] {
+        match self {
+            Channel::Float(_, value) => value(&band.hits[i]).to_ne_bytes(),
+            Channel::Whole(_, value) => value(&band.hits[i]).to_ne_bytes(),
+            Channel::Count(_) => band.film.sample_count(i).to_ne_bytes(),
+            Channel::Variance(_, channel) => band.film.variance(i)[*channel].to_ne_bytes(),
+        }
+    }
 }
 
 impl Aov {
     /// All of them.
-    pub const ALL: [Aov; 4] = [Aov::Normal, Aov::Depth, Aov::Uv, Aov::Primitive];
+    pub const ALL: [Aov; 6] = [
+        Aov::Normal,
+        Aov::Depth,
+        Aov::Uv,
+        Aov::Primitive,
+        Aov::SampleCount,
+        Aov::Variance,
+    ];
+
+    /// Whether it is a value of the film, there under adaptive sampling alone; else it is one of the first hit.
+    pub fn is_of_film(self) -> bool {
+        matches!(self, Aov::SampleCount | Aov::Variance)
+    }
 
     /// The name in options, files and layers.
     pub fn name(self) -> &'static str {
@@ -37,6 +83,8 @@ impl Aov {
             Aov::Depth => "depth",
             Aov::Uv => "uv",
             Aov::Primitive => "primitive",
+            Aov::SampleCount => "sample_count",
+            Aov::Variance => "variance",
         }
     }
 
@@ -54,21 +102,39 @@ impl Aov {
                 Channel::Float("uv.V", |hit| hit.uv.y),
             ],
             Aov::Primitive => vec![Channel::Whole("primitive.ID", |hit| hit.shape)],
+            Aov::SampleCount => vec![Channel::Count("sample_count.N")],
+            Aov::Variance => vec![
+                Channel::Variance("variance.R", 0),
+                Channel::Variance("variance.G", 1),
+                Channel::Variance("variance.B", 2),
+            ],
         }
     }
 
-    /// The colour in a PNG, before rounding to 8 bits; black where nothing is hit. The normal is moved from [-1, 1] to
-    /// [0, 1]; the depth is `middle / (middle + depth)`, near is bright; of texture coordinates the fraction is shown in
-    /// red and green; a shape has a colour that its number is hashed to.
-    pub fn color(self, hit: &FirstHit, middle_depth: f32) -> Vec3 {
+    /// The colour of pixel `i` of a band in a PNG, before rounding to 8 bits; black where nothing is hit. The normal is
+    /// moved from [-1, 1] to [0, 1]; the depth d is `1 / (1 + (d / middle)^4)`, near is bright; of texture coordinates the
+    /// fraction is shown in red and green; a shape has a colour that its number is hashed to. Sample counts are
+    /// `log(count) / log(most)`, variances the standard error to the power 1/2.2.
+    pub fn color(self, band: Band, i: usize, layout: &Layout) -> Vec3 {
+        match self {
+            Aov::SampleCount => {
+                let [count, most] = [band.film.sample_count(i), layout.most_samples].map(|n| n.max(1) as f32);
+                Vec3::splat(count.ln() / most.max(2.0).ln())
+            }
+            Aov::Variance => Vec3::from(band.film.variance(i)).map(|v| v.sqrt().powf(1.0 / 2.2)),
+            _ => self.color_of_hit(&band.hits[i], layout.middle_depth),
+        }
+    }
+
+    fn color_of_hit(self, hit: &FirstHit, middle_depth: f32) -> Vec3 {
         if hit.shape == NOTHING {
             return Vec3::ZERO;
         }
         match self {
             Aov::Normal => hit.normal * 0.5 + 0.5,
-            Aov::Depth => Vec3::splat(middle_depth / (middle_depth + hit.depth)),
+            Aov::Depth => Vec3::splat(1.0 / (1.0 + (hit.depth / middle_depth).powi(4))),
             Aov::Uv => (hit.uv - hit.uv.floor()).extend(0.0),
-            Aov::Primitive => {
+            _ => {
                 let bits = hash4(UVec4::new(hit.shape, 0, 0, 0)).truncate();
                 bits.as_vec3() * (0.75 / u32::MAX as f32) + 0.25 // never as dark as nothing is
             }

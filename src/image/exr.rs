@@ -57,15 +57,14 @@ pub fn write(
 /// Where a channel's samples come from.
 enum Column {
     Radiance(usize),
-    FirstHit(Channel),
+    Aov(Channel),
 }
 
 /// The channels by name, in the order of the file, which is that of the alphabet.
 fn columns(layout: &Layout) -> Vec<(&'static str, Column)> {
     let mut columns: Vec<_> = ["R", "G", "B"].into_iter().zip((0..).map(Column::Radiance)).collect();
     for channel in layout.aovs.iter().flat_map(|aov| aov.channels()) {
-        let (Channel::Float(name, _) | Channel::Whole(name, _)) = &channel;
-        columns.push((*name, Column::FirstHit(channel)));
+        columns.push((channel.name(), Column::Aov(channel)));
     }
     columns.sort_by_key(|(name, _)| *name);
     columns
@@ -74,7 +73,7 @@ fn columns(layout: &Layout) -> Vec<(&'static str, Column)> {
 fn header(layout: &Layout, columns: &[(&str, Column)]) -> Header {
     let channel = |(name, column): &(&str, Column)| {
         let sample = match column {
-            Column::FirstHit(Channel::Whole(..)) => SampleType::U32,
+            Column::Aov(channel) if channel.is_whole() => SampleType::U32,
             _ => SampleType::F32,
         };
         ChannelDescription::named(*name, sample)
@@ -151,8 +150,7 @@ fn line(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>) 
         for i in pixels.clone() {
             bytes.extend(match column {
                 Column::Radiance(channel) => mean(band.film.sums[i])[*channel].to_ne_bytes(),
-                Column::FirstHit(Channel::Float(_, value)) => value(&band.hits[i]).to_ne_bytes(),
-                Column::FirstHit(Channel::Whole(_, value)) => value(&band.hits[i]).to_ne_bytes(),
+                Column::Aov(channel) => channel.bytes(band, i),
             });
         }
     }

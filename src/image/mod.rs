@@ -50,6 +50,8 @@ pub struct Layout {
     pub aovs: Vec<Aov>,
     /// The distance that is half bright in a PNG of the depth.
     pub middle_depth: f32,
+    /// The number of samples that is bright in a PNG of their counts.
+    pub most_samples: u32,
 }
 
 /// Some whole rows of a region, in full width.
@@ -57,7 +59,7 @@ pub struct Layout {
 pub struct Band<'a> {
     /// The radiance.
     pub film: &'a Film,
-    /// The first hits of the same pixels; empty where the layout has no [`Aov`].
+    /// The first hits of the same pixels; empty where the layout has no [`Aov`] of them.
     pub hits: &'a [FirstHit],
 }
 

@@ -48,7 +48,7 @@ pub fn write(
         for (stream, content) in &mut streams {
             let bytes = match &*content {
                 None => radiance(band),
-                Some(aov) => colors(band, *aov, layout.middle_depth),
+                Some(aov) => colors(band, *aov, layout),
             };
             stream.write_all(&bytes)?;
         }
@@ -71,13 +71,12 @@ fn radiance(band: Band) -> Vec<u8> {
         .collect()
 }
 
-fn colors(band: Band, aov: Aov, middle_depth: f32) -> Vec<u8> {
-    let color = |hit| {
-        aov.color(hit, middle_depth)
-            .to_array()
-            .map(|value| quantize(f64::from(value)))
+fn colors(band: Band, aov: Aov, layout: &Layout) -> Vec<u8> {
+    let color = |i| {
+        let color = aov.color(band, i, layout).to_array();
+        color.map(|value| quantize(f64::from(value)))
     };
-    band.hits.par_iter().flat_map_iter(color).collect()
+    (0..band.film.sums.len()).into_par_iter().flat_map_iter(color).collect()
 }
 
 fn plain(error: EncodingError) -> io::Error {

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use super::error::{At, Problem, SceneError};
 use super::parse::{invalid, syntax_error};
-use super::validate::{sample_count, side};
-use super::{Assets, Description, SamplesDescription, Scene};
+use super::validate::{adaptive, sample_count, side};
+use super::{AdaptiveDescription, Assets, Description, Pattern, SamplesDescription, Scene};
 
 /// The largest scene file in bytes: far above what anyone writes, far below what fills the memory.
 const LARGEST_FILE: u64 = 64 << 20;
@@ -24,6 +24,10 @@ pub struct Overrides {
     pub light_samples: Option<u32>,
     /// `--seed`
     pub seed: Option<u32>,
+    /// `--pixel-pattern`
+    pub pixel_pattern: Option<Pattern>,
+    /// `--adaptive`: the error; the most samples stay.
+    pub adaptive: Option<f64>,
     /// `--asset-root`: the folder that files named by the scene must lie in, instead of the scene's own.
     pub asset_root: Option<PathBuf>,
 }
@@ -35,9 +39,18 @@ impl Overrides {
             description.image.height = side(height).at("--size")?;
         }
         let render = &mut description.render;
+        if let Some(pattern) = self.pixel_pattern {
+            render.pixel_samples.pattern = pattern;
+        }
         set_count(&mut render.pixel_samples, self.pixel_samples).at("--pixel-samples")?;
         set_count(&mut render.light_samples, self.light_samples).at("--light-samples")?;
         render.seed = self.seed.unwrap_or(render.seed);
+        if let Some(error) = self.adaptive {
+            let max_samples = (render.adaptive.as_ref()).and_then(|adaptive| adaptive.max_samples);
+            let description = AdaptiveDescription { error, max_samples };
+            adaptive(&description, &render.pixel_samples).at("--adaptive")?;
+            render.adaptive = Some(description);
+        }
         Ok(())
     }
 }
@@ -124,7 +137,7 @@ light_samples = { pattern = 'random', count = 5 }
             pixel_samples: Some(9),
             light_samples: Some(8),
             seed: Some(3),
-            asset_root: None,
+            ..Overrides::default()
         };
         let scene = Scene::parse(SCENE, "s.toml", &overrides).unwrap();
         let render = scene.render;

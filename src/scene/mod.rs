@@ -98,6 +98,10 @@ pub struct Render {
     pub pixel_samples: Samples,
     /// Samples of every area light, at every hit.
     pub light_samples: Samples,
+    /// What a pixel's samples are weighted by.
+    pub filter: PixelFilter,
+    /// Further samples of the pixels whose error is large; then `pixel_samples` are those of one round.
+    pub adaptive: Option<Adaptive>,
 }
 
 /// What light is simulated.
@@ -127,6 +131,26 @@ pub struct Samples {
     pub pattern: Pattern,
     /// How many, 1 to 65,536; a square for patterns of n x n cells.
     pub count: u32,
+}
+
+/// Adaptive sampling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Adaptive {
+    /// The standard error of a pixel's displayed value that is aimed at, 0 to 1.
+    pub error: f64,
+    /// The most samples of a pixel, from the count of [`Render::pixel_samples`] to 65,536.
+    pub max_samples: u32,
+}
+
+/// A reconstruction filter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct PixelFilter {
+    /// Its form.
+    pub kind: PixelFilterKind,
+    /// How far it reaches along x and y, in pixels, 0.01 to 16.
+    pub radius: f64,
 }
 
 /// A surface's appearance.

@@ -13,9 +13,9 @@ use self::appearance::Textures;
 use super::error::{At, Problem};
 use super::parse::list;
 use super::{
-    Assets, Camera, CameraDescription, Color, Description, EllipsoidDescription, Geometry, Light, LightDescription,
-    Material, Parallelogram, Pattern, Projection, Render, RenderDescription, Samples, SamplesDescription, Scene, Shape,
-    ShapeDescription,
+    Adaptive, AdaptiveDescription, Assets, Camera, CameraDescription, Color, Description, EllipsoidDescription,
+    Geometry, Light, LightDescription, Material, Parallelogram, Pattern, PixelFilter, PixelFilterDescription,
+    Projection, Render, RenderDescription, Samples, SamplesDescription, Scene, Shape, ShapeDescription,
 };
 
 /// Largest absolute coordinate.
@@ -120,6 +120,36 @@ fn render(description: &RenderDescription) -> Checked<Render> {
         seed: description.seed,
         pixel_samples: samples(&description.pixel_samples).at("pixel_samples")?,
         light_samples: samples(&description.light_samples).at("light_samples")?,
+        filter: filter(&description.filter).at("filter")?,
+        adaptive: (description.adaptive.as_ref())
+            .map(|adaptive| self::adaptive(adaptive, &description.pixel_samples).at("adaptive"))
+            .transpose()?,
+    })
+}
+
+fn filter(description: &PixelFilterDescription) -> Checked<PixelFilter> {
+    let PixelFilterDescription { kind, radius } = *description;
+    let radius = between(radius.unwrap_or(kind.radius()), 0.01, 16.0).at("radius")?;
+    Ok(PixelFilter { kind, radius })
+}
+
+/// Adaptive sampling, of pixels with these samples.
+pub(super) fn adaptive(description: &AdaptiveDescription, pixel_samples: &SamplesDescription) -> Checked<Adaptive> {
+    let SamplesDescription { pattern, count } = *pixel_samples;
+    check(pattern.goes_on(), || {
+        "the pattern of pixel_samples must not be a grid, which has no further samples".to_owned()
+    })?;
+    let error = between(description.error, 0.0, 1.0).at("error")?;
+    let most = description.max_samples;
+    let most = most.unwrap_or(count.saturating_mul(16).min(MOST));
+    let least = count.max(2); // one sample tells nothing of an error
+    check((least..=MOST).contains(&most), || {
+        format!("{most} must be from {least} to {MOST}, and not below the count of pixel_samples")
+    })
+    .at("max_samples")?;
+    Ok(Adaptive {
+        error,
+        max_samples: most,
     })
 }
 

@@ -405,3 +405,25 @@ fn help_and_version_are_no_errors() {
         assert!(help.contains(option), "{option} is not told of");
     }
 }
+
+#[test]
+fn the_scenes_of_the_documents_are_good() {
+    let place = Place::new();
+    for document in ["README.md", "docs/scene-format.md"] {
+        let text = std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(document)).unwrap();
+        let scenes: Vec<&str> = text
+            .split("```toml\n")
+            .skip(1)
+            .filter_map(|rest| rest.split("```").next())
+            .collect();
+        assert!(
+            scenes.iter().any(|scene| scene.contains("[camera]")),
+            "{document}: no scene was found"
+        );
+        for scene in scenes.into_iter().filter(|scene| scene.contains("[camera]")) {
+            place.write("scene.toml", scene);
+            let ran = place.run(&["check", "scene.toml"]);
+            assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{document}");
+        }
+    }
+}

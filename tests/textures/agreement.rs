@@ -1,0 +1,159 @@
+//! Pictures with textures, mirrors and glass on the device against the CPU: bit for bit on software Vulkan.
+
+use std::path::Path;
+
+use wgray::gpu::{Choice, Gpu, Options, choose, compose::Shaders};
+use wgray::job::Cut;
+use wgray::pack::Packed;
+
+use super::{cpu_picture, picture, scene, write_exr, write_png};
+
+/// All scenes that this is about, small.
+fn scenes(folder: &Path) -> Vec<(String, Packed)> {
+    let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let mut scenes = Vec::new();
+    for name in ["ground-grid", "balls-checker", "textures", "mirror-glass"] {
+        let text = std::fs::read_to_string(project.join(format!("{name}.toml"))).unwrap();
+        let text = text
+            .replace("width = 400", "width = 90")
+            .replace("height = 400", "height = 70");
+        scenes.push((
+            name.to_string(),
+            scene(&text.replace("height = 300", "height = 70"), &project),
+        ));
+    }
+    write_exr(&folder.join("f.exr"), 37, 11, |x, y| {
+        [x as f32 / 9.0, y as f32, ((x * y) % 7) as f32 * 0.1]
+    });
+    write_png(&folder.join("b.png"), 21, 64, |x, y| {
+        [(x * 12) as u8, (y * 4) as u8, ((x ^ y) * 9) as u8]
+    });
+    for filter in ["nearest", "bilinear", "trilinear", "ewa"] {
+        for wrap in ["repeat", "clamp", "mirror"] {
+            scenes.push((format!("{filter} {wrap}"), scene(&every_shape(filter, wrap), folder)));
+        }
+    }
+    scenes
+}
+
+fn every_shape(filter: &str, wrap: &str) -> String {
+    format!(
+        "image = {{ width = 48, height = 36 }}
+        camera = {{ position = [0.2, -4, 1.3], look_at = [0, 0, 0.5], fov = 45 }}
+        [render]
+        ambient = [0.3, 0.3, 0.3]
+        background = [0.2, 0.3, 0.4]
+        pixel_samples = {{ pattern = 'random', count = 3 }}
+        [textures.f]
+        type = 'image'
+        file = 'f.exr'
+        filter = '{filter}'
+        wrap = '{wrap}'
+        scale = [1.7, -2.3]
+        rotate = 20
+        offset = [-0.4, 0.3]
+        max_anisotropy = 5
+        [textures.b]
+        type = 'image'
+        file = 'b.png'
+        filter = '{filter}'
+        wrap = '{wrap}'
+        scale = [3, 2]
+        [textures.n]
+        type = 'image'
+        file = 'b.png'
+        encoding = 'linear'
+        filter = '{filter}'
+        wrap = '{wrap}'
+        [materials.float]
+        type = 'phong'
+        ambient = {{ texture = 'b' }}
+        diffuse = {{ texture = 'f' }}
+        specular = {{ texture = 'n' }}
+        normal_map = {{ texture = 'n', strength = 0.4 }}
+        [materials.plain]
+        type = 'phong'
+        color = {{ texture = 'b' }}
+        [materials.glass]
+        type = 'glass'
+        ior = 1.4
+        tint = {{ texture = 'b' }}
+        normal_map = {{ texture = 'n', strength = 0.1 }}
+        [[lights]]
+        type = 'point'
+        position = [-2, -3, 4]
+        color = [1, 1, 1]
+        [[shapes]]
+        type = 'plane'
+        material = 'float'
+        point = [0, 0, 0]
+        normal = [0, 0, 1]
+        tangent = [1, 0.3, 0]
+        [[shapes]]
+        type = 'ellipsoid'
+        material = 'float'
+        center = [-0.8, 0.3, 0.6]
+        a = [0.5, 0.1, 0]
+        b = [0, 0.6, 0.1]
+        c = [0.1, 0, 0.5]
+        [[shapes]]
+        type = 'sphere'
+        material = 'glass'
+        center = [0.5, -0.6, 0.5]
+        radius = 0.5
+        [[shapes]]
+        type = 'tetrahedron'
+        material = 'plain'
+        vertices = [[0.6, 0.4, 0.1], [1.8, 0.3, 0.1], [1.1, 1.3, 0.1], [1.2, 0.6, 1.2]]"
+    )
+}
+
+#[test]
+fn pictures_are_the_same_on_the_device_and_on_the_cpu() {
+    if std::env::var_os("WGRAY_TEST_WITHOUT_GPU").is_some_and(|value| value == "1") {
+        return;
+    }
+    let device = choose(&Choice::Auto).unwrap();
+    let software = device.info.exact && device.info.kind == "software";
+    let folder = tempfile::tempdir().unwrap();
+    let odd = Cut {
+        band_pixels: 700,
+        samples_per_call: Some(1),
+        rows_per_call: Some(3),
+    };
+    for (name, scene) in scenes(folder.path()) {
+        let expected = cpu_picture(&scene);
+        let colors: std::collections::BTreeSet<_> = expected.iter().map(|pixel| pixel.map(f32::to_bits)).collect();
+        assert!(colors.len() > 100, "{name} shows nothing");
+        for (baked, cut) in [(true, Cut::default()), (false, odd)] {
+            let options = Options {
+                exact: device.info.exact,
+                baked,
+            };
+            let mut gpu = Gpu::new(&device, &scene, &Shaders::built_in(), options).unwrap();
+            let found = picture(&mut gpu, &scene, &cut);
+            let differ = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
+            if software {
+                assert_eq!(differ, 0, "{name}, baked: {baked}");
+            }
+            assert!(differ <= expected.len() / 50, "{name}, baked: {baked}: {differ} pixels");
+        }
+    }
+}
+
+/// The control: a footprint twice as large is seen.
+#[test]
+fn a_wrong_footprint_is_noticed() {
+    let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let text = std::fs::read_to_string(project.join("textures.toml")).unwrap();
+    let mut scene = scene(
+        &text
+            .replace("width = 400", "width = 60")
+            .replace("height = 300", "height = 45"),
+        &project,
+    );
+    let right = cpu_picture(&scene);
+    scene.specialization.differentials = 0;
+    let wrong = cpu_picture(&scene);
+    assert!(right.iter().zip(&wrong).filter(|(a, b)| a != b).count() > 100);
+}

@@ -1,0 +1,331 @@
+//! Bad textures and materials: each is told with file, line, key, value and rule, and ends with exit code 3.
+
+use std::path::Path;
+use std::process::Command;
+
+use wgray::scene::{Overrides, Scene};
+
+use super::{write_exr, write_png};
+
+const START: &str = "\
+image = { width = 4, height = 4 }
+camera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }
+";
+
+fn load(folder: &Path, text: &str) -> Result<Scene, String> {
+    let path = folder.join("s.toml");
+    std::fs::write(&path, format!("{START}{text}")).unwrap();
+    Scene::load(&path, &Overrides::default()).map_err(|error| {
+        let message = error.to_string();
+        let start = format!("{}:", path.display());
+        message
+            .strip_prefix(&start)
+            .unwrap_or_else(|| panic!("{message}"))
+            .to_string()
+    })
+}
+
+fn files(folder: &Path) {
+    let path = |name: &str| folder.join(name);
+    write_png(&path("good.png"), 4, 4, |x, _| [x as u8 * 60; 3]);
+    write_exr(&path("good.exr"), 4, 4, |x, _| [x as f32; 3]);
+    write_exr(&path("nan.exr"), 4, 4, |x, y| {
+        [if (x, y) == (2, 1) { f32::NAN } else { 1.0 }; 3]
+    });
+    write_exr(&path("negative.exr"), 4, 4, |x, y| {
+        [if (x, y) == (3, 3) { -0.5 } else { 1.0 }; 3]
+    });
+    let png = std::fs::read(path("good.png")).unwrap();
+    std::fs::write(path("cut.png"), &png[..png.len() / 2]).unwrap();
+    std::fs::write(path("head.png"), &png[..12]).unwrap();
+    std::fs::write(path("empty.png"), b"").unwrap();
+    std::fs::write(path("text.png"), b"no image at all").unwrap();
+    std::fs::write(path("named.jpg"), &png).unwrap();
+    // A header that claims 60000 x 60000 texels, with its checksum.
+    let mut huge = png.clone();
+    huge[16..24].copy_from_slice(&[0, 0, 0xea, 0x60, 0, 0, 0xea, 0x60]);
+    let crc = crc32(&huge[12..29]);
+    huge[29..33].copy_from_slice(&crc.to_be_bytes());
+    std::fs::write(path("huge.png"), &huge).unwrap();
+    let mut zero = png;
+    zero[16..24].copy_from_slice(&[0, 0, 0, 0, 0, 0, 0, 4]);
+    let crc = crc32(&zero[12..29]);
+    zero[29..33].copy_from_slice(&crc.to_be_bytes());
+    std::fs::write(path("zero.png"), &zero).unwrap();
+    std::fs::write(path("zero.hdr"), b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 0 +X 0\n").unwrap();
+    image::RgbImage::new(6000, 5000).save(path("large.png")).unwrap();
+    std::fs::create_dir(path("folder.png")).unwrap();
+    std::fs::create_dir(path("inner")).unwrap();
+    std::fs::copy(path("good.png"), path("inner/good.png")).unwrap();
+}
+
+/// The checksum of PNG chunks (ISO 3309).
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0, |mut crc, byte| {
+        crc ^= u32::from(*byte);
+        (0..8).for_each(|_| {
+            crc = if crc & 1 == 1 {
+                (crc >> 1) ^ 0xedb8_8320
+            } else {
+                crc >> 1
+            }
+        });
+        crc
+    })
+}
+
+#[test]
+fn bad_images_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    files(folder.path());
+    for good in ["good.png", "good.exr", "inner/good.png", "inner/../good.png"] {
+        load(folder.path(), &format!("[textures.t]\ntype = 'image'\nfile = '{good}'")).unwrap();
+    }
+    for (file, told) in [
+        ("none.png", "cannot be read: "),
+        ("", "must be a file"),
+        ("folder.png", "must be a file"),
+        ("cut.png", "must be sound, and have at most 16384 texels along a side: "),
+        (
+            "head.png",
+            "must be sound, and have at most 16384 texels along a side: ",
+        ),
+        (
+            "huge.png",
+            "must be sound, and have at most 16384 texels along a side: ",
+        ),
+        (
+            "zero.png",
+            "must be sound, and have at most 16384 texels along a side: ",
+        ),
+        ("zero.hdr", "must "),
+        ("empty.png", "must be a PNG, JPEG, EXR or HDR file"),
+        ("text.png", "must be a PNG, JPEG, EXR or HDR file"),
+        ("s.toml", "must be a PNG, JPEG, EXR or HDR file"),
+        ("named.jpg", "must be what its name says; it is a file of type PNG"),
+        (
+            "nan.exr",
+            "has the texel [NaN, NaN, NaN] at (2, 1); the values of each must be finite, from 0 to 1e6",
+        ),
+        (
+            "negative.exr",
+            "has the texel [-0.5, -0.5, -0.5] at (3, 3); the values of each must be finite, from 0 to 1e6",
+        ),
+        (
+            "large.png",
+            "takes 152.6 MiB, the textures before it 0.0 MiB; together they must fit 128.0 MiB",
+        ),
+        ("/etc/hostname", "must not leave "),
+        ("../", "must not leave "),
+    ] {
+        let message = load(folder.path(), &format!("[textures.t]\ntype = 'image'\nfile = '{file}'")).unwrap_err();
+        let start = format!("5: textures.t.file: {file:?} {told}");
+        assert!(message.starts_with(&start), "{message}\n{start}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn links_that_leave_the_folder_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = tempfile::tempdir().unwrap();
+    write_png(&other.path().join("good.png"), 2, 2, |_, _| [1; 3]);
+    std::os::unix::fs::symlink(other.path().join("good.png"), folder.path().join("link.png")).unwrap();
+    let text = "[textures.t]\ntype = 'image'\nfile = 'link.png'";
+    assert!(load(folder.path(), text).unwrap_err().contains("must not leave"));
+    let overrides = Overrides {
+        asset_root: Some("/".into()),
+        ..Overrides::default()
+    };
+    Scene::load(&folder.path().join("s.toml"), &overrides).unwrap();
+}
+
+#[test]
+fn all_images_together_must_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    image::RgbImage::new(4000, 4000)
+        .save(folder.path().join("a.png"))
+        .unwrap();
+    let texture =
+        |name: &str, filter: &str| format!("[textures.{name}]\ntype = 'image'\nfilter = '{filter}'\nfile = 'a.png'\n");
+    // Without smaller levels, two of them take 122 MiB.
+    let two = texture("a", "nearest") + &texture("b", "bilinear");
+    load(folder.path(), &two).unwrap();
+    let message = load(folder.path(), &(two + &texture("c", "nearest"))).unwrap_err();
+    let told =
+        "14: textures.c.file: \"a.png\" takes 61.0 MiB, the textures before it 122.1 MiB; together they must fit";
+    assert!(message.starts_with(told), "{message}");
+    let message = load(folder.path(), &(texture("a", "ewa") + &texture("b", "ewa"))).unwrap_err();
+    assert!(
+        message.contains("takes 81.4 MiB, the textures before it 81.4 MiB"),
+        "{message}"
+    );
+}
+
+#[test]
+fn bad_values_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    files(folder.path());
+    let image = "[textures.t]\ntype = 'image'\nfile = 'good.png'\n";
+    let checker = "[textures.t]\ntype = 'checker'\neven = [0, 0, 0]\nodd = [1, 1, 1]\n";
+    let grid = "[textures.t]\ntype = 'grid'\ncell = [0, 0, 0]\nline = [1, 1, 1]\n";
+    let linear = "[textures.t]\ntype = 'image'\nfile = 'good.png'\nencoding = 'linear'\n";
+    let mapped = "[materials.m]\ntype = 'phong'\ncolor = [1, 1, 1]\nnormal_map = { texture = 't' }\n";
+    let triangle = "[[shapes]]\ntype = 'triangle'\nmaterial = 'm'\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\n";
+    for (text, told) in [
+        (
+            format!("{image}filter = 'sharp'"),
+            "6: textures.t.filter: \"sharp\" must be one of \"nearest\", \"bilinear\", \"trilinear\", \"ewa\"",
+        ),
+        (
+            format!("{image}wrap = 'around'"),
+            "6: textures.t.wrap: \"around\" must be one of \"repeat\", \"clamp\", \"mirror\"",
+        ),
+        (
+            format!("{image}encoding = 'log'"),
+            "6: textures.t.encoding: \"log\" must be \"srgb\" or \"linear\"",
+        ),
+        (
+            format!("{image}max_anisotropy = 0.5"),
+            "6: textures.t.max_anisotropy: 0.5 must be from 1 to 64",
+        ),
+        (
+            format!("{image}max_anisotropy = nan"),
+            "6: textures.t.max_anisotropy: nan must be from 1 to 64",
+        ),
+        (
+            format!("{image}scale = [1, 0]"),
+            "6: textures.t.scale: [1, 0] must be finite and not 0: from 1e-6 to 1e6, or negative",
+        ),
+        (
+            format!("{image}scale = [inf, 1]"),
+            "6: textures.t.scale: [inf, 1] must be finite and not 0: from 1e-6 to 1e6, or negative",
+        ),
+        (
+            format!("{image}offset = [0, 2e6]"),
+            "6: textures.t.offset: [0, 2e6] must be finite, from -1e6 to 1e6",
+        ),
+        (
+            format!("{image}rotate = 400"),
+            "6: textures.t.rotate: 400 must be from -360 to 360",
+        ),
+        (format!("{image}blur = 1"), "6: textures.t.blur: unknown key"),
+        ("[textures.t]\ntype = 'image'".into(), "3: textures.t.file: is missing"),
+        (
+            "[textures.t]\ntype = 'image'\nfile = 'good.exr'\nencoding = 'srgb'".into(),
+            "5: textures.t.file: \"good.exr\" must not be \"srgb\": files of type EXR are linear",
+        ),
+        (
+            "[textures.t]\ntype = 'noise'".into(),
+            "4: textures.t.type: \"noise\" must be one of \"constant\", \"checker\", \"grid\", \"image\"",
+        ),
+        (
+            "[textures.t]\ntype = 'constant'\ncolor = [0, -1, 0]".into(),
+            "5: textures.t.color: -1 must be finite, from 0 to 1e6",
+        ),
+        (
+            checker.replace("[1, 1, 1]", "[1, nan, 1]"),
+            "6: textures.t.odd: nan must be finite, from 0 to 1e6",
+        ),
+        (
+            format!("{grid}line_width = 0"),
+            "7: textures.t.line_width: 0 must be greater than 0 and less than 1",
+        ),
+        (
+            format!("{grid}line_width = 1"),
+            "7: textures.t.line_width: 1 must be greater than 0 and less than 1",
+        ),
+        (
+            "[materials.m]\ntype = 'phong'\ncolor = { texture = 't' }".into(),
+            "5: materials.m.color.texture: \"t\" is no texture; the file has none",
+        ),
+        (
+            format!("{image}[materials.m]\ntype = 'phong'\ncolor = {{ texture = 'u' }}"),
+            "8: materials.m.color.texture: \"u\" is no texture; there are \"t\"",
+        ),
+        (
+            "[materials.m]\ntype = 'phong'\ncolor = 'red'".into(),
+            "5: materials.m.color: \"red\" must be a list of 3 numbers or { texture = NAME }",
+        ),
+        (
+            "[materials.m]\ntype = 'phong'\ncolor = [1, 'a', 1]".into(),
+            "5: materials.m.color[1]: \"a\" must be a number",
+        ),
+        (
+            "[materials.m]\ntype = 'phong'\ncolor = [1, 1]".into(),
+            "5: materials.m.color: [1, 1] must be a list of 3 numbers",
+        ),
+        (
+            "[materials.m]\ntype = 'phong'\ncolor = { texture = 't', tint = 1 }".into(),
+            "5: materials.m.color.tint: unknown key; the keys here are \"texture\"",
+        ),
+        (
+            "[materials.m]\ntype = 'glass'\nior = 0".into(),
+            "5: materials.m.ior: 0 must be greater than 0, from 0.01 to 100",
+        ),
+        (
+            "[materials.m]\ntype = 'glass'\nior = -1.5".into(),
+            "5: materials.m.ior: -1.5 must be greater than 0, from 0.01 to 100",
+        ),
+        (
+            "[materials.m]\ntype = 'glass'\nior = nan".into(),
+            "5: materials.m.ior: nan must be greater than 0, from 0.01 to 100",
+        ),
+        ("[materials.m]\ntype = 'glass'".into(), "3: materials.m.ior: is missing"),
+        (
+            "[materials.m]\ntype = 'mirror'\ntint = [1, 1, 2]".into(),
+            "5: materials.m.tint: 2 must be from 0 to 1",
+        ),
+        (
+            "render = { max_depth = 0 }".into(),
+            "3: render.max_depth: 0 must be from 1 to 64",
+        ),
+        (
+            "render = { max_depth = 65 }".into(),
+            "3: render.max_depth: 65 must be from 1 to 64",
+        ),
+        (
+            "render = { shadows = 'none' }".into(),
+            "3: render.shadows: \"none\" must be \"opaque\" or \"transparent\"",
+        ),
+        (
+            format!("{image}{mapped}"),
+            "9: materials.m.normal_map.texture: \"t\" must have encoding = \"linear\" to be a normal map",
+        ),
+        (
+            format!("{checker}{mapped}"),
+            "10: materials.m.normal_map.texture: \"t\" must be a texture of type \"image\"",
+        ),
+        (
+            format!("{linear}{mapped}{triangle}"),
+            "13: shapes[0].material: \"m\" must have no normal map here, as the sides of this shape have no tangents",
+        ),
+        (
+            format!("{linear}{}", mapped.replace("'t'", "'t', strength = -1")),
+            "10: materials.m.normal_map.strength: -1 must be from 0 to 100",
+        ),
+    ] {
+        let message = load(folder.path(), &text).expect_err(&text);
+        assert!(message.starts_with(told), "{message}\n{told}");
+    }
+    load(folder.path(), &format!("{linear}{mapped}")).unwrap();
+}
+
+#[test]
+fn the_command_line_ends_with_exit_code_3() {
+    let folder = tempfile::tempdir().unwrap();
+    files(folder.path());
+    let check = |text: &str| {
+        let _ = load(folder.path(), text);
+        Command::new(env!("CARGO_BIN_EXE_wgray"))
+            .arg("check")
+            .arg(folder.path().join("s.toml"))
+            .output()
+            .unwrap()
+    };
+    let bad = check("[textures.t]\ntype = 'image'\nfile = 'cut.png'");
+    assert_eq!(bad.status.code(), Some(3), "{bad:?}");
+    assert!(String::from_utf8_lossy(&bad.stderr).contains("s.toml:5: textures.t.file: \"cut.png\" must be sound"));
+    let good = check("[textures.t]\ntype = 'image'\nfile = 'good.png'");
+    assert_eq!(good.status.code(), Some(0), "{good:?}");
+}

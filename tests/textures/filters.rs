@@ -1,0 +1,263 @@
+//! What the filters make of images.
+
+use std::path::Path;
+
+use glam::{DVec3, Vec2, Vec3};
+use wgray::cpu::footprint::{Footprint, footprint_ellipse};
+use wgray::cpu::texel::{near_coordinate, srgb_to_linear, wrapped_index};
+use wgray::cpu::texture::texture_color;
+use wgray::pack::{CLAMP, MIRRORED, Packed, REPEAT};
+
+use super::{Numbers, scene, write_exr, write_png};
+
+/// A scene with one texture, of a file in the folder.
+pub fn textured(folder: &Path, keys: &str) -> Packed {
+    let text = format!(
+        "image = {{ width = 4, height = 4 }}
+        camera = {{ position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }}
+        [textures.t]
+        {keys}
+        [materials.m]
+        type = 'phong'
+        color = {{ texture = 't' }}"
+    );
+    scene(&text, folder)
+}
+
+fn color(scene: &Packed, uv: Vec2, dx: Vec2, dy: Vec2) -> Vec3 {
+    texture_color(scene, &scene.textures[0], Footprint { uv, dx, dy })
+}
+
+/// Footprints of all sizes and shapes, and what grazing rays make.
+fn footprints() -> Vec<(Vec2, Vec2, Vec2)> {
+    let mut numbers = Numbers::new(1);
+    let mut footprints = Vec::new();
+    for i in 0..300 {
+        let mut vector =
+            |size: f64| Vec2::new(numbers.between(-size, size) as f32, numbers.between(-size, size) as f32);
+        let size = 2f64.powi(i % 30 - 15);
+        footprints.push((
+            vector(3.0),
+            vector(size),
+            vector(size * if i % 3 == 0 { 0.01 } else { 1.0 }),
+        ));
+    }
+    let (inf, nan) = (f32::INFINITY, f32::NAN);
+    for dx in [0.0, 1e-30, 1e20, 1e38, inf, nan] {
+        footprints.push((Vec2::splat(0.3), Vec2::new(dx, 0.1), Vec2::new(0.0, dx)));
+        footprints.push((Vec2::new(dx, 0.7), Vec2::splat(dx), Vec2::splat(dx)));
+    }
+    footprints
+}
+
+const FILTERS: [&str; 4] = ["nearest", "bilinear", "trilinear", "ewa"];
+const WRAPS: [&str; 3] = ["repeat", "clamp", "mirror"];
+
+#[test]
+fn a_constant_image_is_constant_under_every_filter_and_footprint() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    write_png(&path("even.png"), 16, 16, |_, _| [200, 31, 5]);
+    write_png(&path("odd.png"), 7, 13, |_, _| [200, 31, 5]);
+    write_exr(&path("line.exr"), 5, 1, |_, _| [0.1, 7.3, 1e-3]);
+    write_png(&path("spot.png"), 7, 13, |x, y| {
+        if (x, y) == (3, 6) { [0; 3] } else { [200, 31, 5] }
+    });
+    let mut varied = 0;
+    for file in ["even.png", "odd.png", "line.exr", "spot.png"] {
+        for filter in FILTERS {
+            for wrap in WRAPS {
+                let keys = format!("type = 'image'\nfile = '{file}'\nfilter = '{filter}'\nwrap = '{wrap}'");
+                let scene = textured(folder.path(), &keys);
+                let expected = color(&scene, Vec2::ZERO, Vec2::ZERO, Vec2::ZERO);
+                for (uv, dx, dy) in footprints() {
+                    let found = color(&scene, uv, dx, dy);
+                    if file == "spot.png" {
+                        varied += u32::from(found != expected); // the control: one texel is seen
+                    } else {
+                        assert_eq!(found, expected, "{keys}\n{uv} {dx} {dy}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(varied > 1000, "{varied}");
+}
+
+#[test]
+fn values_of_the_srgb_curve_are_those_of_the_standard() {
+    for byte in 0..=255 {
+        let x = f64::from(byte) / 255.0;
+        let exact = if x <= 0.04045 {
+            x / 12.92
+        } else {
+            ((x + 0.055) / 1.055).powf(2.4)
+        };
+        let found = f64::from(srgb_to_linear(byte as f32 / 255.0));
+        assert!(
+            (found - exact).abs() <= 1e-6 * exact.max(1e-3),
+            "{byte}: {found} {exact}"
+        );
+    }
+}
+
+#[test]
+fn an_image_without_filter_is_its_texels() {
+    let folder = tempfile::tempdir().unwrap();
+    let texel = |x: u32, y: u32| [x as f32, y as f32, 10.0 * y as f32 + x as f32];
+    write_exr(&folder.path().join("t.exr"), 5, 3, texel);
+    let scene = textured(folder.path(), "type = 'image'\nfile = 't.exr'\nfilter = 'nearest'");
+    for y in 0..3 {
+        for x in 0..5 {
+            // The first row of a file is the top of the picture.
+            let uv = Vec2::new((x as f32 + 0.5) / 5.0, 1.0 - (y as f32 + 0.5) / 3.0);
+            assert_eq!(color(&scene, uv, Vec2::ZERO, Vec2::ZERO), Vec3::from(texel(x, y)));
+        }
+    }
+    let bilinear = textured(folder.path(), "type = 'image'\nfile = 't.exr'\nfilter = 'bilinear'");
+    let middle = color(&bilinear, Vec2::new(0.4, 0.5), Vec2::ZERO, Vec2::ZERO);
+    assert!((middle - Vec3::new(1.5, 1.0, 11.5)).length() < 1e-5, "{middle}");
+}
+
+#[test]
+fn coordinates_go_on_beyond_the_image_as_they_should() {
+    let found = |wrap: u32| (-7..8).map(|i| wrapped_index(i, 3, wrap)).collect::<Vec<_>>();
+    assert_eq!(found(REPEAT), [2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1]);
+    assert_eq!(found(CLAMP), [0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 2, 2, 2, 2, 2]);
+    assert_eq!(found(MIRRORED), [0, 0, 1, 2, 2, 1, 0, 0, 1, 2, 2, 1, 0, 0, 1]);
+    assert_eq!(near_coordinate(-0.25, REPEAT), 0.75);
+    assert_eq!(near_coordinate(-0.25, MIRRORED), 1.75);
+    assert_eq!(near_coordinate(-0.25, CLAMP), -0.25);
+    for wrap in [REPEAT, MIRRORED, CLAMP] {
+        for u in [f32::NAN, f32::INFINITY, -f32::INFINITY, 1e30, -1e30] {
+            assert!(near_coordinate(u, wrap).abs() <= 9.0);
+        }
+    }
+}
+
+/// Random texels, and the file that has them.
+fn noise(folder: &Path, width: u32, height: u32) -> Vec<f64> {
+    let mut numbers = Numbers::new(5);
+    let texels: Vec<f32> = (0..width * height).map(|_| numbers.next() as f32).collect();
+    write_exr(&folder.join("noise.exr"), width, height, |x, y| {
+        [texels[(y * width + x) as usize]; 3]
+    });
+    // From the bottom, as v goes up.
+    let rows = texels.chunks(width as usize).rev();
+    rows.flatten().map(|&texel| f64::from(texel)).collect()
+}
+
+#[test]
+fn ewa_of_a_round_footprint_is_a_gaussian_mean() {
+    let folder = tempfile::tempdir().unwrap();
+    let n = 32;
+    let texels = noise(folder.path(), n, n);
+    let scene = textured(folder.path(), "type = 'image'\nfile = 'noise.exr'\nfilter = 'ewa'");
+    // exp(-2 d^2 / r^2) - exp(-2) where d < r: r^2 is 1 for the footprint of one texel, and 1 for reconstruction.
+    let exact = |u: f64, v: f64, r2: f64| {
+        let (mut sum, mut total) = (0.0, 0.0);
+        for y in -10..n as i32 + 10 {
+            for x in -10..n as i32 + 10 {
+                let (a, b) = (
+                    f64::from(x) + 0.5 - u * f64::from(n),
+                    f64::from(y) + 0.5 - v * f64::from(n),
+                );
+                let d2 = (a * a + b * b) / r2;
+                if d2 < 1.0 {
+                    let weight = (-2.0 * d2).exp() - (-2f64).exp();
+                    let (x, y) = (x.rem_euclid(n as i32), y.rem_euclid(n as i32));
+                    sum += weight * texels[(y * n as i32 + x) as usize];
+                    total += weight;
+                }
+            }
+        }
+        sum / total
+    };
+    let mut numbers = Numbers::new(9);
+    let texel = 1.0 / n as f32;
+    let mut narrower_differs = false;
+    for _ in 0..200 {
+        let uv = Vec2::new(numbers.next() as f32, numbers.next() as f32);
+        let angle = numbers.between(0.0, 6.28) as f32;
+        let (dx, dy) = (Vec2::from_angle(angle) * texel, Vec2::from_angle(angle).perp() * texel);
+        let found = f64::from(color(&scene, uv, dx, dy).x);
+        let (u, v) = (f64::from(uv.x), f64::from(uv.y));
+        assert!(
+            (found - exact(u, v, 2.0)).abs() < 2e-5,
+            "{uv}: {found} {}",
+            exact(u, v, 2.0)
+        );
+        narrower_differs |= (found - exact(u, v, 1.5)).abs() > 0.01;
+    }
+    assert!(narrower_differs);
+}
+
+#[test]
+fn wide_footprints_see_the_whole_image() {
+    let folder = tempfile::tempdir().unwrap();
+    for (width, height) in [(32, 32), (13, 7), (1, 9)] {
+        let texels = noise(folder.path(), width, height);
+        let mean = texels.iter().sum::<f64>() / texels.len() as f64;
+        for filter in ["trilinear", "ewa"] {
+            let scene = textured(
+                folder.path(),
+                &format!("type = 'image'\nfile = 'noise.exr'\nfilter = '{filter}'"),
+            );
+            for size in [20.0, 1e6, f32::INFINITY] {
+                let found = color(&scene, Vec2::new(0.2, 0.4), Vec2::new(size, 0.0), Vec2::new(0.0, size)).x;
+                assert!(
+                    (f64::from(found) - mean).abs() < 1e-6,
+                    "{width} x {height}, {filter}: {found} {mean}"
+                );
+            }
+            let narrow = color(&scene, Vec2::new(0.2, 0.4), Vec2::ZERO, Vec2::ZERO).x;
+            assert!((f64::from(narrow) - mean).abs() > 1e-3);
+        }
+    }
+}
+
+/// The mean over a long footprint follows it: EWA is near the mean over its ellipse where trilinear has blurred all.
+#[test]
+fn ewa_keeps_what_lies_across_a_long_footprint() {
+    let folder = tempfile::tempdir().unwrap();
+    write_exr(&folder.path().join("stripes.exr"), 64, 64, |x, _| {
+        [if x % 16 < 8 { 1.0 } else { 0.0 }; 3]
+    });
+    let contrast = |filter: &str| {
+        let scene = textured(
+            folder.path(),
+            &format!("type = 'image'\nfile = 'stripes.exr'\nfilter = '{filter}'"),
+        );
+        let (dx, dy) = (Vec2::new(1.0 / 64.0, 0.0), Vec2::new(0.0, 14.0 / 64.0));
+        color(&scene, Vec2::new(4.0 / 64.0, 0.5), dx, dy).x - color(&scene, Vec2::new(12.0 / 64.0, 0.5), dx, dy).x
+    };
+    assert!(contrast("ewa") > 0.99, "{}", contrast("ewa"));
+    assert!(contrast("trilinear") < 0.3, "{}", contrast("trilinear"));
+}
+
+#[test]
+fn a_footprints_ellipse_has_its_conjugate_axes() {
+    let mut numbers = Numbers::new(3);
+    let mut clamped = 0;
+    for _ in 0..1000 {
+        let mut vector = || Vec2::new(numbers.between(-9.0, 9.0) as f32, numbers.between(-9.0, 9.0) as f32);
+        let (dx, dy) = (vector(), vector());
+        let (a, b) = (dx.as_dvec2(), dy.as_dvec2());
+        let m = DVec3::new(a.x * a.x + b.x * b.x, a.x * a.y + b.x * b.y, a.y * a.y + b.y * b.y);
+        let root = ((m.x - m.z).powi(2) / 4.0 + m.y * m.y).sqrt();
+        let (major, minor) = (
+            ((m.x + m.z) / 2.0 + root).sqrt(),
+            a.perp_dot(b).abs() / ((m.x + m.z) / 2.0 + root).sqrt(),
+        );
+        let ellipse = footprint_ellipse(dx, dy, 1e3);
+        assert!((f64::from(ellipse.major) - major).abs() < 1e-5 * major);
+        if minor > 0.02 * major {
+            assert!((f64::from(ellipse.minor) - minor).abs() < 1e-3 * minor, "{dx} {dy}");
+            assert!((ellipse.m.as_dvec3() - m).length() < 1e-4 * major * major, "{dx} {dy}");
+        }
+        let limited = footprint_ellipse(dx, dy, 2.0);
+        assert!(limited.minor >= 0.49999 * limited.major);
+        clamped += u32::from(limited.minor > 1.001 * ellipse.minor);
+    }
+    assert!(clamped > 100);
+}

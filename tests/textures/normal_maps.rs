@@ -1,0 +1,157 @@
+//! Normal maps: where their normals point.
+
+use glam::Vec3;
+use wgray::cpu::differential::Arrival;
+use wgray::cpu::path::usable_normal;
+use wgray::cpu::ray::Ray;
+use wgray::cpu::surface::surface_at;
+use wgray::cpu::texture::appearance;
+use wgray::pack::Packed;
+
+use super::{Numbers, scene, write_exr};
+
+/// Shapes with a map whose normal is (x, y, z) / |(x, y, z)| everywhere.
+fn shapes(normal: Vec3, keys: &str, strength: f32) -> Packed {
+    let folder = tempfile::tempdir().unwrap();
+    let texel = normal * 0.5 + 0.5;
+    write_exr(&folder.path().join("n.exr"), 2, 2, |_, _| texel.to_array());
+    let text = format!(
+        "image = {{ width = 4, height = 4 }}
+        camera = {{ position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }}
+        [textures.n]
+        type = 'image'
+        file = 'n.exr'
+        {keys}
+        [materials.m]
+        type = 'phong'
+        color = [1, 1, 1]
+        normal_map = {{ texture = 'n', strength = {strength} }}
+        [[shapes]]
+        type = 'rectangle'
+        material = 'm'
+        center = [0, 0, 0]
+        size = [2, 3]
+        normal = [0, 0, 1]
+        tangent = [1, 0, 0]
+        [[shapes]]
+        type = 'sphere'
+        material = 'm'
+        center = [9, 0, 0]
+        radius = 1
+        [[shapes]]
+        type = 'plane'
+        material = 'm'
+        point = [0, 0, -5]
+        normal = [0, 0, 1]
+        tangent = [0, 1, 0]"
+    );
+    scene(&text, folder.path())
+}
+
+/// The normal that a ray sees on the primitive.
+fn normal(scene: &Packed, primitive: usize, origin: Vec3, target: Vec3) -> Vec3 {
+    let q = &scene.primitives[primitive];
+    let ray = Ray {
+        origin,
+        direction: (target - origin).normalize(),
+    };
+    let surface = surface_at(q, ray, (target - origin).length(), 1e-5);
+    let look = appearance(
+        scene,
+        q,
+        &scene.materials[q.material as usize],
+        surface,
+        Arrival::default(),
+        1,
+    );
+    look.normal
+}
+
+fn near(a: Vec3, b: Vec3) -> bool {
+    (a - b).length() < 1e-5
+}
+
+#[test]
+fn maps_lean_along_the_tangent_and_the_bitangent() {
+    let n = Vec3::new(0.6, 0.0, 0.8);
+    let map = shapes(n, "", 1.0);
+    let (above, below) = (Vec3::new(0.3, 0.2, 3.0), Vec3::new(0.3, 0.2, -3.0));
+    assert!(near(normal(&map, 0, above, Vec3::ZERO), n));
+    // From behind it is the same surface, seen from its other side.
+    assert!(near(normal(&map, 0, below, Vec3::ZERO), -n));
+    // The plane's tangent is y.
+    assert!(near(
+        normal(&map, 2, above, Vec3::new(0.0, 0.0, -5.0)),
+        Vec3::new(0.0, 0.6, 0.8)
+    ));
+    // On the sphere u goes east and v north.
+    let equator = Vec3::new(9.0, -1.0, 0.0);
+    assert!(near(
+        normal(&map, 1, Vec3::new(9.0, -5.0, 0.0), equator),
+        Vec3::new(0.6, -0.8, 0.0)
+    ));
+    let north = shapes(Vec3::new(0.0, 0.6, 0.8), "", 1.0);
+    assert!(near(
+        normal(&north, 1, Vec3::new(9.0, -5.0, 0.0), equator),
+        Vec3::new(0.0, -0.8, 0.6)
+    ));
+    assert!(near(normal(&north, 0, above, Vec3::ZERO), Vec3::new(0.0, 0.6, 0.8)));
+}
+
+#[test]
+fn maps_turn_with_their_texture() {
+    let n = Vec3::new(0.6, 0.0, 0.8);
+    let above = Vec3::new(0.3, 0.2, 3.0);
+    // Turned by 90 degrees, the texture's u runs against the surface's v, whatever the scale.
+    let turned = normal(
+        &shapes(n, "rotate = 90\nscale = [3, 0.5]", 1.0),
+        2,
+        above,
+        Vec3::new(0.0, 0.0, -5.0),
+    );
+    assert!(near(turned, Vec3::new(0.6, 0.0, 0.8)), "{turned}"); // the plane's bitangent is -x
+    let mirrored = normal(&shapes(n, "scale = [-1, 1]", 1.0), 0, above, Vec3::ZERO);
+    assert!(near(mirrored, Vec3::new(-0.6, 0.0, 0.8)), "{mirrored}");
+}
+
+#[test]
+fn strength_is_a_factor_of_the_slope() {
+    let above = Vec3::new(0.3, 0.2, 3.0);
+    let flat = normal(&shapes(Vec3::new(0.6, 0.0, 0.8), "", 0.0), 0, above, Vec3::ZERO);
+    assert!(near(flat, Vec3::Z));
+    let steep = normal(&shapes(Vec3::new(0.6, 0.0, 0.8), "", 2.0), 0, above, Vec3::ZERO);
+    assert!(near(steep, Vec3::new(1.2, 0.0, 0.8).normalize()));
+}
+
+#[test]
+fn a_flat_map_changes_nothing() {
+    let flat = shapes(Vec3::Z, "", 1.0);
+    let mut numbers = Numbers::new(8);
+    for _ in 0..200 {
+        let mut unit = || Vec3::from_array([0; 3].map(|_| numbers.between(-1.0, 1.0) as f32)).normalize();
+        let target = Vec3::new(9.0, 0.0, 0.0) + unit();
+        let origin = target + (target - Vec3::new(9.0, 0.0, 0.0)) * 3.0 + unit();
+        let q = &flat.primitives[1];
+        let ray = Ray {
+            origin,
+            direction: (target - origin).normalize(),
+        };
+        let plain = surface_at(q, ray, (target - origin).length(), 1e-5).normal;
+        assert!(near(normal(&flat, 1, origin, target), plain));
+    }
+}
+
+#[test]
+fn mirrors_use_no_normal_that_would_lead_into_them() {
+    let map = shapes(Vec3::new(0.9, 0.0, 0.3).normalize(), "", 1.0);
+    let q = &map.primitives[0];
+    let grazing = Ray {
+        origin: Vec3::new(5.0, 0.0, 1.0),
+        direction: Vec3::new(-5.0, 0.0, -1.0).normalize(),
+    };
+    let surface = surface_at(q, grazing, 26f32.sqrt(), 1e-5);
+    let bent = normal(&map, 0, grazing.origin, Vec3::ZERO);
+    assert_eq!(usable_normal(surface, bent), bent);
+    let away = Vec3::new(-bent.x, 0.0, bent.z);
+    assert_eq!(usable_normal(surface, away), surface.normal);
+}

@@ -1,0 +1,295 @@
+//! Mirrors and glass: known values, energy, and what is seen in them.
+
+use std::path::Path;
+
+use wgray::cpu::specular::{fresnel, refracted_cosine};
+use wgray::pack::Packed;
+
+use super::{cpu_picture, scene};
+
+fn reflectance(degrees: f64, ior: f64) -> f64 {
+    let cosine = degrees.to_radians().cos() as f32;
+    let eta = (1.0 / ior) as f32;
+    f64::from(fresnel(cosine, refracted_cosine(cosine, eta), eta))
+}
+
+#[test]
+fn reflectances_are_those_of_fresnel() {
+    assert!((reflectance(0.0, 1.5) - 0.04).abs() < 1e-6);
+    assert!((reflectance(0.0, 1.0 / 1.5) - 0.04).abs() < 1e-6);
+    // At Brewster's angle only one polarisation is reflected: ((n^2 - 1) / (n^2 + 1))^2, and half of the light has it.
+    let brewster = 1.5f64.atan().to_degrees();
+    assert!((reflectance(brewster, 1.5) - 0.5 * (1.25f64 / 3.25).powi(2)).abs() < 1e-6);
+    // Beyond the critical angle all is.
+    let critical = (1.0 / 1.5f64).asin().to_degrees();
+    assert_eq!(reflectance(critical + 0.1, 1.0 / 1.5), 1.0);
+    assert!(reflectance(critical - 0.1, 1.0 / 1.5) < 0.9);
+    assert!(reflectance(89.999, 1.5) > 0.999);
+    for degrees in 0..90 {
+        assert_eq!(reflectance(f64::from(degrees), 1.0), 0.0);
+        let there = reflectance(f64::from(degrees), 1.5);
+        let refracted = (f64::from(degrees).to_radians().sin() / 1.5).asin().to_degrees();
+        // The same from the other side.
+        assert!((there - reflectance(refracted, 1.0 / 1.5)).abs() < 1e-4);
+    }
+}
+
+/// A ball and more before a background.
+fn ball(background: &str, material: &str, more: &str) -> Packed {
+    let text = format!(
+        "image = {{ width = 40, height = 40 }}
+        camera = {{ position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }}
+        [render]
+        background = {background}
+        ambient = [0.2, 0.2, 0.2]
+        pixel_samples = {{ count = 4 }}
+        shadows = 'transparent'
+        [materials.ball]
+        {material}
+        [materials.gray]
+        type = 'phong'
+        color = [0.5, 0.6, 0.7]
+        [[shapes]]
+        type = 'ellipsoid'
+        material = 'ball'
+        center = [0, 0, 1]
+        a = [0.9, 0, 0]
+        b = [0.2, 0.8, 0]
+        c = [0, 0.1, 0.7]
+        {more}"
+    );
+    scene(&text, Path::new("."))
+}
+
+const ROOM: &str = "
+    [[lights]]
+    type = 'rectangle'
+    center = [0, 0, 2.5]
+    size = [1, 1]
+    normal = [0, 0, -1]
+    tangent = [1, 0, 0]
+    color = [0.8, 0.8, 0.8]
+    [[shapes]]
+    type = 'rectangle'
+    material = 'gray'
+    center = [0, 2, 1]
+    size = [3, 3]
+    normal = [0, -1, 0]
+    tangent = [1, 0, 0]
+    [[shapes]]
+    type = 'rectangle'
+    material = 'gray'
+    center = [0, 0, 0]
+    size = [4, 4]
+    normal = [0, 0, 1]
+    tangent = [1, 0, 0]";
+
+fn farthest(a: &[[f32; 3]], b: &[[f32; 3]]) -> Vec<f32> {
+    let pixels = a.iter().zip(b);
+    pixels
+        .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max))
+        .collect()
+}
+
+#[test]
+fn a_glass_ball_before_a_uniform_background_keeps_its_energy() {
+    for ior in [1.1, 1.5, 2.4, 0.7] {
+        for background in [1.0f32, 0.3] {
+            let colors = format!("[{background}, {background}, {background}]");
+            let picture = cpu_picture(&ball(&colors, &format!("type = 'glass'\nior = {ior}"), ""));
+            let error = picture
+                .iter()
+                .flatten()
+                .map(|x| (x - background).abs())
+                .fold(0.0, f32::max);
+            assert!(error < 1e-6, "{ior}: {error}");
+        }
+    }
+    let tinted = cpu_picture(&ball("[1, 1, 1]", "type = 'glass'\nior = 1.5\ntint = [0.9, 1, 1]", ""));
+    assert!(tinted.iter().any(|pixel| pixel[0] < 0.85)); // 0.9 on the way in and on the way out
+    assert!(tinted.iter().all(|pixel| (pixel[1] - 1.0).abs() < 1e-6));
+}
+
+#[test]
+fn clear_glass_of_index_1_is_invisible() {
+    let seen = |material: &str| cpu_picture(&ball("[0.1, 0.2, 0.3]", material, ROOM));
+    let without = seen(
+        "type = 'glass'\nior = 1\n[[shapes]]\ntype = 'sphere'\nmaterial = 'gray'\ncenter = [0, 0, -9]\nradius = 1",
+    );
+    let clear = seen("type = 'glass'\nior = 1");
+    let dense = seen("type = 'glass'\nior = 1.3");
+    let far_away = cpu_picture(&ball(
+        "[0.1, 0.2, 0.3]",
+        "type = 'glass'\nior = 1",
+        &format!("{ROOM}\n"),
+    ));
+    assert_eq!(clear, far_away);
+    // Without the ball at all: the same text with the ball out of the picture.
+    let nothing = {
+        let mut scene = ball("[0.1, 0.2, 0.3]", "type = 'glass'\nior = 1", ROOM);
+        let keep = scene.specialization.rectangles as usize;
+        scene.primitives.truncate(keep);
+        scene.bounds.truncate(keep);
+        (
+            scene.specialization.ellipsoids,
+            scene.specialization.blocking_ellipsoids,
+        ) = (0, 0);
+        cpu_picture(&scene)
+    };
+    let visible = |picture: &[[f32; 3]]| farthest(picture, &nothing).iter().filter(|d| **d > 1e-3).count();
+    assert!(visible(&clear) <= 2, "{}", visible(&clear)); // edges, by the rays' offset from the surface
+    assert!(visible(&dense) > 100, "{}", visible(&dense));
+    assert_eq!(without.len(), clear.len());
+}
+
+#[test]
+fn mirrors_see_lights_in_their_colour() {
+    let light = "
+        [[lights]]
+        type = 'rectangle'
+        center = [0, -9, 1]
+        size = [90, 90]
+        normal = [0, 1, 0]
+        tangent = [1, 0, 0]
+        color = [0.25, 0.5, 0.75]";
+    let wall = "
+        [[shapes]]
+        type = 'rectangle'
+        material = 'ball'
+        center = [0, 4, 1]
+        size = [50, 50]
+        normal = [0, -1, 0]
+        tangent = [1, 0, 0]";
+    let picture = cpu_picture(&ball(
+        "[0, 0, 0]",
+        "type = 'mirror'\ntint = [1, 0.5, 1]",
+        &format!("{light}{wall}"),
+    ));
+    assert!(picture.iter().filter(|pixel| **pixel == [0.25, 0.25, 0.75]).count() > 600);
+}
+
+#[test]
+fn a_path_cut_off_sees_the_background() {
+    for depth in [1, 2, 5, 64] {
+        let text = format!(
+            "image = {{ width = 4, height = 4 }}
+            camera = {{ position = [0, 0, 0], look_at = [0, 1, 0], fov = 10 }}
+            [render]
+            background = [1, 2, 0]
+            max_depth = {depth}
+            [materials.m]
+            type = 'mirror'
+            tint = [0.5, 1, 1]
+            [[shapes]]
+            type = 'plane'
+            material = 'm'
+            point = [0, 1, 0]
+            normal = [0, 1, 0]
+            tangent = [1, 0, 0]
+            [[shapes]]
+            type = 'plane'
+            material = 'm'
+            point = [0, -1, 0]
+            normal = [0, 1, 0]
+            tangent = [1, 0, 0]"
+        );
+        for pixel in cpu_picture(&scene(&text, Path::new("."))) {
+            assert_eq!(pixel, [0.5f32.powi(depth), 2.0, 0.0]);
+        }
+    }
+}
+
+#[test]
+fn glass_casts_a_shadow_unless_it_is_transparent() {
+    let floor = |shadows: &str, material: &str| {
+        let text = format!(
+            "image = {{ width = 8, height = 8 }}
+            camera = {{ position = [0, 0, 0.5], look_at = [0, 0, 0], up = [0, 1, 0], fov = 20 }}
+            render = {{ shadows = '{shadows}' }}
+            [materials.ball]
+            {material}
+            [materials.gray]
+            type = 'phong'
+            color = [0.5, 0.5, 0.5]
+            specular = [0, 0, 0]
+            [[lights]]
+            type = 'point'
+            position = [0, 0, 9]
+            color = [1, 1, 1]
+            [[shapes]]
+            type = 'sphere'
+            material = 'ball'
+            center = [0, 0, 2]
+            radius = 0.5
+            [[shapes]]
+            type = 'tetrahedron'
+            material = 'ball'
+            vertices = [[-1, -1, 3], [1, -1, 3], [0, 1, 3], [0, 0, 4]]
+            [[shapes]]
+            type = 'rectangle'
+            material = 'ball'
+            center = [0, 0, 5]
+            size = [2, 2]
+            normal = [0, 0, 1]
+            tangent = [1, 0, 0]
+            [[shapes]]
+            type = 'plane'
+            material = 'gray'
+            point = [0, 0, 0]
+            normal = [0, 0, 1]
+            tangent = [1, 0, 0]"
+        );
+        cpu_picture(&scene(&text, Path::new(".")))[27][0]
+    };
+    let glass = "type = 'glass'\nior = 1.5";
+    assert_eq!(floor("opaque", glass), 0.0);
+    assert!(floor("transparent", glass) > 0.4);
+    assert_eq!(floor("transparent", "type = 'mirror'"), 0.0);
+}
+
+/// After the splits a branch is chosen at random: in the mean it is what following both would give.
+#[test]
+fn branches_chosen_at_random_have_the_right_mean() {
+    // Between the plates, light is reflected and refracted again and again: the sum of the series is known.
+    let text = |depth: u32| {
+        format!(
+            "image = {{ width = 1, height = 1 }}
+            camera = {{ position = [0, 0, 5], look_at = [0, 0, 0], up = [0, 1, 0], fov = 0.01 }}
+            [render]
+            max_depth = {depth}
+            pixel_samples = {{ pattern = 'random', count = 60000 }}
+            ambient = [1, 1, 1]
+            [materials.g]
+            type = 'glass'
+            ior = 10
+            [materials.white]
+            type = 'phong'
+            color = [1, 1, 1]
+            [[shapes]]
+            type = 'plane'
+            material = 'g'
+            point = [0, 0, 1]
+            normal = [0, 0, 1]
+            tangent = [1, 0, 0]
+            [[shapes]]
+            type = 'plane'
+            material = 'g'
+            point = [0, 0, 0]
+            normal = [0, 0, -1]
+            tangent = [1, 0, 0]
+            [[shapes]]
+            type = 'plane'
+            material = 'white'
+            point = [0, 0, -1]
+            normal = [0, 0, 1]
+            tangent = [1, 0, 0]"
+        )
+    };
+    let r = (9.0f64 / 11.0).powi(2);
+    let plate = (1.0 - r) / (1.0 + r); // what passes both surfaces, after any number of reflections between them
+    let found = f64::from(cpu_picture(&scene(&text(64), Path::new(".")))[0][0]);
+    assert!((found - plate).abs() < 4e-3, "{found} {plate}");
+    // The control: with 3 bounces most light is still on its way.
+    let cut = f64::from(cpu_picture(&scene(&text(3), Path::new(".")))[0][0]);
+    assert!(plate - cut > 0.03, "{cut}");
+}
