@@ -17,6 +17,7 @@ mod pictures;
 mod probes;
 mod radiance;
 mod random;
+mod random_scenes;
 mod render;
 mod robust;
 mod sampling;
