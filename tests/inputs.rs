@@ -447,7 +447,6 @@ fn whole(function: &str, name: &str, random: &Random) -> u32 {
         "i" if function == "block_sample" => random.below(32),
         "exponent_bits" => random.below(14),
         "bits" if function == "power_whole" => random.below(14),
-        "bins" => 1 + random.below(256),
         "side" => 1 + random.below(16),
         _ => random.pick(&[
             0,
