@@ -41,6 +41,19 @@ fn wrong_command_lines_exit_with_2() {
         (&["--device", ""], "--device"),
         (&["--threads", "0"], "--threads"),
         (&["--aov", "normal,colour"], "colour"),
+        (
+            &["--aov", "variance"],
+            "--aov variance: is known under adaptive sampling alone",
+        ),
+        (&["--pixel-pattern", "hexagonal"], "hexagonal"),
+        (
+            &["--pixel-pattern", "sobol", "--adaptive", "2"],
+            "--adaptive: 2 must be from 0 to 1",
+        ),
+        (
+            &["--pixel-pattern", "grid", "--adaptive", "0.1"],
+            "--adaptive: the pattern of pixel_samples",
+        ),
         (&["--progress", "loud"], "--progress"),
         (&["-q", "-v"], "cannot be used with"),
         (&["-o", "picture.jpg"], "picture.jpg: must end in .png or .exr"),

@@ -5,8 +5,9 @@ use wgray::image::{difference, encode, read_exr};
 use wgray::job::{self, Cut};
 
 use super::{NO_DRIVER, Place, SCENE, project_scene, read_png};
+use crate::patterns;
 use crate::pictures::{film, reference, whole};
-use crate::scenes::parse;
+use crate::scenes::{packed, parse};
 
 #[test]
 fn the_picture_has_the_scenes_name_and_is_in_the_current_folder() {
@@ -210,6 +211,77 @@ fn aovs_are_layers_of_an_exr() {
             })
             .collect();
         assert_eq!(found, expected, "{name}");
+    }
+}
+
+#[test]
+fn adaptive_sampling_and_its_layers_are_those_of_the_library() {
+    let place = Place::new();
+    let options = ["--pixel-pattern", "sobol", "--spp", "8", "--adaptive", "0.02"];
+    let files = [
+        "-o",
+        "out.exr",
+        "--aov",
+        "variance,sample_count",
+        "--stats",
+        "stats.json",
+    ];
+    place.quietly(&[&["render", "small.toml"], &options[..], &files[..]].concat());
+    let mut description = wgray::scene::Description::parse(SCENE, "test").unwrap();
+    let render = &mut description.render;
+    render.pixel_samples = patterns::samples(wgray::scene::Pattern::Sobol, 8);
+    render.adaptive = Some(wgray::scene::AdaptiveDescription {
+        error: 0.02,
+        max_samples: None,
+    });
+    let scene = packed(&description);
+    let film = film(&mut Cpu::new(&scene), &scene, whole(&scene), &Cut::default());
+    let counts: Vec<u32> = film.sample_counts().collect();
+    assert!(
+        counts.contains(&8) && counts.iter().any(|count| *count > 8),
+        "{counts:?}"
+    );
+    let image = exr::prelude::read_first_flat_layer_from_file(place.path("out.exr")).unwrap();
+    let channels = &image.layer_data.channel_data.list;
+    let names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
+    let expected = [
+        "B",
+        "G",
+        "R",
+        "sample_count.N",
+        "variance.B",
+        "variance.G",
+        "variance.R",
+    ];
+    assert_eq!(names, expected);
+    for channel in channels {
+        match (&channel.sample_data, channel.name.to_string().as_str()) {
+            (exr::prelude::FlatSamples::U32(found), _) => assert_eq!(*found, counts),
+            (exr::prelude::FlatSamples::F32(found), "variance.G") => {
+                assert!(found.iter().enumerate().all(|(i, found)| *found == film.variance(i)[1]));
+            }
+            _ => {}
+        }
+    }
+    let stats: serde_json::Value = serde_json::from_slice(&place.read("stats.json")).unwrap();
+    let rays = counts.iter().map(|count| u64::from(count + 4)).sum::<u64>();
+    assert_eq!(stats["camera_rays"].as_u64(), Some(rays));
+    // Beside a PNG: the most samples are white, and the least are not.
+    place.quietly(
+        &[
+            &["render", "small.toml"],
+            &options[..],
+            &["-o", "out.png", "--aov", "sample_count"],
+        ]
+        .concat(),
+    );
+    let (_, _, bytes) = read_png(&place.path("out.sample_count.png"));
+    for (pixel, count) in bytes.chunks(3).zip(&counts) {
+        let grey = (255.0 * f64::from(*count).ln() / 128f64.ln()).round() as i32;
+        assert!(
+            pixel.iter().all(|value| (i32::from(*value) - grey).abs() <= 1),
+            "{pixel:?} for {count}"
+        );
     }
 }
 
