@@ -6,6 +6,7 @@ mod against_oracle;
 mod analytic;
 mod bounds;
 mod cli;
+mod culling;
 mod inputs;
 mod kernel;
 mod layout;

@@ -278,7 +278,7 @@ fn render() -> impl Strategy<Value = RenderDescription> {
     )
 }
 
-fn description() -> impl Strategy<Value = Description> {
+pub fn description() -> impl Strategy<Value = Description> {
     let (shapes, lights) = (
         prop::collection::vec(shape(), 0..7),
         prop::collection::vec(light(), 0..4),
@@ -339,7 +339,9 @@ fn moved(d: &mut Description, scale: f64, offset: DVec3) {
             }
             ShapeDescription::Ellipsoid(s) => {
                 point(&mut s.center);
-                [&mut s.a, &mut s.b, &mut s.c].map(|axis| *axis *= scale);
+                [&mut s.a, &mut s.b, &mut s.c]
+                    .into_iter()
+                    .for_each(|axis| *axis *= scale);
             }
             ShapeDescription::Triangle(s) => s.vertices.iter_mut().for_each(point),
             ShapeDescription::Tetrahedron(s) => s.vertices.iter_mut().for_each(point),
@@ -370,7 +372,7 @@ fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
         }
     }
     // another kernel, so only now and then
-    if d.render.seed % 4 == 0 {
+    if d.render.seed.is_multiple_of(4) {
         let (gpu, cpu) = (first_hits(&packed, Way::Buffers), first_hits(&packed, Way::Cpu));
         if bytemuck::cast_slice::<_, u8>(&gpu) != bytemuck::cast_slice::<_, u8>(&cpu) {
             return Err("the first hits differ".into());
