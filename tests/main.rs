@@ -6,8 +6,7 @@ mod against_oracle;
 mod analytic;
 mod bounds;
 mod cli;
-#[cfg(feature = "dev")]
-mod dev;
+mod culling;
 mod inputs;
 mod kernel;
 mod layout;

@@ -278,7 +278,7 @@ fn render() -> impl Strategy<Value = RenderDescription> {
     )
 }
 
-fn description() -> impl Strategy<Value = Description> {
+pub fn description() -> impl Strategy<Value = Description> {
     let (shapes, lights) = (
         prop::collection::vec(shape(), 0..7),
         prop::collection::vec(light(), 0..4),
@@ -339,9 +339,9 @@ fn moved(d: &mut Description, scale: f64, offset: DVec3) {
             }
             ShapeDescription::Ellipsoid(s) => {
                 point(&mut s.center);
-                for axis in [&mut s.a, &mut s.b, &mut s.c] {
-                    *axis *= scale;
-                }
+                [&mut s.a, &mut s.b, &mut s.c]
+                    .into_iter()
+                    .for_each(|axis| *axis *= scale);
             }
             ShapeDescription::Triangle(s) => s.vertices.iter_mut().for_each(point),
             ShapeDescription::Tetrahedron(s) => s.vertices.iter_mut().for_each(point),

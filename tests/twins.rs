@@ -236,7 +236,7 @@ fn spirv(source: &Source, kernel: Kernel, packed: &Packed) -> Vec<u32> {
 fn kernels_hold_no_operation_that_devices_may_compute_differently() {
     let mut operations = 0;
     for (name, packed) in scenes::all() {
-        for kernel in [Kernel::Render, Kernel::Adaptive, Kernel::Aov] {
+        for kernel in sources::KERNELS {
             for baked in [None, Some(bake(&packed))] {
                 let module = spirv(&sources::shaders().compose(kernel, baked.as_deref()), kernel, &packed);
                 operations += instructions(&module)
