@@ -164,7 +164,7 @@ fn pixel_corners(pixel: vec2u) -> vec4f {
 // Whether a pixel, before its sample of this number, needs no more: it has stopped before, or it does so now, at the end
 // of a round.
 fn is_done(sum: vec4f, moments: vec4f, sample: u32) -> bool {
-    let stopped = moments.w != f32(sample);
+    let stopped = !(moments.w == f32(sample));
     let round_ends = (sample % PIXEL_SAMPLES == 0u) & (sample > 0u);
     return stopped | (round_ends & (display_variance(sum, moments) <= bitcast<f32>(SQUARED_ERROR)));
 }

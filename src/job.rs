@@ -88,48 +88,127 @@ pub fn render(
     output: &mut dyn FnMut(Film) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
     let total = region.pixels() as f64 * f64::from(samples);
-    let mut pace = Pace::default();
+    let mut steps = Steps::new(cut, CALL);
     let mut done = 0.0;
     for band in bands(region, cut, backend.largest_film()) {
         backend.begin(band)?;
-        let mut first = 0;
-        while first < samples {
-            let count = cut
-                .samples_per_call
-                .unwrap_or_else(|| pace.samples(band))
-                .min(samples - first);
-            let mut y = band.y0;
-            while y < band.y1 {
-                let rows = cut
-                    .rows_per_call
-                    .unwrap_or_else(|| pace.rows(band, count))
-                    .min(band.y1 - y);
-                let tile = Region {
-                    y0: y,
-                    y1: y + rows,
-                    ..band
-                };
-                let start = Instant::now();
-                backend.render(tile, first..first + count)?;
-                let work = tile.pixels() as f64 * f64::from(count);
-                let of_all = first + count <= backend.samples_of_all();
-                pace.took(work, start.elapsed(), of_all);
-                done += work;
-                if !progress(done / total) {
-                    return Err(RenderError::Cancelled);
-                }
-                y += rows;
+        steps.start(band, samples);
+        while let Some(work) = steps.step(backend)? {
+            done += work;
+            if !progress(done / total) {
+                return Err(RenderError::Cancelled);
             }
-            first += count;
         }
         output(backend.film()?)?;
     }
     Ok(())
 }
 
+/// The calls that render a film, one after the other: all pixels get a few samples before any gets more.
+#[derive(Clone, Debug)]
+pub struct Steps {
+    cut: Cut,
+    pace: Pace,
+    region: Region,
+    samples: u32,
+    /// The samples that are being added.
+    pass: Range<u32>,
+    /// The first row that does not have them.
+    y: u32,
+}
+
+impl Steps {
+    /// No work yet. A call aims to take `call`.
+    pub fn new(cut: &Cut, call: Duration) -> Steps {
+        Steps {
+            cut: *cut,
+            pace: Pace {
+                call,
+                speed: None,
+                speed_of_all: 0.0,
+            },
+            region: Region::whole(0, 0),
+            samples: 0,
+            pass: 0..0,
+            y: 0,
+        }
+    }
+
+    /// Starts a film, at the pace learnt so far.
+    pub fn start(&mut self, region: Region, samples: u32) {
+        self.region = region;
+        self.samples = samples;
+        self.pace.start_film();
+        self.begin_pass(0);
+    }
+
+    /// Forgets the pace: other work comes.
+    pub fn forget_pace(&mut self) {
+        self.pace.speed = None;
+    }
+
+    /// Makes the next call, and returns how many samples of pixels it was; `None` once the film has them all.
+    pub fn step(&mut self, backend: &mut dyn Backend) -> Result<Option<f64>, RenderError> {
+        if self.is_done() {
+            return Ok(None);
+        }
+        let count = self.pass.len() as u32;
+        let rows = self
+            .cut
+            .rows_per_call
+            .unwrap_or_else(|| self.pace.rows(self.region, count));
+        let tile = Region {
+            y0: self.y,
+            y1: self.y + rows.min(self.region.y1 - self.y),
+            ..self.region
+        };
+        let start = Instant::now();
+        backend.render(tile, self.pass.clone())?;
+        let work = tile.pixels() as f64 * f64::from(count);
+        let of_all = self.pass.end <= backend.samples_of_all();
+        self.pace.took(work, start.elapsed(), of_all);
+        self.y = tile.y1;
+        if self.y >= self.region.y1 {
+            self.begin_pass(self.pass.end);
+        }
+        Ok(Some(work))
+    }
+
+    /// Whether every pixel has all its samples.
+    pub fn is_done(&self) -> bool {
+        self.pass.is_empty()
+    }
+
+    /// The samples that every pixel has.
+    pub fn samples(&self) -> u32 {
+        self.pass.start
+    }
+
+    /// The samples that the pixels of a row have.
+    pub fn samples_of_row(&self, y: u32) -> u32 {
+        if y < self.y { self.pass.end } else { self.pass.start }
+    }
+
+    /// Samples of pixels per second, once a call has been made.
+    pub fn speed(&self) -> Option<f64> {
+        self.pace.speed
+    }
+
+    fn begin_pass(&mut self, first: u32) {
+        let count = self
+            .cut
+            .samples_per_call
+            .unwrap_or_else(|| self.pace.samples(self.region));
+        self.pass = first..first + count.min(self.samples - first);
+        self.y = self.region.y0;
+    }
+}
+
 /// How fast work goes, learnt from the calls so far.
-#[derive(Default)]
+#[derive(Clone, Debug)]
 struct Pace {
+    /// How long a call should take.
+    call: Duration,
     /// Samples of pixels per second.
     speed: Option<f64>,
     /// The same where no pixel leaves samples out.
@@ -151,9 +230,15 @@ impl Pace {
         self.speed = Some(speed.min(Self::MOST_LEFT_OUT * self.speed_of_all));
     }
 
+    /// No pixel of a new film leaves samples out at first.
+    fn start_film(&mut self) {
+        self.speed = self.speed.map(|speed| speed.min(self.speed_of_all));
+    }
+
     /// Pixel samples that fit a call.
     fn work(&self) -> f64 {
-        self.speed.map_or(Self::FIRST_CALL, |speed| speed * CALL.as_secs_f64())
+        self.speed
+            .map_or(Self::FIRST_CALL, |speed| speed * self.call.as_secs_f64())
     }
 
     fn samples(&self, band: Region) -> u32 {

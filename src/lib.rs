@@ -1,6 +1,8 @@
 //! A ray tracer written as WGSL compute shaders on wgpu, with a CPU twin that computes the same bits.
 
 pub mod cpu;
+#[cfg(feature = "dev")]
+pub mod dev;
 pub mod error;
 pub mod film;
 pub mod gpu;

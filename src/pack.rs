@@ -459,7 +459,7 @@ pub fn pack(scene: &Scene) -> Packed {
     };
     let primitives: Vec<Primitive> = order.into_iter().map(|(primitive, _)| primitive).collect();
     Packed {
-        camera: pack_camera(scene),
+        camera: pack_camera(&scene.camera, scene.width, scene.height, scene.render.seed),
         environment: Environment {
             ambient: scene.render.ambient.as_vec3(),
             shadow_epsilon: scene.render.shadow_epsilon as f32,
@@ -504,9 +504,9 @@ fn side(samples: Samples) -> u32 {
     }
 }
 
-fn pack_camera(scene: &Scene) -> Camera {
-    let camera = &scene.camera;
-    let aspect = f64::from(scene.width) / f64::from(scene.height);
+/// A camera for a picture of `width` x `height` pixels.
+pub fn pack_camera(camera: &scene::Camera, width: u32, height: u32, seed: u32) -> Camera {
+    let aspect = f64::from(width) / f64::from(height);
     let (projection, half_height) = match camera.projection {
         Projection::Perspective { fov } => (PERSPECTIVE, (fov / 2.0).tan()),
         Projection::Orthographic { height } => (ORTHOGRAPHIC, height / 2.0),
@@ -515,11 +515,11 @@ fn pack_camera(scene: &Scene) -> Camera {
         position: camera.position.as_vec3(),
         projection,
         right: (camera.right * half_height * aspect).as_vec3(),
-        width: scene.width,
+        width,
         up: (camera.up * half_height).as_vec3(),
-        height: scene.height,
+        height,
         forward: camera.forward.as_vec3(),
-        seed: scene.render.seed,
+        seed,
     }
 }
 

@@ -75,9 +75,13 @@ pub fn judge(known: Option<&Known>, what: &str, share: f64) -> Result<(), String
     match known {
         None if share == 0.0 => Ok(()),
         None => Err(format!("{what}: {:.4} % of the results differ", share * 100.0)),
-        Some(k) if share == 0.0 => Err(format!("{what}: nothing differs any more, so its entry must go: {k:?}")),
+        Some(k) if share == 0.0 => Err(format!(
+            "{what}: nothing differs any more, its entry must go: {}",
+            k.reason
+        )),
         Some(k) if share > k.share => Err(format!(
-            "{what}: {share} of the results differ, more than is known: {k:?}"
+            "{what}: {share} of the results differ, not by {} alone",
+            k.reason
         )),
         Some(_) => Ok(()),
     }

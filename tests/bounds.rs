@@ -202,6 +202,13 @@ fn functions_have_their_exact_answers() {
         ("max", &[1.0, 2.0], 2.0),
         ("min", &[0.0, -0.0], -0.0), // the second, as neither is less
         ("max", &[f32::NAN, 0.0], 0.0),
+        ("positive_zero", &[-0.0], 0.0),
+        ("positive_zero", &[-1.5], -1.5),
+        ("floor", &[-1.5], -2.0),
+        ("floor", &[1.5], 1.0),
+        ("floor", &[-3.0], -3.0),
+        ("floor", &[1e30], 1e30),
+        ("unit_float", &[f32::from_bits(u32::MAX)], 1.0 - f32::EPSILON / 2.0),
         ("dot", &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], 32.0),
         ("cross", &[1.0, 2.0, 3.0, 4.0, 6.0, 8.0], -2.0),
     ];
@@ -217,6 +224,17 @@ fn functions_have_their_exact_answers() {
                 "{name}{arguments:?}"
             );
         }
+    }
+}
+
+/// Two values of the paper's hash, computed from its listing in Python.
+#[test]
+fn the_hash_is_pcg4d() {
+    for (key, expected) in [
+        ([0, 0, 0, 0], [251_852_841, 760_645_481, 850_445_371, 3_542_436_074]),
+        ([1, 2, 3, 4], [908_250_390, 4_044_648_920, 3_775_961_919, 45_698_095]),
+    ] {
+        assert_eq!(twin("hash4").results(&key, 4), expected);
     }
 }
 

@@ -442,11 +442,11 @@ fn whole(function: &str, name: &str, random: &Random) -> u32 {
         "kind" | "pattern" | "wrap" | "format" => random.below(8),
         "size" => 1 + random.pick(&[random.below(20), random.below(16_384)]),
         "level" => random.below(15),
+        "bins" => 1 + random.below(512),
         "count" => 1 + random.below(256),
         "i" if function == "block_sample" => random.below(32),
         "exponent_bits" => random.below(14),
         "bits" if function == "power_whole" => random.below(14),
-        "bins" => 1 + random.below(256),
         "side" => 1 + random.below(16),
         _ => random.pick(&[
             0,

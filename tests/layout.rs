@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use naga::{Expression, Literal, Module, TypeInner};
 use syn::{BinOp, Expr, Item, Lit, UnOp, Visibility};
-use wgray::gpu::compose::{Kernel, Source};
+use wgray::gpu::compose::Source;
 use wgray::pack::Specialization;
 
 use crate::sources::{self, Signature, file_of, parse, shared_source};
@@ -322,7 +322,7 @@ fn override_differences(source: &Source, given: &[&str]) -> Vec<String> {
 fn overrides_are_the_fields_of_the_specialization() {
     let constants = Specialization::default().constants();
     let names: Vec<&str> = constants.iter().map(|(name, _)| *name).collect();
-    for kernel in [Kernel::Render, Kernel::Adaptive, Kernel::Aov] {
+    for kernel in sources::KERNELS {
         let source = sources::shaders().compose(kernel, None);
         assert_eq!(override_differences(&source, &names), Vec::<String>::new());
         // negative controls

@@ -178,6 +178,13 @@ probes! {
     vector_to_world(q: &Primitive, v: Vec3) -> Vec3;
     local_tangents(q: &Primitive, local: Vec3) -> Tangents;
     mapped_normal(q: &Primitive, local: Vec3, surface: Surface, t: &Texture, n: Vec3) -> Vec3;
+    filter_bin(u: f32, bins: u32) -> u32;
+    filter_offset(u: f32, bin: u32, bins: u32, low: f32, high: f32) -> f32;
+    moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
+    mean_of(sum: Vec4) -> Vec3;
+    variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3;
+    display_variance(sum: Vec4, moments: Vec4) -> f32;
+    display_slope_squared(value: f32) -> f32;
 }
 
 /// Shared functions that are not probed, and why.

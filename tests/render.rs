@@ -8,7 +8,7 @@ use wgray::film::{Film, Region};
 use wgray::gpu::{Gpu, Options};
 use wgray::job::{Backend, Cut};
 use wgray::pack::{FirstHit, Packed};
-use wgray::scene::Description;
+use wgray::scene::{Description, Pattern};
 
 use crate::adapter::{self, KNOWN, allowed, bit_exact, judge};
 use crate::pictures::{Way, backend, crop, differing, film, first_hits, reference, render, whole};
@@ -74,9 +74,7 @@ pub fn compare_hits(gpu: &[FirstHit], cpu: &[FirstHit]) -> Result<(), String> {
 }
 
 /// A scene with another size, seed and samples.
-fn with(description: &Description, size: (u32, u32), seed: u32, pattern: usize, counts: (u32, u32)) -> Description {
-    let all = patterns::all();
-    let pattern = all[pattern % all.len()].1;
+fn with(description: &Description, size: (u32, u32), seed: u32, pattern: Pattern, counts: (u32, u32)) -> Description {
     let mut d = description.clone();
     (d.image.width, d.image.height) = size;
     d.render.seed = seed;
@@ -106,11 +104,9 @@ fn variations() -> Vec<(String, Packed)> {
             [(1, 1), (9, 4), (2, 36), (4, 100)][i % 4],
         );
         let seed = [0, 1, u32::MAX][i % 3];
-        let name = format!(
-            "{name}, pattern {}, seed {seed}, {size:?}, {counts:?} samples",
-            patterns[i % patterns.len()].0
-        );
-        (name, scenes::packed(&with(d, size, seed, i, counts)))
+        let (pattern_name, pattern) = &patterns[i % patterns.len()];
+        let name = format!("{name}, {pattern_name}, seed {seed}, {size:?}, {counts:?} samples");
+        (name, scenes::packed(&with(d, size, seed, *pattern, counts)))
     };
     (0..scenes.len().max(patterns.len())).map(vary).collect()
 }
@@ -247,7 +243,7 @@ fn tile(x0: u32, y0: u32, x1: u32, y1: u32) -> Region {
 #[test]
 fn pictures_do_not_depend_on_how_the_work_is_cut() {
     let description = scenes::scene("lights.toml");
-    for pattern in 0..2 {
+    for pattern in [Pattern::Grid, Pattern::Random] {
         let packed = scenes::packed(&with(&description, (45, 37), 3, pattern, (9, 4)));
         let expected = reference(&packed);
         for way in exact_ways() {
@@ -305,7 +301,13 @@ fn pictures_do_not_depend_on_how_the_work_is_cut() {
 
 #[test]
 fn a_crop_is_a_part_of_the_whole() {
-    let packed = scenes::packed(&with(&scenes::scene("ellipsoids.toml"), (67, 41), 3, 1, (4, 4)));
+    let packed = scenes::packed(&with(
+        &scenes::scene("ellipsoids.toml"),
+        (67, 41),
+        3,
+        Pattern::Random,
+        (4, 4),
+    ));
     let expected = reference(&packed);
     for way in exact_ways() {
         let mut backend = backend(&packed, way);
@@ -333,7 +335,7 @@ fn a_crop_is_a_part_of_the_whole() {
 #[test]
 fn pictures_do_not_depend_on_the_number_of_threads() {
     let description = scenes::scene("cornell.toml");
-    let packed = scenes::packed(&with(&description, (70, 31), 3, 1, (3, 4)));
+    let packed = scenes::packed(&with(&description, (70, 31), 3, Pattern::Random, (3, 4)));
     let expected = reference(&packed);
     for threads in [1, 2, 3, 7] {
         let pool = rayon::ThreadPoolBuilder::new()
@@ -347,6 +349,12 @@ fn pictures_do_not_depend_on_the_number_of_threads() {
         );
     }
     // The same samples with another seed are another picture.
-    let other = reference(&scenes::packed(&with(&description, (70, 31), 4, 1, (3, 4))));
+    let other = reference(&scenes::packed(&with(
+        &description,
+        (70, 31),
+        4,
+        Pattern::Random,
+        (3, 4),
+    )));
     assert!(differing(&other, &expected) > 0, "the comparison cannot fail");
 }

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use naga::{ArraySize, Module, ScalarKind, TypeInner};
 use syn::{FnArg, Item, Pat, ReturnType, Type};
-use wgray::gpu::compose::{SHARED, Shaders, Source};
+use wgray::gpu::compose::{Kernel, SHARED, Shaders, Source};
 
 /// A folder of shaders to test in place of the ones in the program: what `scripts/mutate` has changed.
 const SHADERS: &str = "WGRAY_TEST_SHADERS";
@@ -240,4 +240,19 @@ pub fn differences(place: &str, wgsl: &[Signature], rust: &[Signature]) -> Vec<S
         problems.push(format!("{place}: the order differs"));
     }
     problems
+}
+
+/// Every kernel.
+pub const KERNELS: [Kernel; 3] = [Kernel::Render, Kernel::Adaptive, Kernel::Aov];
+
+#[test]
+fn every_kernel_is_tested() {
+    for (file, text) in wgray::gpu::compose::BUILT_IN {
+        if file.starts_with("kernels/") {
+            let known = KERNELS
+                .iter()
+                .any(|kernel| shaders().compose(*kernel, None).text.contains(text));
+            assert!(known, "{file} is no kernel of tests/sources.rs");
+        }
+    }
 }

@@ -1,6 +1,8 @@
 //! The command line: arguments, messages and exit codes. One file a subcommand.
 
 mod check;
+#[cfg(feature = "dev")]
+mod dev;
 mod devices;
 mod progress;
 mod render;
@@ -32,6 +34,9 @@ enum Command {
     Check(check::Args),
     /// Lists the adapters that pictures can be rendered on, and which one "auto" chooses
     Devices,
+    /// Shows a scene on a web page, and shows it anew whenever the scene file or a shader is saved
+    #[cfg(feature = "dev")]
+    Dev(dev::Args),
 }
 
 /// A command line that can be read but makes no sense.
@@ -46,12 +51,16 @@ pub fn main() -> ExitCode {
     let threads = match &cli.command {
         Command::Render(args) => args.threads,
         Command::Check(_) | Command::Devices => None,
+        #[cfg(feature = "dev")]
+        Command::Dev(_) => None,
     };
     prepare_environment(threads);
     let result = match cli.command {
         Command::Render(args) => render::run(*args, start),
         Command::Check(args) => check::run(&args),
         Command::Devices => devices::run(),
+        #[cfg(feature = "dev")]
+        Command::Dev(args) => dev::run(args),
     };
     match result {
         Ok(code) => code,

@@ -116,7 +116,7 @@ fn aov_parser() -> impl clap::builder::TypedValueParser<Value = Aov> {
     })
 }
 
-fn parse_size(text: &str) -> Result<(u32, u32), String> {
+pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let numbers = text
         .split_once('x')
         .map(|(width, height)| (width.parse(), height.parse()));

@@ -223,7 +223,8 @@ pub fn pixel_corners(scene: &Packed, pixel: UVec2) -> Vec4 {
 
 pub fn is_done(scene: &Packed, sum: Vec4, moments: Vec4, sample: u32) -> bool {
     let s = &scene.specialization;
-    let stopped = moments.w != sample as f32;
+    // not !=, which naga makes false where there is no number
+    let stopped = !(moments.w == sample as f32);
     let round_ends = sample.is_multiple_of(s.pixel_samples) & (sample > 0);
     stopped | (round_ends & (display_variance(sum, moments) <= f32::from_bits(s.squared_error)))
 }

@@ -26,6 +26,11 @@ impl<'a> Cpu<'a> {
             film: Film::new(Region::whole(0, 0)),
         }
     }
+
+    /// A renderer that goes on with a film.
+    pub fn resume(scene: &'a Packed, film: Film) -> Cpu<'a> {
+        Cpu { scene, film }
+    }
 }
 
 /// Pixels of a row that one thread takes at a time.

@@ -161,6 +161,12 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
 }
 
 impl Device {
+    /// Gives the device up: whatever uses it from now on fails, as when a driver loses it.
+    #[cfg(test)]
+    pub(crate) fn destroy(&self) {
+        self.device.destroy();
+    }
+
     /// What wgpu calls it, for kernels other than the renderer's.
     pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
         (&self.device, &self.queue)

@@ -13,7 +13,7 @@ use super::pipeline::{WORKGROUP, bind_group_layout, pipeline};
 use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::job::Backend;
-use crate::pack::{FirstHit, Packed, Specialization, Work};
+use crate::pack::{Camera, FirstHit, Packed, Specialization, Work};
 
 /// How a scene is put on a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,19 +78,7 @@ impl Gpu {
             true => kernels.compile(device, Kernel::Adaptive)?,
             false => kernels.compile(device, Kernel::Render)?,
         };
-        let scene = device.checked(|| {
-            [
-                device.upload(BufferUsages::UNIFORM, &[packed.camera]),
-                device.upload(BufferUsages::UNIFORM, &[packed.environment]),
-                device.upload(BufferUsages::STORAGE, &packed.primitives),
-                device.upload(BufferUsages::STORAGE, &packed.bounds),
-                device.upload(BufferUsages::STORAGE, &packed.materials),
-                device.upload(BufferUsages::STORAGE, &packed.lights),
-                device.upload(BufferUsages::STORAGE, &packed.textures),
-                device.upload(BufferUsages::STORAGE, &packed.texels),
-                device.upload(BufferUsages::STORAGE, &packed.filter_table),
-            ]
-        })?;
+        let scene = upload(device, packed)?;
         let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         let mut gpu = Gpu {
             device: device.clone(),
@@ -111,6 +99,29 @@ impl Gpu {
         gpu.begin(nothing)?;
         gpu.render(nothing, 0..0)?;
         Ok(gpu)
+    }
+
+    /// The device that it is on.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// Uploads a changed scene that needs no other kernel. Returns whether it does not; if it does, nothing is done.
+    /// The film is lost.
+    pub fn update(&mut self, packed: &Packed) -> Result<bool, RenderError> {
+        let same_kernel = self.kernels.baked.is_none()
+            && (self.kernels.constants, self.adaptive) == (packed.specialization, packed.adaptive);
+        if same_kernel {
+            self.film = None;
+            self.scene = upload(&self.device, packed)?;
+        }
+        Ok(same_kernel)
+    }
+
+    /// Changes the camera. Whoever does so starts a new film.
+    pub fn set_camera(&mut self, camera: &Camera) -> Result<(), RenderError> {
+        self.device
+            .checked(|| self.device.queue.write_buffer(&self.scene[0], 0, bytes_of(camera)))
     }
 
     fn target<T: Pod>(&self, region: Region) -> Result<Target, RenderError> {
@@ -236,6 +247,23 @@ impl Backend for Gpu {
         let info = &self.device.info;
         info.largest_binding.min(info.largest_buffer) / size_of::<FirstHit>() as u64
     }
+}
+
+/// The buffers of a scene, in the order of their bindings.
+fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 9], RenderError> {
+    device.checked(|| {
+        [
+            device.upload(BufferUsages::UNIFORM | BufferUsages::COPY_DST, &[packed.camera]),
+            device.upload(BufferUsages::UNIFORM, &[packed.environment]),
+            device.upload(BufferUsages::STORAGE, &packed.primitives),
+            device.upload(BufferUsages::STORAGE, &packed.bounds),
+            device.upload(BufferUsages::STORAGE, &packed.materials),
+            device.upload(BufferUsages::STORAGE, &packed.lights),
+            device.upload(BufferUsages::STORAGE, &packed.textures),
+            device.upload(BufferUsages::STORAGE, &packed.texels),
+            device.upload(BufferUsages::STORAGE, &packed.filter_table),
+        ]
+    })
 }
 
 impl Kernels {

@@ -126,7 +126,8 @@ impl Aov {
         }
     }
 
-    fn color_of_hit(self, hit: &FirstHit, middle_depth: f32) -> Vec3 {
+    /// The same of a first hit; for values of the film it is that of [`Aov::Primitive`].
+    pub(crate) fn color_of_hit(self, hit: &FirstHit, middle_depth: f32) -> Vec3 {
         if hit.shape == NOTHING {
             return Vec3::ZERO;
         }

@@ -17,7 +17,7 @@ pub enum Color {
 /// A texture in tangent space that gives normals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalMap {
-    /// Index into [`Scene::textures`](super::Scene::textures) of a [`Pattern::Image`] with linear texels.
+    /// Index into [`Scene::textures`](super::Scene::textures) of a [`TexturePattern::Image`] with linear texels.
     pub texture: usize,
     /// Factor of the slopes.
     pub strength: f64,

@@ -76,6 +76,17 @@ impl Description {
     }
 }
 
+impl CameraDescription {
+    /// Checks a camera by itself.
+    ///
+    /// # Errors
+    ///
+    /// The first value that breaks a rule.
+    pub fn validate(&self) -> Result<Camera, Problem> {
+        camera(self)
+    }
+}
+
 fn each<D, T>(descriptions: &[D], check: impl Fn(&D) -> Checked<T>) -> Checked<Vec<T>> {
     let descriptions = descriptions.iter().enumerate();
     descriptions.map(|(i, description)| check(description).at(i)).collect()

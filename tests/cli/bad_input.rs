@@ -15,7 +15,7 @@ fn assert_failed(place: &Place, ran: &Ran, code: i32, message: &str) {
 #[test]
 fn wrong_command_lines_exit_with_2() {
     let place = Place::new();
-    let cases: [(&[&str], &str); 26] = [
+    let cases: [(&[&str], &str); 30] = [
         (&["--size", "64"], "--size"),
         (&["--size", "64x"], "--size"),
         (&["--size", "0x64"], "--size: 0 must be from 1 to 65536"),

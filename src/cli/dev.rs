@@ -1,0 +1,274 @@
+//! `wgray dev`: a scene that is rendered anew as it and its shaders are saved, on a page.
+
+use std::io::{self, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, SystemTime};
+
+use anyhow::anyhow;
+use clap::builder::NonEmptyStringValueParser;
+use wgray::dev::{Diagnostic, Listener, Report, Session, Settings, Sources, StartError, measure};
+use wgray::gpu::Choice;
+use wgray::scene::{Overrides, SceneError};
+
+use super::Usage;
+use super::render::parse_size;
+
+/// The arguments as they are written.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Scene file; docs/scene-format.md says what is in it
+    scene: PathBuf,
+
+    /// Where the page is. Who can reach this address can look, and can save the camera into the scene file
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7878", value_parser = NonEmptyStringValueParser::new())]
+    listen: String,
+
+    /// Folder of the shaders, with the files of the project's own. If absent: ./shaders if it is such a folder, else the
+    /// shaders in the program, which cannot change
+    #[arg(long, value_name = "DIR")]
+    shaders: Option<PathBuf>,
+
+    /// What renders. auto or gpu: a real GPU, else software Vulkan; NAME: the adapter with this as a part of its name,
+    /// driver or type
+    #[arg(long, value_name = "auto|gpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
+    device: String,
+
+    /// Size of the picture in pixels, in place of the scene's
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(u32, u32)>,
+
+    /// Folder that the files named by the scene, such as textures, must lie in, instead of the scene's own
+    #[arg(long, value_name = "DIR")]
+    asset_root: Option<PathBuf>,
+
+    /// Picture to write after each reload, once every pixel has a sample and again when all are there
+    #[arg(short, long, value_name = "FILE.png")]
+    out: Option<PathBuf>,
+
+    /// No page: what is seen is the file of --out
+    #[arg(long, conflicts_with = "listen")]
+    no_page: bool,
+
+    /// Measures the time from a save to the picture, on copies of the files, and prints it
+    #[arg(long, conflicts_with_all = ["listen", "out", "no_page"])]
+    measure: bool,
+}
+
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let sources = Sources {
+        scene: args.scene,
+        overrides: Overrides {
+            size: args.size,
+            asset_root: args.asset_root,
+            ..Overrides::default()
+        },
+        shaders: shaders(args.shaders)?,
+    };
+    let device = match args.device.as_str() {
+        "auto" => Choice::Auto,
+        "gpu" => Choice::Gpu,
+        "cpu" => {
+            return Err(Usage("--device: cpu runs no shaders; dev needs a GPU or software Vulkan".to_string()).into());
+        }
+        name => Choice::Named(name.to_string()),
+    };
+    if args.measure {
+        return measured(&sources, device);
+    }
+    if args.no_page && args.out.is_none() {
+        return Err(Usage("--no-page: --out FILE.png must say where the picture goes".to_string()).into());
+    }
+    if let Some(out) = args
+        .out
+        .as_ref()
+        .filter(|out| !out.extension().is_some_and(|end| end.eq_ignore_ascii_case("png")))
+    {
+        return Err(Usage(format!("--out: {}: must end in .png", out.display())).into());
+    }
+    let listener = if args.no_page {
+        None
+    } else {
+        Some(Listener::open(&args.listen).map_err(|error| anyhow!("--listen: {error}"))?)
+    };
+    let terminal = Terminal::new();
+    let what = format!("{}: watched", watched(&sources));
+    let session = Session::start(Settings {
+        sources,
+        device,
+        out: args.out.clone(),
+        report: Box::new(move |report| terminal.report(&report)),
+    })
+    .map_err(|error| match error {
+        StartError::Device(error) => anyhow::Error::from(error),
+        StartError::NoScene(path, error) => SceneError::Read { path, error }.into(),
+        error => anyhow::Error::from(error),
+    })?;
+    terminal.line("", &what);
+    let Some(listener) = listener else {
+        Terminal::new().line("", &format!("{}: the picture", args.out.unwrap_or_default().display()));
+        loop {
+            std::thread::park(); // until the user interrupts
+        }
+    };
+    let address = listener.address()?;
+    Terminal::new().line("", &format!("http://{address}/: the page; Ctrl+C ends"));
+    if !address.ip().is_loopback() {
+        eprintln!(
+            "warning: {address} is no loopback address: everybody who can reach it can look, and can save the camera \
+             into the scene file"
+        );
+    }
+    listener.serve(&session)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The folder of the shaders, if they are not those in the program.
+fn shaders(told: Option<PathBuf>) -> anyhow::Result<Option<PathBuf>> {
+    match told {
+        Some(folder) if folder.is_dir() => Ok(Some(folder)),
+        Some(folder) => Err(Usage(format!("--shaders: {}: is no folder", folder.display())).into()),
+        None => Ok(Some(PathBuf::from("shaders")).filter(|folder| folder.join("kernels/render.wgsl").is_file())),
+    }
+}
+
+fn watched(sources: &Sources) -> String {
+    let scene = sources.scene.display();
+    match &sources.shaders {
+        Some(folder) => format!("{scene} and {}", folder.join("").display()),
+        None => format!("{scene}, with the shaders in the program"),
+    }
+}
+
+/// What happens, line by line on standard error.
+#[derive(Clone, Copy)]
+struct Terminal {
+    colored: bool,
+}
+
+const RED: &str = "31";
+const GREEN: &str = "32";
+const BOLD: &str = "1";
+
+impl Terminal {
+    fn new() -> Terminal {
+        let wanted = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+        Terminal {
+            colored: wanted && io::stderr().is_terminal(),
+        }
+    }
+
+    fn report(self, report: &Report) {
+        match report {
+            Report::Problem(problem) => self.problem(problem),
+            Report::Mended => self.line(GREEN, "no errors any more"),
+            Report::Reloaded {
+                seconds,
+                compiled: None,
+            } => self.line("", &format!("picture after {}", time(*seconds))),
+            Report::Reloaded {
+                seconds,
+                compiled: Some(compiled),
+            } => {
+                self.line(
+                    "",
+                    &format!("picture after {}, {} of it to compile", time(*seconds), time(*compiled)),
+                );
+            }
+            Report::Finished { seconds } => self.line("", &format!("all samples after another {}", time(*seconds))),
+            Report::Saved(Ok(())) => self.line(GREEN, "camera saved into the scene file"),
+            Report::Saved(Err(error)) => self.line(RED, &format!("camera not saved: {error}")),
+        }
+    }
+
+    fn problem(self, problem: &Diagnostic) {
+        let place = problem
+            .place
+            .as_ref()
+            .map(|place| format!("{place}: "))
+            .unwrap_or_default();
+        let head = format!(
+            "{} {}",
+            self.painted(RED, "error:"),
+            self.painted(BOLD, &format!("{place}{}", problem.message))
+        );
+        let excerpt = problem
+            .excerpt
+            .as_ref()
+            .map(|excerpt| self.marked(excerpt))
+            .unwrap_or_default();
+        say(&format!("{} {head}\n{excerpt}", clock()));
+    }
+
+    /// An excerpt with its marks in red.
+    fn marked(self, excerpt: &str) -> String {
+        let lines = excerpt.lines().map(|line| match line.find('^') {
+            Some(at) if !line.starts_with(char::is_numeric) => {
+                format!("{}{}\n", &line[..at], self.painted(RED, &line[at..]))
+            }
+            _ => format!("{line}\n"),
+        });
+        lines.collect()
+    }
+
+    fn line(self, color: &str, text: &str) {
+        say(&format!("{} {}\n", clock(), self.painted(color, text)));
+    }
+
+    fn painted(self, color: &str, text: &str) -> String {
+        if self.colored && !color.is_empty() {
+            format!("\x1b[{color}m{text}\x1b[0m")
+        } else {
+            text.to_string()
+        }
+    }
+}
+
+fn say(text: &str) {
+    let _ = io::stderr().lock().write_all(text.as_bytes()); // where this cannot be written there is nobody to tell
+}
+
+/// The time of day in UTC: what tells one reload from the next.
+fn clock() -> String {
+    let since = SystemTime::now()
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .unwrap_or_default()
+        .as_secs();
+    format!("{:02}:{:02}:{:02}", since / 3600 % 24, since / 60 % 60, since % 60)
+}
+
+fn time(seconds: f64) -> String {
+    if seconds < 1.0 {
+        format!("{:.0} ms", seconds * 1000.0)
+    } else {
+        format!("{seconds:.2} s")
+    }
+}
+
+fn measured(sources: &Sources, device: Choice) -> anyhow::Result<ExitCode> {
+    let all = measure(sources, device).map_err(|error| anyhow!(error))?;
+    let mut out = io::stdout().lock();
+    writeln!(
+        out,
+        "{}: milliseconds, median and worst",
+        Path::new(&sources.scene).display()
+    )?;
+    writeln!(
+        out,
+        "{:<14}{:>16}{:>18}{:>22}",
+        "change", "old one stopped", "first picture", "every pixel sampled"
+    )?;
+    for row in all {
+        let cells = [row.stopped, row.first, row.whole].map(|mut times| {
+            times.sort();
+            let millis = |time: Option<&Duration>| time.map_or(0, |time| time.as_millis());
+            format!("{} {:>6}", millis(times.get(times.len() / 2)), millis(times.last()))
+        });
+        writeln!(
+            out,
+            "{:<14}{:>16}{:>18}{:>22}",
+            row.change, cells[0], cells[1], cells[2]
+        )?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,133 @@
+//! Making a scene ready on a device, on a thread of its own: a driver's compiler cannot be interrupted, and whoever looks
+//! at the picture must not wait for it.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use crate::error::{RenderError, ShaderError};
+use crate::gpu::compose::Shaders;
+use crate::gpu::{Choice, Device, Gpu, Options, choose};
+use crate::pack::Packed;
+
+/// What is to be made.
+pub struct Request {
+    /// Given back with the result, so that a late one is known as such.
+    pub id: u64,
+    /// The device; a new one is opened if there is none.
+    pub device: Option<Device>,
+    /// The scene.
+    pub packed: Packed,
+    /// The shaders.
+    pub shaders: Arc<Shaders>,
+    /// Shaders that are known to be right, to be used if those are wrong.
+    pub fallback: Option<Arc<Shaders>>,
+}
+
+/// What was made of a request.
+pub struct Built {
+    /// The request's.
+    pub id: u64,
+    /// The scene on a device, and the shaders that it has.
+    pub result: Result<(Box<Gpu>, Arc<Shaders>), RenderError>,
+    /// What is wrong with the request's shaders.
+    pub refused: Option<ShaderError>,
+    /// How long it took to compile.
+    pub took: Duration,
+}
+
+/// The thread; it ends when this is dropped, after what it is doing.
+pub struct Builder {
+    requests: Option<Sender<Request>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Builder {
+    /// Starts the thread. It gives `done` its results, except those of requests that a newer one has overtaken.
+    pub fn start(choice: Choice, done: impl Fn(Built) + Send + 'static) -> std::io::Result<Builder> {
+        let (sender, receiver) = channel();
+        let thread = std::thread::Builder::new()
+            .name("build".to_string())
+            .spawn(move || run(&choice, &receiver, done))?;
+        Ok(Builder {
+            requests: Some(sender),
+            thread: Some(thread),
+        })
+    }
+
+    /// Asks for something; what was asked for earlier and has not begun is dropped.
+    pub fn request(&self, request: Request) {
+        if let Some(requests) = &self.requests {
+            let _ = requests.send(request); // the thread lives as long as this
+        }
+    }
+}
+
+impl Drop for Builder {
+    fn drop(&mut self) {
+        self.requests = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn run(choice: &Choice, requests: &Receiver<Request>, done: impl Fn(Built)) {
+    while let Ok(mut request) = requests.recv() {
+        while let Ok(newer) = requests.try_recv() {
+            request = newer;
+        }
+        done(build(choice, request));
+    }
+}
+
+fn build(choice: &Choice, request: Request) -> Built {
+    let Request {
+        id,
+        device,
+        packed,
+        shaders,
+        fallback,
+    } = request;
+    let start = Instant::now();
+    let mut refused = None;
+    let result = guarded(|| {
+        let device = device.map_or_else(|| choose(choice), Ok)?;
+        // In buffers: a change of the scene then needs no compiler.
+        let options = Options {
+            baked: false,
+            ..Options::best(&device)
+        };
+        match (Gpu::new(&device, &packed, &shaders, options), &fallback) {
+            (Ok(gpu), _) => Ok((Box::new(gpu), shaders)),
+            (Err(RenderError::Shader(error)), Some(fallback)) => {
+                refused = Some(error);
+                Ok((
+                    Box::new(Gpu::new(&device, &packed, fallback, options)?),
+                    fallback.clone(),
+                ))
+            }
+            (Err(error), _) => Err(error),
+        }
+    });
+    Built {
+        id,
+        result,
+        refused,
+        took: start.elapsed(),
+    }
+}
+
+/// Runs what calls a driver. wgpu panics when a device is lost while it waits: that is an error here.
+pub fn guarded<T>(work: impl FnOnce() -> Result<T, RenderError>) -> Result<T, RenderError> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let message = panic.downcast_ref::<String>().map(String::as_str);
+        let message = message.or_else(|| panic.downcast_ref::<&str>().copied());
+        Err(RenderError::Device {
+            device: "device".to_string(),
+            message: message.unwrap_or("lost").to_string(),
+        })
+    })
+}

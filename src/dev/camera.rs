@@ -1,0 +1,225 @@
+//! Moving a camera by hand, and writing it as the text of a scene file.
+
+use glam::{DQuat, DVec3};
+use serde::Deserialize;
+
+use crate::scene::CameraDescription;
+
+/// A change of a camera.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Move {
+    /// Around what it looks at: angles to the right and upwards, in radians, that the scene seems to turn by.
+    Orbit(f64, f64),
+    /// Sideways: how far the scene moves to the right and upwards, in heights of the picture.
+    Pan(f64, f64),
+    /// Towards what it looks at: the logarithm of the factor by which the scene grows.
+    Dolly(f64),
+}
+
+/// The least angle between the view and the vertical, in radians.
+const STEEPEST: f64 = 0.02;
+/// A camera is written with so many digits of its distance: the eye sees no more, and the file stays readable.
+const DIGITS: i32 = 5;
+
+/// The position, what it looks at, and what the height of the picture spans there.
+struct View {
+    position: DVec3,
+    look_at: DVec3,
+    up: DVec3,
+    span: f64,
+}
+
+fn view(camera: &CameraDescription) -> View {
+    match camera {
+        CameraDescription::Perspective(c) => View {
+            position: c.position,
+            look_at: c.look_at,
+            up: c.up,
+            span: 2.0 * (c.fov.to_radians() / 2.0).tan() * c.position.distance(c.look_at),
+        },
+        CameraDescription::Orthographic(c) => View {
+            position: c.position,
+            look_at: c.look_at,
+            up: c.up,
+            span: c.height,
+        },
+    }
+}
+
+/// A camera after a move, or the same if the move would make it invalid.
+pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
+    let mut new = camera.clone();
+    let View {
+        mut position,
+        mut look_at,
+        up,
+        span,
+    } = view(camera);
+    let up = up.normalize();
+    let offset = position - look_at;
+    let right = (-offset).cross(up).normalize();
+    match by {
+        Move::Orbit(x, y) => {
+            let turned = DQuat::from_axis_angle(up, -x) * offset;
+            let right = DQuat::from_axis_angle(up, -x) * right;
+            let angle = turned.angle_between(up);
+            // To look from higher up is to come nearer to the vertical.
+            let new_angle = (angle - y).clamp(STEEPEST, std::f64::consts::PI - STEEPEST);
+            position = look_at + DQuat::from_axis_angle(right, new_angle - angle) * turned;
+        }
+        Move::Pan(x, y) => {
+            let upwards = right.cross(-offset).normalize();
+            let shift = (right * -x + upwards * -y) * span;
+            position += shift;
+            look_at += shift;
+        }
+        Move::Dolly(by) => position = look_at + offset * (-by).exp(),
+    }
+    let scale = position.distance(look_at);
+    match &mut new {
+        CameraDescription::Perspective(c) => {
+            (c.position, c.look_at) = (rounded(position, scale), rounded(look_at, scale));
+        }
+        CameraDescription::Orthographic(c) => {
+            if let Move::Dolly(by) = by {
+                c.height = round(c.height * (-by).exp(), c.height); // going nearer would change nothing
+            } else {
+                (c.position, c.look_at) = (rounded(position, scale), rounded(look_at, scale));
+            }
+        }
+    }
+    if new.validate().is_ok() { new } else { camera.clone() }
+}
+
+fn rounded(point: DVec3, scale: f64) -> DVec3 {
+    DVec3::from(point.to_array().map(|x| round(x, scale)))
+}
+
+/// A number with few decimals: the ones that count for lengths like `scale`.
+fn round(x: f64, scale: f64) -> f64 {
+    let decimals = (DIGITS - scale.log10().floor() as i32).clamp(0, 15) as usize;
+    let x = format!("{x:.decimals$}").parse().unwrap_or(x);
+    if x == 0.0 { 0.0 } else { x } // no -0
+}
+
+/// The keys and values of a camera as a scene file has them, those that a move can change.
+pub fn entries(camera: &CameraDescription) -> Vec<(&'static str, Entry)> {
+    match camera {
+        CameraDescription::Perspective(c) => vec![
+            ("position", Entry::Point(c.position)),
+            ("look_at", Entry::Point(c.look_at)),
+            ("up", Entry::Point(c.up)),
+            ("fov", Entry::Number(c.fov)),
+        ],
+        CameraDescription::Orthographic(c) => vec![
+            ("position", Entry::Point(c.position)),
+            ("look_at", Entry::Point(c.look_at)),
+            ("up", Entry::Point(c.up)),
+            ("height", Entry::Number(c.height)),
+        ],
+    }
+}
+
+/// The value of a key.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Entry {
+    /// One number.
+    Number(f64),
+    /// A list of three.
+    Point(DVec3),
+}
+
+/// A camera as the section of a scene file.
+pub fn text(camera: &CameraDescription) -> String {
+    let kind = match camera {
+        CameraDescription::Perspective(_) => "",
+        CameraDescription::Orthographic(_) => "type = \"orthographic\"\n",
+    };
+    let entries = entries(camera).into_iter().map(|(key, entry)| match entry {
+        Entry::Number(x) => format!("{key} = {x}\n"),
+        Entry::Point(p) => format!("{key} = [{}, {}, {}]\n", p.x, p.y, p.z),
+    });
+    format!("[camera]\n{kind}{}", entries.collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Description;
+
+    fn camera(text: &str) -> CameraDescription {
+        let text = format!("image = {{ width = 4, height = 4 }}\n[camera]\n{text}");
+        Description::parse(&text, "camera").unwrap().camera
+    }
+
+    fn perspective() -> CameraDescription {
+        camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 45")
+    }
+
+    fn orthographic() -> CameraDescription {
+        camera("type = 'orthographic'\nposition = [3, -4, 1]\nlook_at = [0, 0, 1]\nheight = 2")
+    }
+
+    #[test]
+    fn an_orbit_keeps_distance_and_target() {
+        for (x, y) in [(0.3, 0.0), (0.0, 0.5), (-1.0, -0.7), (0.0, 9.0), (0.0, -9.0)] {
+            for camera in [perspective(), orthographic()] {
+                let (old, new) = (view(&camera), view(&moved(&camera, Move::Orbit(x, y))));
+                assert_eq!(old.look_at, new.look_at);
+                let (a, b) = (old.position.distance(old.look_at), new.position.distance(new.look_at));
+                assert!((a - b).abs() < 1e-4 * a, "{x} {y}: {a} {b}");
+                assert_ne!(old.position, new.position);
+            }
+        }
+    }
+
+    #[test]
+    fn the_scene_follows_the_hand() {
+        // Dragged to the right, the camera goes to the left; dragged down, it rises.
+        let right = view(&moved(&perspective(), Move::Orbit(0.1, 0.0))).position;
+        assert!(right.x < -0.3, "{right}");
+        let above = view(&moved(&perspective(), Move::Orbit(0.0, 0.1))).position;
+        assert!(above.z > 1.3, "{above}");
+        let panned = view(&moved(&perspective(), Move::Pan(0.5, 0.25)));
+        let height = 8.0 * 22.5f64.to_radians().tan();
+        assert!(
+            panned
+                .look_at
+                .abs_diff_eq(DVec3::new(-0.5 * height, 0.0, 1.0 - 0.25 * height), 1e-4)
+        );
+        let near = view(&moved(&perspective(), Move::Dolly(2f64.ln()))).position;
+        assert!(near.abs_diff_eq(DVec3::new(0.0, -2.0, 1.0), 1e-4), "{near}");
+        let CameraDescription::Orthographic(near) = moved(&orthographic(), Move::Dolly(2f64.ln())) else {
+            panic!()
+        };
+        assert_eq!(near.height, 1.0);
+    }
+
+    #[test]
+    fn a_camera_stays_valid_and_short() {
+        let mut camera = perspective();
+        for i in 0..1000 {
+            camera = moved(&camera, Move::Orbit(0.37, if i % 5 < 3 { 0.11 } else { -0.09 }));
+            camera = moved(&camera, Move::Dolly(0.5));
+            camera.validate().unwrap();
+        }
+        for by in [Move::Dolly(1e9), Move::Dolly(-1e9), Move::Pan(1e300, 0.0)] {
+            moved(&camera, by).validate().unwrap();
+        }
+        let text = text(&moved(&perspective(), Move::Orbit(0.3, 0.2)));
+        assert_eq!(
+            text,
+            "[camera]\nposition = [-1.15852, -3.74517, 1.79468]\nlook_at = [0, 0, 1]\nup = [0, 0, 1]\nfov = 45\n"
+        );
+    }
+
+    #[test]
+    fn its_text_reads_back_as_the_same_camera() {
+        for camera in [perspective(), orthographic()] {
+            let camera = moved(&camera, Move::Orbit(0.1, 0.2));
+            let text = format!("image = {{ width = 4, height = 4 }}\n{}", text(&camera));
+            assert_eq!(Description::parse(&text, "camera").unwrap().camera, camera);
+        }
+    }
+}

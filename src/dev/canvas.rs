@@ -1,0 +1,336 @@
+//! A picture in the making: coarse at first, then all pixels with few samples, then more. What interrupts it waits for
+//! one call at most.
+
+use std::ops::Range;
+use std::time::Duration;
+
+use crate::cpu::Cpu;
+use crate::error::RenderError;
+use crate::film::{Film, Region};
+use crate::gpu::Gpu;
+use crate::image::{Aov, Pixels};
+use crate::job::{Backend, Cut, Steps};
+use crate::pack::{Camera, FirstHit, Packed};
+
+use super::picture::{Content, View, means};
+
+/// What one call aims to take: a save or a move of the camera waits so long.
+const CALL: Duration = Duration::from_millis(30);
+/// What a coarse picture aims to take.
+const COARSE: Duration = Duration::from_millis(60);
+/// Pixels of a coarse picture as long as nothing is known of the speed.
+const COARSE_PIXELS: f64 = 10_000.0;
+/// The coarsest picture has one pixel for so many along each side.
+const COARSEST: u32 = 32;
+/// First hits that are found in one call.
+const HITS_PER_CALL: u32 = 1 << 17;
+
+/// A scene on a device, seen by a camera.
+pub struct Canvas {
+    gpu: Gpu,
+    /// The scene, with the camera of the stage under way.
+    scene: Packed,
+    /// The camera of the whole picture.
+    camera: Camera,
+    /// Whether the CPU renders the same.
+    compare: bool,
+    stage: Stage,
+    steps: Steps,
+    /// The last coarser picture, by the GPU and by the CPU.
+    under: Option<(Pixels, Option<Pixels>)>,
+    /// What the CPU has of the stage.
+    cpu: Film,
+    /// The first rows' hits.
+    hits: Vec<FirstHit>,
+    shown: bool,
+}
+
+/// Which picture the film is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Stage {
+    /// Pixels of the picture along each side of one of the film.
+    scale: u32,
+    width: u32,
+    height: u32,
+    /// Whether anything of it is rendered.
+    begun: bool,
+}
+
+impl Canvas {
+    /// Starts a picture of a scene that is on the device.
+    pub fn new(gpu: Gpu, scene: Packed, view: View) -> Result<Canvas, RenderError> {
+        let camera = scene.camera;
+        let stage = Stage {
+            scale: 1,
+            width: camera.width,
+            height: camera.height,
+            begun: false,
+        };
+        let mut canvas = Canvas {
+            gpu,
+            scene,
+            camera,
+            compare: false,
+            stage,
+            steps: Steps::new(&Cut::default(), CALL),
+            under: None,
+            cpu: Film::new(Region::whole(0, 0)),
+            hits: Vec::new(),
+            shown: false,
+        };
+        canvas.restart(camera, view)?;
+        Ok(canvas)
+    }
+
+    /// Whether it is this scene that is rendered.
+    pub fn shows(&self, scene: &Packed) -> bool {
+        *scene
+            == Packed {
+                camera: self.camera,
+                ..self.scene.clone()
+            }
+    }
+
+    /// Starts a picture of a changed scene. Returns false, and does nothing, if it takes another kernel.
+    pub fn update(&mut self, scene: &Packed, view: View) -> Result<bool, RenderError> {
+        let same_kernel = self.gpu.update(scene)?;
+        if same_kernel {
+            self.scene = scene.clone();
+            self.restart(scene.camera, view)?;
+        }
+        Ok(same_kernel)
+    }
+
+    /// Starts the picture again, from a camera.
+    pub fn restart(&mut self, camera: Camera, view: View) -> Result<(), RenderError> {
+        self.camera = camera;
+        if self.compare != (view == View::Compare) {
+            self.steps.forget_pace();
+        }
+        self.compare = view == View::Compare;
+        self.under = None;
+        self.hits.clear();
+        self.shown = false;
+        let scale = if view.aov().is_some() { 1 } else { self.first_scale() };
+        self.begin(scale)
+    }
+
+    /// Goes over to another view of the same picture.
+    pub fn change_view(&mut self, view: View) -> Result<(), RenderError> {
+        self.shown = false;
+        let film = view.aov().is_none();
+        let nothing_there = self.stage.scale == 1 && self.steps.samples() == 0;
+        let other_film = self.compare != (view == View::Compare);
+        if film && (other_film || nothing_there) {
+            self.restart(self.camera, view)
+        } else if !film && self.stage.scale > 1 {
+            self.begin(1)
+        } else {
+            Ok(())
+        }
+    }
+
+    fn first_scale(&self) -> u32 {
+        let pixels = f64::from(self.camera.width) * f64::from(self.camera.height);
+        let affordable = self
+            .steps
+            .speed()
+            .map_or(COARSE_PIXELS, |speed| speed * COARSE.as_secs_f64());
+        ((pixels / affordable.max(1.0)).sqrt().ceil() as u32)
+            .next_power_of_two()
+            .min(COARSEST)
+    }
+
+    fn begin(&mut self, scale: u32) -> Result<(), RenderError> {
+        let (width, height) = (self.camera.width.div_ceil(scale), self.camera.height.div_ceil(scale));
+        let region = Region::whole(width, height);
+        if region.pixels() > self.gpu.largest_film() {
+            let device = self.gpu.device().info.name.clone();
+            let most = self.gpu.largest_film();
+            let message = format!("a picture of {width} x {height} pixels is too large here: it can show {most}");
+            return Err(RenderError::Device { device, message });
+        }
+        self.stage = Stage {
+            scale,
+            width,
+            height,
+            begun: false,
+        };
+        self.scene.camera = Camera {
+            width,
+            height,
+            ..self.camera
+        };
+        self.gpu.set_camera(&self.scene.camera)?;
+        self.gpu.begin(region)?;
+        if self.compare {
+            let mut cpu = Cpu::new(&self.scene);
+            cpu.begin(region)?;
+            self.cpu = cpu.film()?;
+        }
+        self.steps
+            .start(region, if scale > 1 { 1 } else { self.scene.pixel_samples });
+        Ok(())
+    }
+
+    /// Whether nothing of the picture has been worth showing yet.
+    pub fn is_new(&self) -> bool {
+        !self.shown
+    }
+
+    /// Whether there is nothing left to do for a view.
+    pub fn is_done(&self, view: View) -> bool {
+        match view.aov() {
+            Some(_) => self.hits.len() as u64 == u64::from(self.camera.width) * u64::from(self.camera.height),
+            None => self.stage.scale == 1 && self.steps.is_done(),
+        }
+    }
+
+    /// Makes one call. Returns whether there is something new that must not wait to be shown.
+    pub fn step(&mut self, view: View) -> Result<bool, RenderError> {
+        let show = match view.aov() {
+            Some(_) => self.step_hits(view)?,
+            None => self.step_film()?,
+        };
+        self.shown |= show;
+        Ok(show)
+    }
+
+    fn step_hits(&mut self, view: View) -> Result<bool, RenderError> {
+        let Camera { width, height, .. } = self.camera;
+        let first = (self.hits.len() / width as usize) as u32;
+        let rows = (HITS_PER_CALL / width).max(1).min(height - first);
+        let strip = Region {
+            y0: first,
+            y1: first + rows,
+            ..Region::whole(width, height)
+        };
+        self.hits.extend(self.gpu.first_hits(strip)?);
+        Ok(self.is_done(view))
+    }
+
+    fn step_film(&mut self) -> Result<bool, RenderError> {
+        let passes = self.steps.samples();
+        if self.compare {
+            let film = std::mem::replace(&mut self.cpu, Film::new(Region::whole(0, 0)));
+            let mut both = Both {
+                gpu: &mut self.gpu,
+                cpu: Cpu::resume(&self.scene, film),
+            };
+            let result = self.steps.step(&mut both);
+            self.cpu = both.cpu.film()?;
+            result?;
+        } else {
+            self.steps.step(&mut self.gpu)?;
+        }
+        self.stage.begun = true;
+        if self.stage.scale > 1 && self.steps.is_done() {
+            let gpu = self.gpu_pixels()?;
+            let cpu = self.compare.then(|| self.cpu_pixels());
+            self.under = Some((gpu, cpu));
+            let scale = self.stage.scale;
+            self.begin(if scale > 4 { scale / 4 } else { 1 })?;
+            return Ok(true);
+        }
+        let first_pass = passes == 0 && self.steps.samples() > 0;
+        Ok(first_pass || self.steps.is_done())
+    }
+
+    fn gpu_pixels(&mut self) -> Result<Pixels, RenderError> {
+        let film = self.gpu.film()?;
+        Ok(self.pixels(&film, self.under.as_ref().map(|(gpu, _)| gpu)))
+    }
+
+    fn cpu_pixels(&self) -> Pixels {
+        self.pixels(&self.cpu, self.under.as_ref().and_then(|(_, cpu)| cpu.as_ref()))
+    }
+
+    fn pixels(&self, film: &Film, under: Option<&Pixels>) -> Pixels {
+        means(film, under, &|y| self.steps.samples_of_row(y) > 0)
+    }
+
+    /// The picture as it is now, and its width and height.
+    pub fn content(&mut self, view: View) -> Result<(Content, [u32; 2]), RenderError> {
+        if let Some(aov) = view.aov() {
+            return Ok((self.hits_so_far(aov), [self.camera.width, self.camera.height]));
+        }
+        let size = [self.stage.width, self.stage.height];
+        if view == View::Samples {
+            let film = self.gpu.film()?;
+            let counts = match self.scene.adaptive {
+                true => film.sample_counts().collect(),
+                false => (0..self.stage.height)
+                    .flat_map(|y| std::iter::repeat_n(self.steps.samples_of_row(y), self.stage.width as usize))
+                    .collect(),
+            };
+            return Ok((Content::Samples(counts, self.scene.pixel_samples), size));
+        }
+        // Before the next stage has anything the last one is sent, which is smaller.
+        let last = self.under.as_ref().filter(|_| !self.stage.begun).cloned();
+        let (gpu, cpu) = match last {
+            Some(last) => last,
+            None => (self.gpu_pixels()?, self.compare.then(|| self.cpu_pixels())),
+        };
+        let size = [gpu.width, gpu.height];
+        Ok(match cpu.filter(|_| view == View::Compare) {
+            Some(cpu) => (Content::Compare(gpu, cpu), size),
+            None => (Content::Color(gpu), size),
+        })
+    }
+
+    fn hits_so_far(&self, aov: Aov) -> Content {
+        let nothing = FirstHit {
+            shape: crate::pack::NOTHING,
+            ..bytemuck::Zeroable::zeroed()
+        };
+        let mut hits = self.hits.clone();
+        hits.resize((self.camera.width * self.camera.height) as usize, nothing);
+        Content::Hits(aov, hits)
+    }
+
+    /// Width and height of the whole picture.
+    pub fn size(&self) -> [u32; 2] {
+        [self.camera.width, self.camera.height]
+    }
+
+    /// Samples that every pixel of the whole picture has, and will have.
+    pub fn samples(&self) -> (u32, u32) {
+        let so_far = if self.stage.scale == 1 { self.steps.samples() } else { 0 };
+        (so_far, self.scene.pixel_samples)
+    }
+
+    /// Samples of pixels per second.
+    pub fn speed(&self) -> Option<f64> {
+        self.steps.speed()
+    }
+}
+
+/// The same work done by both backends.
+struct Both<'a> {
+    gpu: &'a mut Gpu,
+    cpu: Cpu<'a>,
+}
+
+impl Backend for Both<'_> {
+    fn begin(&mut self, region: Region) -> Result<(), RenderError> {
+        self.gpu.begin(region)?;
+        self.cpu.begin(region)
+    }
+
+    fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+        self.gpu.render(tile, samples.clone())?;
+        self.cpu.render(tile, samples)
+    }
+
+    fn film(&mut self) -> Result<Film, RenderError> {
+        self.gpu.film()
+    }
+
+    fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
+        self.gpu.first_hits(region)
+    }
+
+    fn largest_film(&self) -> u64 {
+        self.gpu.largest_film()
+    }
+}

@@ -1,0 +1,169 @@
+//! Which requests are answered. A page from elsewhere must not reach the session through the user's browser: not by a
+//! name that it points to this address (DNS rebinding: the Host is foreign), not by a WebSocket (the Origin is foreign).
+
+use std::net::IpAddr;
+
+use axum::http::uri::Authority;
+use axum::http::{HeaderMap, HeaderName, header};
+
+/// The hosts that a server may be called by.
+#[derive(Clone, Debug)]
+pub struct Guard {
+    /// The name that it was told to listen on, if it is no address.
+    pub name: Option<String>,
+    /// Whether it listens on loopback only.
+    pub loopback: bool,
+}
+
+impl Guard {
+    /// Whether a request may be answered; if not, what is wrong. A WebSocket must have an Origin.
+    ///
+    /// # Errors
+    ///
+    /// What to tell whoever asks.
+    pub fn check(&self, headers: &HeaderMap, socket: bool) -> Result<(), &'static str> {
+        let host = one(headers, header::HOST).and_then(|host| host.parse::<Authority>().ok());
+        let host = host
+            .filter(|host| self.knows(host))
+            .ok_or("this Host is not served here")?;
+        match (one(headers, header::ORIGIN), headers.contains_key(header::ORIGIN)) {
+            // Through a tunnel or a proxy the browser may see https.
+            (Some(origin), _) => {
+                let authority = origin
+                    .strip_prefix("http://")
+                    .or_else(|| origin.strip_prefix("https://"));
+                let same = authority.is_some_and(|authority| authority.eq_ignore_ascii_case(host.as_str()));
+                if same {
+                    Ok(())
+                } else {
+                    Err("pages from elsewhere are not served")
+                }
+            }
+            (None, true) => Err("pages from elsewhere are not served"),
+            (None, false) if socket => Err("a WebSocket needs an Origin"),
+            (None, false) => Ok(()),
+        }
+    }
+
+    /// An address cannot be pointed elsewhere, unlike a name: of names only those that are known count. Any port will do,
+    /// for those who come through a tunnel.
+    fn knows(&self, host: &Authority) -> bool {
+        if host.as_str().contains('@') {
+            return false;
+        }
+        let name = host.host();
+        let bare = name
+            .strip_prefix('[')
+            .and_then(|name| name.strip_suffix(']'))
+            .unwrap_or(name);
+        if let Ok(address) = bare.parse::<IpAddr>() {
+            return !self.loopback || address.is_loopback();
+        }
+        name.eq_ignore_ascii_case("localhost")
+            || self.name.as_ref().is_some_and(|known| name.eq_ignore_ascii_case(known))
+    }
+}
+
+/// A header's value, if it is there once.
+fn one(headers: &HeaderMap, name: HeaderName) -> Option<&str> {
+    let mut values = headers.get_all(name).iter();
+    let value = values.next()?;
+    values.next().is_none().then(|| value.to_str().ok()).flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checked(guard: &Guard, host: &str, origin: Option<&str>, socket: bool) -> bool {
+        let mut headers = HeaderMap::new();
+        headers.insert(header::HOST, host.parse().unwrap());
+        if let Some(origin) = origin {
+            headers.insert(header::ORIGIN, origin.parse().unwrap());
+        }
+        guard.check(&headers, socket).is_ok()
+    }
+
+    #[test]
+    fn only_loopback_names_reach_a_loopback_server() {
+        let guard = Guard {
+            name: None,
+            loopback: true,
+        };
+        for host in [
+            "localhost:7878",
+            "LocalHost",
+            "127.0.0.1:7878",
+            "127.3.2.1",
+            "[::1]:7878",
+            "localhost:9000",
+        ] {
+            assert!(checked(&guard, host, None, false), "{host}");
+        }
+        for host in [
+            "evil.example:7878",
+            "localhost.evil.example",
+            "localhost.",
+            "127.0.0.1.evil.example",
+            "192.168.1.2:7878",
+            "user@localhost",
+            "localhost@evil.example",
+            "",
+            "[::1",
+            "0.0.0.0:7878",
+        ] {
+            assert!(!checked(&guard, host, None, false), "{host}");
+        }
+    }
+
+    #[test]
+    fn elsewhere_addresses_and_the_told_name_count() {
+        let guard = Guard {
+            name: Some("studio".to_string()),
+            loopback: false,
+        };
+        for host in ["192.168.1.2:7878", "studio:7878", "[fe80::1]", "localhost"] {
+            assert!(checked(&guard, host, None, false), "{host}");
+        }
+        for host in ["studio.evil.example", "evil.example"] {
+            assert!(!checked(&guard, host, None, false), "{host}");
+        }
+    }
+
+    #[test]
+    fn the_origin_is_the_host() {
+        let guard = Guard {
+            name: None,
+            loopback: true,
+        };
+        let host = "localhost:7878";
+        assert!(checked(&guard, host, Some("http://localhost:7878"), true));
+        assert!(checked(&guard, host, Some("https://localhost:7878"), true));
+        assert!(!checked(&guard, host, None, true), "a socket without an origin");
+        for origin in [
+            "http://localhost:3000",
+            "http://127.0.0.1:7878",
+            "https://evil.example",
+            "null",
+            "",
+            "file://",
+        ] {
+            assert!(!checked(&guard, host, Some(origin), true), "{origin}");
+            assert!(!checked(&guard, host, Some(origin), false), "{origin}");
+        }
+    }
+
+    #[test]
+    fn a_missing_or_doubled_host_is_refused() {
+        let guard = Guard {
+            name: None,
+            loopback: true,
+        };
+        assert!(guard.check(&HeaderMap::new(), false).is_err());
+        let mut headers = HeaderMap::new();
+        headers.append(header::HOST, "localhost".parse().unwrap());
+        assert!(guard.check(&headers, false).is_ok());
+        headers.append(header::HOST, "evil.example".parse().unwrap());
+        assert!(guard.check(&headers, false).is_err());
+    }
+}

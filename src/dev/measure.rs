@@ -1,0 +1,172 @@
+//! How long it takes from a save to the picture: saves copies of a scene and of the shaders, and looks at the clock.
+
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime};
+
+use toml_edit::{DocumentMut, value};
+
+use super::camera::Move;
+use super::picture::Frame;
+use super::session::{Command, Session, Settings};
+use super::source::Sources;
+use crate::gpu::Choice;
+use crate::gpu::compose::{BUILT_IN, Shaders};
+
+/// Saves of each kind.
+const ROUNDS: usize = 7;
+/// No picture takes so long.
+const LONGEST: Duration = Duration::from_secs(120);
+/// The expression in `kernels/render.wgsl` that is changed, so that the picture changes and no cache knows the kernel.
+const PLACE: &str = "pixel_radiance(pixel, sample)";
+
+/// Times from one kind of change.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// What was changed.
+    pub change: &'static str,
+    /// Until the old picture's rendering was given up.
+    pub stopped: Vec<Duration>,
+    /// Until the first picture, which may be coarse.
+    pub first: Vec<Duration>,
+    /// Until every pixel has a sample.
+    pub whole: Vec<Duration>,
+}
+
+/// Measures saves of a scene, moves of its camera and saves of a shader. Copies are saved, the scene's beside it.
+///
+/// # Errors
+///
+/// What to tell the user.
+pub fn measure(sources: &Sources, device: Choice) -> Result<Vec<Measured>, String> {
+    let told = |error: std::io::Error| error.to_string();
+    let text = fs::read_to_string(&sources.scene).map_err(|error| format!("{}: {error}", sources.scene.display()))?;
+    let folder = sources
+        .scene
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let scene = tempfile::Builder::new()
+        .prefix(".wgray-measure-")
+        .suffix(".toml")
+        .tempfile_in(folder)
+        .map_err(told)?;
+    fs::write(scene.path(), &text).map_err(told)?;
+    let shaders = match &sources.shaders {
+        Some(folder) => Shaders::read(folder).map_err(told)?,
+        None => Shaders::built_in(),
+    };
+    let copies = tempfile::tempdir().map_err(told)?;
+    for (name, _) in BUILT_IN {
+        let path = copies.path().join(name);
+        fs::create_dir_all(path.parent().unwrap_or(copies.path())).map_err(told)?;
+        fs::write(path, shaders.text(name)).map_err(told)?;
+    }
+    let session = Session::start(Settings {
+        sources: Sources {
+            scene: scene.path().to_owned(),
+            overrides: sources.overrides.clone(),
+            shaders: Some(copies.path().to_owned()),
+        },
+        device,
+        out: None,
+        report: Box::new(|_| ()),
+    })
+    .map_err(|error| error.to_string())?;
+    let mut clock = Clock { session };
+    clock.after("start", || Ok(()))?;
+    let kernel = copies.path().join("kernels/render.wgsl");
+    let kernel_text = shaders.text("kernels/render.wgsl").to_string();
+    if !kernel_text.contains(PLACE) {
+        return Err(format!(
+            "kernels/render.wgsl must contain '{PLACE}', which is changed to measure"
+        ));
+    }
+    // Every run has kernels of its own: factors that are not the same as f32.
+    let now = SystemTime::now()
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .map_or(0, |time| time.as_millis() % 65_536);
+    Ok(vec![
+        clock.all("scene save", &mut |i, _| {
+            fs::write(scene.path(), brighter(&text, i)).map_err(told)
+        })?,
+        clock.all("camera move", &mut |_, session| {
+            session.send(Command::Move(Move::Orbit(0.05, 0.0)));
+            Ok(())
+        })?,
+        clock.all("shader save", &mut |i, _| {
+            let factor = 1.0 + (now as f64 * ROUNDS as f64 + i as f64) / f64::from(1 << 21);
+            fs::write(
+                &kernel,
+                kernel_text.replace(PLACE, &format!("({PLACE} * vec4f(vec3f({factor:?}), 1.0))")),
+            )
+            .map_err(told)
+        })?,
+    ])
+}
+
+/// The scene with another ambient light.
+fn brighter(text: &str, i: usize) -> String {
+    let mut document: DocumentMut = text.parse().unwrap_or_default();
+    let light = 0.1 + 0.001 * (i + 1) as f64;
+    document["render"]["ambient"] = value([light; 3].into_iter().collect::<toml_edit::Array>());
+    document.to_string()
+}
+
+struct Clock {
+    session: Session,
+}
+
+impl Clock {
+    fn all(
+        &mut self,
+        change: &'static str,
+        make: &mut dyn FnMut(usize, &Session) -> Result<(), String>,
+    ) -> Result<Measured, String> {
+        let mut measured = Measured {
+            change,
+            stopped: Vec::new(),
+            first: Vec::new(),
+            whole: Vec::new(),
+        };
+        for i in 0..ROUNDS {
+            let session = &self.session;
+            let [stopped, first, whole] = self.after(change, || make(i, session))?;
+            measured.stopped.push(stopped);
+            measured.first.push(first);
+            measured.whole.push(whole);
+            std::thread::sleep(Duration::from_millis(200)); // into the middle of what is being rendered
+        }
+        Ok(measured)
+    }
+
+    /// The times from a change.
+    fn after(&self, change: &str, make: impl FnOnce() -> Result<(), String>) -> Result<[Duration; 3], String> {
+        let revision = self.frame().map(|frame| frame.header.revision);
+        let start = Instant::now();
+        make()?;
+        let (mut stopped, mut first) = (None, None);
+        while start.elapsed() < LONGEST {
+            if let Some(problem) = self.session.state.borrow().problems.first() {
+                return Err(format!("{change}: {}", problem.message));
+            }
+            if self.session.state.borrow().compiling {
+                stopped.get_or_insert(start.elapsed());
+            }
+            if let Some(frame) = self.frame().filter(|frame| Some(frame.header.revision) > revision) {
+                let first = *first.get_or_insert(start.elapsed());
+                let header = &frame.header;
+                if header.sent == [header.width, header.height] && header.samples > 0 {
+                    return Ok([stopped.unwrap_or(first), first, start.elapsed()]);
+                }
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Err(format!("{change}: no picture within {} s", LONGEST.as_secs()))
+    }
+
+    fn frame(&self) -> Option<Arc<Frame>> {
+        self.session.frames.borrow().clone()
+    }
+}

@@ -1,0 +1,30 @@
+//! The development mode: a scene and its shaders are watched, rendered anew as they are saved, and shown on a page.
+//!
+//! ```text
+//! files ── watch ──> Snapshot ──> painter ──> builder (compiles)
+//!                                    │  ^─────────┘
+//!                       Canvas (renders, call by call)
+//!                                    └──> State, Frame ──> server ──> page
+//! ```
+
+mod build;
+mod camera;
+mod canvas;
+mod diagnostic;
+mod guard;
+mod measure;
+mod painter;
+mod picture;
+mod save;
+mod server;
+mod session;
+mod source;
+mod watch;
+
+pub use camera::Move;
+pub use diagnostic::Diagnostic;
+pub use measure::{Measured, measure};
+pub use picture::{Content, Frame, Header, View};
+pub use server::Listener;
+pub use session::{Command, Notice, Report, Session, Settings, StartError, State};
+pub use source::Sources;

@@ -1,0 +1,221 @@
+// The page: what the server tells is shown, what the user does is sent.
+
+import { Picture } from "/picture.js";
+
+const element = (id) => document.getElementById(id);
+const RETRY = 500; // milliseconds
+let socket = null;
+let state = null;
+let [received, drawn] = [0, 0]; // numbers of frames, so that a late one is not drawn over a newer
+let pixelAsked = null; // the pixel that an answer is waited for
+let pixelWanted = null;
+let noticesSeen = null;
+
+function ask(command) {
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
+}
+
+const picture = new Picture([...document.querySelectorAll("#panels figure")], ask, readPixel, (fits, scale) => {
+  const percent = `${Math.round(scale * 100)} %`;
+  element("zoom").textContent = fits ? `fit, ${percent}` : percent;
+});
+picture.tool = () => document.querySelector("input[name=tool]:checked").value;
+
+function connect() {
+  socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`);
+  socket.binaryType = "arraybuffer";
+  socket.onopen = () => {
+    showLink("live", "live");
+    [pixelAsked, noticesSeen] = [null, null];
+  };
+  socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : showFrame(data));
+  socket.onclose = () => {
+    showLink("lost", "connection lost, trying again");
+    setTimeout(connect, RETRY);
+  };
+}
+
+function hear(message) {
+  if (message.state) showState(message.state);
+  else if (message.pixel) showPixel(message.pixel);
+  else if (message.refused) showNotice(message.refused, true);
+}
+
+// A frame: the length of its header, the header as JSON, and the PNG files that it counts.
+async function showFrame(data) {
+  const number = ++received;
+  const length = new DataView(data).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
+  let at = 4 + length;
+  const decoded = header.parts.map(async ([name, size]) => {
+    const blob = new Blob([new Uint8Array(data, at, size)], { type: "image/png" });
+    at += size;
+    return [name, await createImageBitmap(blob, { colorSpaceConversion: "none" })];
+  });
+  const images = new Map(await Promise.all(decoded));
+  if (number < drawn) return;
+  drawn = number;
+  const first = !picture.header;
+  element("waiting").hidden = true;
+  picture.show(header, images);
+  if (first && state) showProblems(state.problems);
+  showProgress(header);
+  readPixel(picture.cursor);
+  // For whoever wants to know by script what is on the screen.
+  Object.assign(element("panels").dataset, {
+    revision: header.revision, view: header.view, samples: header.samples, done: header.done,
+  });
+}
+
+function showProgress(header) {
+  const { samples, total, done, speed, differing, view } = header;
+  const counts = ["color", "samples", "compare"].includes(view);
+  element("bar").value = !counts ? 1 : total ? samples / total : 0;
+  element("samples").textContent = counts ? `${samples} of ${total}` : "1 ray a pixel";
+  element("speed").textContent = counts && speed ? withPrefix(speed) : "–";
+  element("size").textContent = `${header.width} × ${header.height}`;
+  if (header.latency !== null) element("latency").textContent = seconds(header.latency);
+  const verdict = element("differing");
+  if (differing) {
+    const [pixels, largest] = differing;
+    const at = done ? "" : ` so far`;
+    verdict.className = pixels ? "differ" : "same";
+    verdict.textContent = pixels
+      ? `${pixels.toLocaleString("en")} ${pixels === 1 ? "pixel differs" : "pixels differ"}${at}, by ${largest?.toPrecision(3) ?? "no number"} at most`
+      : `0 pixels differ${at}: all bits are the same`;
+  } else if (view === "compare") {
+    verdict.className = "";
+    verdict.textContent = "rendering on both";
+  }
+}
+
+function showState(next) {
+  state = next;
+  document.title = `${next.problems.length ? "✗ " : ""}${next.scene} – wgray`;
+  element("scene").textContent = next.scene;
+  element("device").textContent = next.device;
+  element("shaders").textContent = next.shaders ?? "those in the program";
+  element("compile").textContent = next.compiling
+    ? "compiling" : next.compile_seconds === null ? "–" : seconds(next.compile_seconds);
+  element("camera-text").textContent = next.camera;
+  element("moved").hidden = !next.camera_moved;
+  element("save").disabled = element("reset").disabled = !next.camera_moved;
+  element("compare").hidden = next.view !== "compare";
+  element("gain").value = next.gain;
+  element("gain-shown").textContent = `× ${next.gain}`;
+  for (const input of document.querySelectorAll("input[name=view]")) input.checked = input.value === next.view;
+  showProblems(next.problems);
+  const { number = 0, text, bad } = next.notice ?? {};
+  if (noticesSeen !== null && number > noticesSeen) showNotice(text, bad);
+  noticesSeen = number;
+}
+
+function showProblems(problems) {
+  const make = (tag, text) => Object.assign(document.createElement(tag), { textContent: text });
+  const articles = problems.map((problem) => {
+    const article = document.createElement("article");
+    article.append(make("h2", problem.place ?? problem.kind), make("p", problem.message));
+    if (problem.excerpt) article.append(make("pre", problem.excerpt));
+    const stays = picture.header ? "; the picture is the last good one" : "";
+    article.append(make("small", `${problem.kind} error${stays}`));
+    return article;
+  });
+  element("problems").replaceChildren(...articles);
+}
+
+let noticeTimer = 0;
+function showNotice(text, bad) {
+  const notice = element("notice");
+  notice.textContent = text;
+  notice.classList.toggle("bad", Boolean(bad));
+  notice.hidden = false;
+  clearTimeout(noticeTimer);
+  noticeTimer = setTimeout(() => (notice.hidden = true), bad ? 8000 : 3000);
+}
+
+function showLink(kind, text) {
+  element("link").className = kind;
+  element("link").textContent = text;
+}
+
+// One question at a time: the next waits for the answer.
+function readPixel(pixel) {
+  pixelWanted = pixel;
+  if (!pixel) {
+    element("swatch").hidden = true;
+    element("values").textContent = "Point at a pixel to read its value";
+  } else if (!pixelAsked && socket?.readyState === WebSocket.OPEN) {
+    pixelAsked = pixel;
+    ask({ pixel });
+  }
+}
+
+function showPixel({ x, y, values }) {
+  const asked = pixelAsked;
+  pixelAsked = null;
+  if (String(pixelWanted) !== String(asked)) return readPixel(pixelWanted);
+  const bold = (text) => Object.assign(document.createElement("b"), { textContent: text });
+  const parts = [bold("pixel "), `${x} ${y}`];
+  for (const [name, value] of values) parts.push(bold(`   ${name} `), value);
+  element("values").replaceChildren(...parts);
+  const linear = values.find(([name]) => name === "linear RGB")?.[1].split(/\s+/).map(Number);
+  element("swatch").hidden = !linear;
+  if (linear) {
+    const bytes = linear.map((v) => Math.round(255 * Math.min(1, Math.max(0, v)) ** (1 / 2.2)));
+    element("swatch").style.background = `rgb(${bytes.join(" ")})`;
+  }
+}
+
+function withPrefix(n) {
+  const [divisor, prefix] = n >= 1e9 ? [1e9, " G"] : n >= 1e6 ? [1e6, " M"] : n >= 1e3 ? [1e3, " k"] : [1, ""];
+  return (n / divisor).toPrecision(3) + prefix;
+}
+
+function seconds(s) {
+  return s < 1 ? `${Math.round(s * 1000)} ms` : `${s.toFixed(2)} s`;
+}
+
+async function copyCamera() {
+  try {
+    await navigator.clipboard.writeText(state.camera);
+    showNotice("camera copied");
+  } catch {
+    // Without a secure connection there is no clipboard: the text is selected for the user to copy.
+    getSelection().selectAllChildren(element("camera-text"));
+    showNotice("selected: press Ctrl+C to copy");
+  }
+}
+
+const choose = (name, value) => {
+  const input = document.querySelector(`input[name=${name}][value=${value}]`);
+  input.checked = true;
+  input.dispatchEvent(new Event("change", { bubbles: true }));
+};
+
+element("views").addEventListener("change", (event) => ask({ view: event.target.value }));
+element("gain").addEventListener("change", (event) => ask({ gain: Number(event.target.value) }));
+element("copy").addEventListener("click", copyCamera);
+element("save").addEventListener("click", () => ask("save_camera"));
+element("reset").addEventListener("click", () => ask("reset_camera"));
+element("zoom-in").addEventListener("click", () => picture.zoom(1.5));
+element("zoom-out").addEventListener("click", () => picture.zoom(1 / 1.5));
+element("zoom-one").addEventListener("click", () => picture.zoomTo(1));
+element("zoom-fit").addEventListener("click", () => picture.fit());
+
+document.addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("select")) return;
+  const views = ["color", "normal", "depth", "uv", "primitive", "samples", "compare"];
+  const tools = { o: "orbit", p: "pan", d: "dolly", h: "hand" };
+  const actions = {
+    c: copyCamera,
+    r: () => ask("reset_camera"),
+    0: () => picture.fit(),
+    "+": () => picture.zoom(1.25),
+    "-": () => picture.zoom(1 / 1.25),
+  };
+  if (tools[event.key]) choose("tool", tools[event.key]);
+  else if (actions[event.key]) actions[event.key]();
+  else if (views[event.key - 1]) choose("view", views[event.key - 1]);
+});
+
+connect();

@@ -1,0 +1,401 @@
+//! What a session does with what happens: decides what is rendered, compiled, shown and told.
+
+mod commands;
+mod show;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use tokio::sync::watch;
+
+use self::show::Problems;
+use super::build::{Builder, Built, Request, guarded};
+use super::canvas::Canvas;
+use super::diagnostic::Diagnostic;
+use super::picture::{Frame, View};
+use super::session::{Event, Report, State};
+use super::source::{Constants, Loaded, Snapshot, Sources, constants};
+use crate::error::{RenderError, ShaderError};
+use crate::gpu::compose::Shaders;
+use crate::gpu::{Device, Gpu};
+use crate::scene::CameraDescription;
+
+/// Pictures of more samples are shown no more often than this, and a tenth of the time is spent on them at most.
+const BETWEEN_FRAMES: Duration = Duration::from_millis(100);
+/// So often a device is opened anew without any picture in between.
+const ATTEMPTS: u32 = 3;
+/// The factor of differences at first.
+const GAIN: f32 = 256.0;
+
+/// The state of a session.
+pub struct Painter {
+    sources: Sources,
+    builder: Builder,
+    out: Option<PathBuf>,
+    /// The picture that the file was last written for.
+    written: Option<u64>,
+    report: Box<dyn Fn(Report) + Send>,
+    state_sender: watch::Sender<Arc<State>>,
+    frame_sender: watch::Sender<Option<Arc<Frame>>>,
+    state: State,
+
+    /// The last scene that was right.
+    loaded: Option<Arc<Loaded>>,
+    /// The newest shaders that could be read.
+    shaders: Option<Arc<Shaders>>,
+    /// The last shaders that could be rendered with.
+    good: Option<Arc<Shaders>>,
+    /// Shaders that were refused for these constants.
+    refused: Vec<(Arc<Shaders>, Constants)>,
+    device: Option<Device>,
+    running: Option<Running>,
+    pending: Option<Pending>,
+    requests: u64,
+    failures: u32,
+    problems: Problems,
+
+    /// The camera, where it is not the file's.
+    camera: Option<CameraDescription>,
+    /// Whether it moved since the picture was begun.
+    camera_waits: bool,
+    view: View,
+    gain: f32,
+
+    /// Counts the pictures.
+    revision: u64,
+    /// When the change was noticed that the picture does not show yet, and whether a file was saved.
+    since: Option<(Instant, bool)>,
+    /// Seconds from the last change to the first picture of it.
+    latency: Option<f64>,
+    /// What compiling took, if the next frame needed it.
+    compiled: Option<f64>,
+    /// When the first picture of a saved file was shown, until it is finished.
+    first_frame: Option<Instant>,
+    last_frame: Instant,
+    frame_cost: Duration,
+}
+
+struct Running {
+    canvas: Canvas,
+    shaders: Arc<Shaders>,
+    constants: Constants,
+}
+
+struct Pending {
+    id: u64,
+    shaders: Arc<Shaders>,
+    constants: Constants,
+}
+
+impl Painter {
+    /// A session that knows no files yet.
+    pub fn new(
+        sources: Sources,
+        device: Device,
+        builder: Builder,
+        out: Option<PathBuf>,
+        report: Box<dyn Fn(Report) + Send>,
+        state_sender: watch::Sender<Arc<State>>,
+        frame_sender: watch::Sender<Option<Arc<Frame>>>,
+    ) -> Painter {
+        let state = State {
+            scene: sources.scene.display().to_string(),
+            shaders: sources.shaders.as_ref().map(|folder| folder.display().to_string()),
+            device: format!("{}, {}", device.info.name, device.info.driver),
+            gain: GAIN,
+            ..State::default()
+        };
+        Painter {
+            sources,
+            builder,
+            out,
+            written: None,
+            report,
+            state_sender,
+            frame_sender,
+            state,
+            loaded: None,
+            shaders: None,
+            good: None,
+            refused: Vec::new(),
+            device: Some(device),
+            running: None,
+            pending: None,
+            requests: 0,
+            failures: 0,
+            problems: Problems::default(),
+            camera: None,
+            camera_waits: false,
+            view: View::default(),
+            gain: GAIN,
+            revision: 0,
+            since: None,
+            latency: None,
+            compiled: None,
+            first_frame: None,
+            last_frame: Instant::now(),
+            frame_cost: Duration::ZERO,
+        }
+    }
+
+    /// Takes something that happened.
+    pub fn take(&mut self, event: Event) {
+        match event {
+            Event::Files(snapshot, noticed) => self.take_files(*snapshot, noticed),
+            Event::Built(built) => self.take_built(*built),
+            Event::Command(command) => self.take_command(command),
+            #[cfg(test)]
+            Event::Lose => self.device.iter().for_each(Device::destroy),
+            Event::Stop => {}
+        }
+        self.tell();
+    }
+
+    fn take_files(&mut self, snapshot: Snapshot, noticed: Instant) {
+        match snapshot.scene {
+            Ok(loaded) => {
+                self.problems.scene = None;
+                if self.loaded.as_ref().is_some_and(|old| old.camera != loaded.camera) {
+                    self.camera = None; // whoever changes the file's camera wants to see it
+                }
+                self.loaded = Some(loaded);
+            }
+            Err(problem) => self.problems.scene = Some(problem),
+        }
+        match snapshot.shaders {
+            Ok(shaders) => {
+                self.problems.files = None;
+                let good = self.good.as_ref();
+                self.refused
+                    .retain(|(known, _)| *known == shaders || Some(known) == good);
+                self.shaders = Some(shaders);
+            }
+            Err(problem) => self.problems.files = Some(problem),
+        }
+        self.failures = 0;
+        self.settle((noticed, true));
+    }
+
+    /// The scene, and the shaders that it is to be rendered with: the newest, or where these are known to be wrong for
+    /// it the last good ones.
+    fn wanted(&self) -> Option<(Arc<Loaded>, Arc<Shaders>)> {
+        let (loaded, newest) = (self.loaded.clone()?, self.shaders.clone()?);
+        let constants = constants(&loaded.packed);
+        let mut candidates = [Some(newest), self.good.clone()].into_iter().flatten();
+        let shaders = candidates.find(|shaders| !self.refused.contains(&(shaders.clone(), constants)))?;
+        Some((loaded, shaders))
+    }
+
+    /// Sees to it that what is rendered is what the files say.
+    fn settle(&mut self, since: (Instant, bool)) {
+        let Some((loaded, shaders)) = self.wanted() else { return };
+        if self.shaders.as_ref() == Some(&shaders) {
+            self.problems.shader = None;
+        }
+        let constants = constants(&loaded.packed);
+        let fits = |known: &Arc<Shaders>, of| *known == shaders && constants == of;
+        let running = self.running.as_ref();
+        if running.is_some_and(|running| fits(&running.shaders, running.constants)) {
+            self.pending = None;
+            self.draw_scene(since);
+        } else if !(self.pending.as_ref()).is_some_and(|pending| fits(&pending.shaders, pending.constants)) {
+            self.since.get_or_insert(since);
+            self.request(&loaded, shaders);
+        }
+    }
+
+    fn request(&mut self, loaded: &Loaded, shaders: Arc<Shaders>) {
+        let constants = constants(&loaded.packed);
+        // A running kernel that fits the scene stays if the new one is wrong; else the last good shaders are compiled.
+        let running = self.running.as_ref();
+        let stays = running.is_some_and(|running| running.constants == constants);
+        let fallback = self.good.clone().filter(|good| !stays && *good != shaders);
+        self.requests += 1;
+        self.builder.request(Request {
+            id: self.requests,
+            device: self.device.clone(),
+            packed: self.packed(loaded),
+            shaders: shaders.clone(),
+            fallback,
+        });
+        self.pending = Some(Pending {
+            id: self.requests,
+            shaders,
+            constants,
+        });
+    }
+
+    /// Renders the scene with the running kernel, which fits it.
+    fn draw_scene(&mut self, since: (Instant, bool)) {
+        let Some(loaded) = self.loaded.clone() else { return };
+        let packed = self.packed(&loaded);
+        let (Some(running), view) = (&mut self.running, self.view) else {
+            return;
+        };
+        if running.canvas.shows(&packed) {
+            self.since = None;
+            return;
+        }
+        match guarded(|| running.canvas.update(&packed, view)) {
+            Ok(true) => self.begun(since),
+            Ok(false) => {} // it fits, so this cannot be
+            Err(error) => self.fail(&error),
+        }
+    }
+
+    /// A picture has been begun, by the camera as it is now.
+    fn begun(&mut self, since: (Instant, bool)) {
+        self.camera_waits = false;
+        self.changed(since);
+    }
+
+    /// Another picture is shown from now on.
+    fn changed(&mut self, since: (Instant, bool)) {
+        self.revision += 1;
+        self.since.get_or_insert(since);
+    }
+
+    fn take_built(&mut self, built: Built) {
+        let pending = match self.pending.take() {
+            Some(pending) if pending.id == built.id => pending,
+            other => {
+                self.pending = other; // the result is late: files were saved while it was made
+                let _ = guarded(|| {
+                    drop(built.result);
+                    Ok(())
+                });
+                return;
+            }
+        };
+        if let Some(error) = &built.refused {
+            self.refuse(&pending, Some(error));
+        }
+        match built.result {
+            Ok((gpu, shaders)) => {
+                self.state.compile_seconds = Some(built.took.as_secs_f64());
+                self.compiled = self.state.compile_seconds;
+                self.run(*gpu, shaders, pending.constants);
+            }
+            Err(RenderError::Shader(error)) => {
+                self.refuse(&pending, Some(&error));
+                self.since = None;
+                self.settle((Instant::now(), true)); // the scene may have changed meanwhile: the running kernel shows that
+            }
+            Err(error) => {
+                let (view, running) = (self.view, &mut self.running);
+                let lives = |running: &mut Running| guarded(|| running.canvas.content(view)).is_ok();
+                if running.as_mut().is_some_and(lives) {
+                    // The driver refuses what naga does not; the device is well.
+                    self.refuse(&pending, None);
+                    self.problems.device = Some((&error).into());
+                    self.since = None;
+                    self.settle((Instant::now(), true));
+                } else {
+                    self.fail(&error);
+                }
+            }
+        }
+    }
+
+    /// Starts to render with a kernel.
+    fn run(&mut self, mut gpu: Gpu, shaders: Arc<Shaders>, constants: Constants) {
+        let Some(loaded) = self.loaded.clone() else { return };
+        let info = &gpu.device().info;
+        self.state.device = format!("{}, {}", info.name, info.driver);
+        self.device = Some(gpu.device().clone());
+        let (packed, view) = (self.packed(&loaded), self.view);
+        self.stop_running();
+        let canvas = guarded(|| {
+            gpu.update(&packed)?; // the scene may have changed since it was uploaded
+            Canvas::new(gpu, packed, view)
+        });
+        match canvas {
+            Ok(canvas) => {
+                self.good = Some(shaders.clone());
+                self.running = Some(Running {
+                    canvas,
+                    shaders,
+                    constants,
+                });
+                self.problems.device = None;
+                self.begun((Instant::now(), true));
+            }
+            Err(error) => self.fail(&error),
+        }
+    }
+
+    /// Remembers that shaders are wrong for a scene like this, so that they are not tried again.
+    fn refuse(&mut self, pending: &Pending, error: Option<&ShaderError>) {
+        self.refused.push((pending.shaders.clone(), pending.constants));
+        self.problems.shader = error.map(|error| self.of_shader(error));
+    }
+
+    /// A shader's error, with the path by which the user knows the file.
+    fn of_shader(&self, error: &ShaderError) -> Diagnostic {
+        let mut problem = Diagnostic::from(error);
+        if let (Some(folder), Some(place)) = (&self.sources.shaders, &mut problem.place)
+            && place.contains(".wgsl:")
+        {
+            *place = folder.join(&*place).display().to_string();
+        }
+        problem
+    }
+
+    /// Whether [`work`](Self::work) has anything to do.
+    pub fn has_work(&self) -> bool {
+        self.running.as_ref().is_some_and(|running| {
+            let more = !running.canvas.is_done(self.view);
+            // While a kernel is compiled the processor is left to the compiler, but for the camera.
+            self.camera_waits || (more && (self.pending.is_none() || running.canvas.is_new()))
+        })
+    }
+
+    /// Does one call's worth of work.
+    pub fn work(&mut self) {
+        let (view, waits) = (self.view, self.camera_waits);
+        let Some(loaded) = self.loaded.clone() else { return };
+        let camera = self.packed_camera(&loaded);
+        let Some(running) = &mut self.running else { return };
+        // A camera that never rests must not keep the first picture from being finished.
+        if waits && (!running.canvas.is_new() || running.canvas.is_done(view)) {
+            match guarded(|| running.canvas.restart(camera, view)) {
+                Ok(()) => self.begun((Instant::now(), false)),
+                Err(error) => self.fail(&error),
+            }
+            return;
+        }
+        match guarded(|| running.canvas.step(view)) {
+            Ok(show) => {
+                let due = self.last_frame.elapsed() > BETWEEN_FRAMES.max(10 * self.frame_cost);
+                if show || (due && !running.canvas.is_new()) {
+                    self.show();
+                }
+            }
+            Err(error) => self.fail(&error),
+        }
+    }
+
+    /// The device refused something, or is lost: another one is opened, a few times.
+    fn fail(&mut self, error: &RenderError) {
+        self.stop_running();
+        self.problems.device = Some(error.into());
+        self.device = None;
+        self.pending = None;
+        self.refused.clear(); // another device may take them
+        self.failures += 1;
+        if let Some((loaded, shaders)) = self.wanted().filter(|_| self.failures <= ATTEMPTS) {
+            self.request(&loaded, shaders);
+        }
+        self.tell();
+    }
+
+    /// Gives up the running kernel. What a lost device holds may not be given back without a panic.
+    fn stop_running(&mut self) {
+        let running = self.running.take();
+        let _ = guarded(|| {
+            drop(running);
+            Ok(())
+        });
+    }
+}

@@ -1,0 +1,131 @@
+//! What everybody is shown and told.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::Painter;
+use crate::dev::build::guarded;
+use crate::dev::camera::text;
+use crate::dev::diagnostic::Diagnostic;
+use crate::dev::picture::{Content, Frame, Header, Names, View, png_of};
+use crate::dev::save::replace;
+use crate::dev::session::Report;
+
+/// What is wrong, by where it comes from.
+#[derive(Default)]
+pub struct Problems {
+    pub scene: Option<Diagnostic>,
+    pub files: Option<Diagnostic>,
+    pub shader: Option<Diagnostic>,
+    pub device: Option<Diagnostic>,
+    pub out: Option<Diagnostic>,
+}
+
+impl Problems {
+    fn all(&self) -> impl Iterator<Item = &Diagnostic> {
+        [&self.files, &self.shader, &self.scene, &self.device, &self.out]
+            .into_iter()
+            .flatten()
+    }
+}
+
+impl Painter {
+    pub(super) fn is_done(&self) -> bool {
+        self.running
+            .as_ref()
+            .is_some_and(|running| running.canvas.is_done(self.view))
+    }
+
+    /// Shows the picture as it is now.
+    pub(super) fn show(&mut self) {
+        let (view, done) = (self.view, self.is_done());
+        let Some(running) = &mut self.running else { return };
+        let canvas = &mut running.canvas;
+        let start = Instant::now();
+        let (content, sent) = match guarded(|| canvas.content(view)) {
+            Ok(content) => content,
+            Err(error) => return self.fail(&error),
+        };
+        let ([width, height], (samples, total), speed) = (canvas.size(), canvas.samples(), canvas.speed());
+        let whole = sent == [width, height] && samples > 0;
+        if let (Content::Color(colors), true) = (&content, whole) {
+            self.write_out(|| png_of(colors), done);
+        }
+        let since = self.since.take();
+        self.latency = since
+            .map(|(noticed, _)| noticed.elapsed().as_secs_f64())
+            .or(self.latency);
+        let header = Header {
+            revision: self.revision,
+            view,
+            width,
+            height,
+            sent,
+            samples,
+            total,
+            done,
+            speed,
+            latency: self.latency,
+            ..Header::default()
+        };
+        let names = self.loaded.as_ref().map(|loaded| Names {
+            shapes: loaded.scene.shapes.len() as u32,
+            materials: loaded.materials.clone(),
+        });
+        let frame = Frame::new(header, content, names.unwrap_or_default(), self.gain);
+        self.frame_sender.send_replace(Some(Arc::new(frame)));
+        self.last_frame = Instant::now();
+        self.frame_cost = start.elapsed();
+        self.failures = 0;
+        if let Some((noticed, saved)) = since {
+            self.first_frame = saved.then_some(self.last_frame);
+            if saved {
+                let compiled = self.compiled.take();
+                (self.report)(Report::Reloaded {
+                    seconds: noticed.elapsed().as_secs_f64(),
+                    compiled,
+                });
+            }
+        }
+        if let Some(first) = self.first_frame.take_if(|_| done && view == View::Color) {
+            (self.report)(Report::Finished {
+                seconds: first.elapsed().as_secs_f64(),
+            });
+        }
+        self.tell();
+    }
+
+    /// Replaces the file of `--out`: once all pixels have a sample, and when the picture is done.
+    fn write_out(&mut self, png: impl FnOnce() -> Vec<u8>, done: bool) {
+        let Some(out) = &self.out else { return };
+        if done || self.written != Some(self.revision) {
+            self.written = Some(self.revision);
+            let failed = replace(out, &png()).err();
+            let told = |error| Diagnostic::plain("file", format!("{}: cannot be written: {error}", out.display()));
+            self.problems.out = failed.map(told);
+        }
+    }
+
+    /// Tells everybody the state, where it has changed.
+    pub(super) fn tell(&mut self) {
+        let camera = self
+            .camera
+            .as_ref()
+            .or(self.loaded.as_ref().map(|loaded| &loaded.camera));
+        let problems: Vec<Diagnostic> = self.problems.all().cloned().collect();
+        for problem in problems.iter().filter(|problem| !self.state.problems.contains(problem)) {
+            (self.report)(Report::Problem(problem.clone()));
+        }
+        if problems.is_empty() && !self.state.problems.is_empty() {
+            (self.report)(Report::Mended);
+        }
+        self.state.camera = camera.map(text).unwrap_or_default();
+        self.state.camera_moved = self.camera.is_some();
+        self.state.problems = problems;
+        self.state.compiling = self.pending.is_some();
+        (self.state.view, self.state.gain) = (self.view, self.gain);
+        if **self.state_sender.borrow() != self.state {
+            self.state_sender.send_replace(Arc::new(self.state.clone()));
+        }
+    }
+}

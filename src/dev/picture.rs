@@ -1,0 +1,345 @@
+//! What the page and the terminal's file show of a render: pictures of several views, and the numbers behind a pixel.
+
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::film::{Film, mean};
+use crate::image::{Aov, Pixels, difference, encode};
+use crate::pack::{FirstHit, NOTHING};
+
+/// What is shown of the scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum View {
+    /// Radiance.
+    #[default]
+    Color,
+    /// The first hit's normal.
+    Normal,
+    /// Its distance.
+    Depth,
+    /// Its texture coordinates.
+    Uv,
+    /// Which shape it is on.
+    Primitive,
+    /// How many samples a pixel has.
+    Samples,
+    /// Radiance by the GPU, by the CPU, and their difference.
+    Compare,
+}
+
+impl View {
+    /// What it shows of the first hits, if it does not show the film.
+    pub fn aov(self) -> Option<Aov> {
+        match self {
+            View::Normal => Some(Aov::Normal),
+            View::Depth => Some(Aov::Depth),
+            View::Uv => Some(Aov::Uv),
+            View::Primitive => Some(Aov::Primitive),
+            View::Color | View::Samples | View::Compare => None,
+        }
+    }
+}
+
+/// The means of a film's sums. In rows that have no samples yet `under` shows through, a smaller picture of the same.
+pub fn means(film: &Film, under: Option<&Pixels>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> Pixels {
+    let (width, height) = (film.region.width(), film.region.height());
+    let color = |(i, sum): (usize, &Vec4)| match under {
+        Some(under) if !has_samples(i as u32 / width) => {
+            let at = Scaled {
+                from: [width, height],
+                to: [under.width, under.height],
+            };
+            at.index(i as u32 % width, i as u32 / width)
+                .and_then(|i| under.colors.get(i))
+                .copied()
+                .unwrap_or_default()
+        }
+        _ => mean(*sum),
+    };
+    Pixels {
+        width,
+        height,
+        colors: film.sums.par_iter().enumerate().map(color).collect(),
+    }
+}
+
+/// From a picture to the same in another size.
+struct Scaled {
+    from: [u32; 2],
+    to: [u32; 2],
+}
+
+impl Scaled {
+    /// The index of the pixel that covers pixel (x, y); `None` outside of the picture.
+    fn index(&self, x: u32, y: u32) -> Option<usize> {
+        let scaled = |at: u32, i: usize| {
+            (at < self.from[i]).then(|| u64::from(at) * u64::from(self.to[i]) / u64::from(self.from[i]))
+        };
+        Some((scaled(y, 1)? * u64::from(self.to[0]) + scaled(x, 0)?) as usize)
+    }
+}
+
+/// The numbers of a frame.
+#[derive(Clone, Debug)]
+pub enum Content {
+    /// [`View::Color`]
+    Color(Pixels),
+    /// [`View::Samples`]: of how many there will be.
+    Samples(Vec<u32>, u32),
+    /// The views of the first hits.
+    Hits(Aov, Vec<FirstHit>),
+    /// [`View::Compare`]: GPU and CPU, where both have samples.
+    Compare(Pixels, Pixels),
+}
+
+/// What is told about a frame beside its pictures.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Header {
+    /// Counts the changes of scene, shaders and camera: which of them the frame shows.
+    pub revision: u64,
+    /// What it shows.
+    pub view: View,
+    /// Width of the whole picture; that of a coarse frame's pixels is a fraction of it.
+    pub width: u32,
+    /// Height of the whole picture.
+    pub height: u32,
+    /// Width and height of what is sent.
+    pub sent: [u32; 2],
+    /// Samples that every pixel has.
+    pub samples: u32,
+    /// Samples that it will have.
+    pub total: u32,
+    /// Whether nothing will be added.
+    pub done: bool,
+    /// Samples of pixels per second.
+    pub speed: Option<f64>,
+    /// Seconds from the last change to the first frame that showed it.
+    pub latency: Option<f64>,
+    /// What [`View::Compare`] found: pixels that differ in any bit, and the largest difference.
+    pub differing: Option<(usize, f32)>,
+    /// Names and sizes in bytes of the pictures that follow.
+    pub parts: Vec<(&'static str, usize)>,
+}
+
+/// A picture that the viewers get, as PNG files and as numbers.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// About it.
+    pub header: Header,
+    /// PNG files, one for each part of the header.
+    pub pictures: Vec<Vec<u8>>,
+    /// The numbers.
+    pub content: Content,
+    /// How names are given to what the numbers count.
+    pub names: Names,
+}
+
+/// How shapes and materials are called in the scene file.
+#[derive(Clone, Debug, Default)]
+pub struct Names {
+    /// How many shapes there are; lights follow them.
+    pub shapes: u32,
+    /// The materials' names.
+    pub materials: Vec<String>,
+}
+
+impl Frame {
+    /// Makes the pictures of `content`; the header's last two fields are found here. `gain` is the factor of the
+    /// difference of [`View::Compare`].
+    pub fn new(mut header: Header, content: Content, names: Names, gain: f32) -> Frame {
+        let [width, height] = header.sent;
+        let pictures: Vec<(&'static str, Vec<u8>)> = match &content {
+            Content::Color(colors) => vec![("picture", display(colors))],
+            Content::Samples(counts, total) => {
+                vec![(
+                    "picture",
+                    bytes(counts, |n| Vec3::splat(*n as f32 / (*total).max(1) as f32)),
+                )]
+            }
+            Content::Hits(aov, hits) => {
+                let middle = hits.get((height / 2 * width + width / 2) as usize);
+                let middle_depth = middle.filter(|hit| hit.shape != NOTHING).map_or(1.0, |hit| hit.depth);
+                vec![("picture", bytes(hits, |hit| aov.color_of_hit(hit, middle_depth)))]
+            }
+            Content::Compare(gpu, cpu) => {
+                header.differing = difference(gpu, cpu, 0.0).map(|found| (found.unequal, found.largest));
+                vec![
+                    ("gpu", display(gpu)),
+                    ("cpu", display(cpu)),
+                    ("difference", amplified(gpu, cpu, gain)),
+                ]
+            }
+        };
+        let (parts, pictures): (Vec<_>, Vec<_>) = pictures
+            .into_par_iter()
+            .map(|(name, rgb)| {
+                let file = png(width, height, &rgb);
+                ((name, file.len()), file)
+            })
+            .unzip();
+        header.parts = parts;
+        Frame {
+            header,
+            pictures,
+            content,
+            names,
+        }
+    }
+
+    /// What is known of a pixel of the whole picture, by name; `None` outside of it.
+    pub fn pixel(&self, x: u32, y: u32) -> Option<Vec<(&'static str, String)>> {
+        let Header {
+            width, height, sent, ..
+        } = self.header;
+        let i = Scaled {
+            from: [width, height],
+            to: sent,
+        }
+        .index(x, y)?;
+        Some(match &self.content {
+            Content::Color(pixels) => vec![("linear RGB", numbers(*pixels.colors.get(i)?))],
+            Content::Samples(counts, total) => vec![("samples", format!("{} of {total}", counts.get(i)?))],
+            Content::Hits(aov, hits) => self.hit(*aov, hits.get(i)?),
+            Content::Compare(gpu, cpu) => {
+                let (gpu, cpu) = (Vec3::from(*gpu.colors.get(i)?), Vec3::from(*cpu.colors.get(i)?));
+                vec![
+                    ("GPU", numbers(gpu.into())),
+                    ("CPU", numbers(cpu.into())),
+                    ("GPU - CPU", numbers((gpu - cpu).into())),
+                ]
+            }
+        })
+    }
+
+    fn hit(&self, aov: Aov, hit: &FirstHit) -> Vec<(&'static str, String)> {
+        if hit.shape == NOTHING {
+            return vec![("hit", "nothing".to_string())];
+        }
+        let shape = match hit.shape.checked_sub(self.names.shapes) {
+            None => format!("shapes[{}]", hit.shape),
+            Some(light) => format!("lights[{light}]"),
+        };
+        let mut known = match aov {
+            Aov::Normal => vec![("normal", numbers(hit.normal.into()))],
+            Aov::Depth => vec![("depth", numbers([hit.depth]))],
+            Aov::Uv => vec![("uv", numbers(hit.uv.into()))],
+            _ => Vec::new(),
+        };
+        known.push(("on", shape));
+        known.extend(
+            self.names
+                .materials
+                .get(hit.material as usize)
+                .map(|name| ("material", name.clone())),
+        );
+        known
+    }
+}
+
+fn numbers<const N: usize>(values: [f32; N]) -> String {
+    values.map(|v| format!("{v}")).join("  ")
+}
+
+/// The bytes of values that are shown as they are, not as light.
+fn bytes<T: Sync>(pixels: &[T], color: impl Fn(&T) -> Vec3 + Sync) -> Vec<u8> {
+    let byte = |v: f32| (v * 255.0 + 0.5) as u8; // saturates
+    pixels
+        .par_iter()
+        .with_min_len(1024)
+        .flat_map_iter(|pixel| color(pixel).to_array().map(byte))
+        .collect()
+}
+
+fn display(pixels: &Pixels) -> Vec<u8> {
+    pixels
+        .colors
+        .par_iter()
+        .with_min_len(1024)
+        .flat_map_iter(|color| color.map(encode))
+        .collect()
+}
+
+/// A picture of the differences: `gain` times as large, but never so small that they cannot be seen.
+fn amplified(gpu: &Pixels, cpu: &Pixels, gain: f32) -> Vec<u8> {
+    const LEAST: f32 = 0.2;
+    let pairs: Vec<_> = gpu.colors.iter().copied().zip(cpu.colors.iter().copied()).collect();
+    bytes(&pairs, |(gpu, cpu)| {
+        if gpu.map(f32::to_bits) == cpu.map(f32::to_bits) {
+            return Vec3::ZERO;
+        }
+        let apart = (Vec3::from(*gpu) - Vec3::from(*cpu)).abs() * gain;
+        // What is no number is as wrong as can be.
+        let apart = Vec3::select(apart.is_nan_mask(), Vec3::ONE, apart);
+        if apart.max_element() < LEAST {
+            Vec3::splat(LEAST)
+        } else {
+            apart
+        }
+    })
+}
+
+/// A picture of radiance as a PNG file.
+pub fn png_of(pixels: &Pixels) -> Vec<u8> {
+    png(pixels.width, pixels.height, &display(pixels))
+}
+
+/// A PNG file of 8-bit RGB, packed for speed.
+fn png(width: u32, height: u32, rgb: &[u8]) -> Vec<u8> {
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_compression(png::Compression::Fast);
+    // Writing to memory fails only if the sizes do not fit; the page then shows no picture, which the tests would see.
+    let written = encoder
+        .write_header()
+        .and_then(|mut writer| writer.write_image_data(rgb));
+    if let Err(error) = written {
+        tracing::error!("a picture of {width} x {height} cannot be made: {error}");
+    }
+    file
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Region;
+
+    fn pixels(colors: &[[f32; 3]]) -> Pixels {
+        Pixels {
+            width: colors.len() as u32,
+            height: 1,
+            colors: colors.to_vec(),
+        }
+    }
+
+    #[test]
+    fn every_difference_is_seen() {
+        let a = pixels(&[[0.5; 3], [0.0; 3], [1.0; 3], [1.0; 3], [0.0; 3]]);
+        let b = pixels(&[
+            [0.5; 3],
+            [-0.0; 3],
+            [1.0, 1.0 + f32::EPSILON, 1.0],
+            [f32::NAN; 3],
+            [0.001, 0.0, 1.0],
+        ]);
+        assert_eq!(
+            amplified(&a, &b, 256.0),
+            [0, 0, 0, 51, 51, 51, 51, 51, 51, 255, 255, 255, 65, 0, 255]
+        );
+        assert_eq!(amplified(&a, &a, 256.0), [0; 15]);
+    }
+
+    #[test]
+    fn a_coarse_picture_shows_where_the_film_is_empty() {
+        let under = pixels(&[[1.0, 0.0, 0.0]]);
+        let mut film = Film::new(Region::whole(1, 2));
+        film.sums[0] = Vec4::new(0.0, 2.0, 4.0, 2.0);
+        assert_eq!(
+            means(&film, Some(&under), &|y| y < 1).colors,
+            [[0.0, 1.0, 2.0], [1.0, 0.0, 0.0]]
+        );
+        assert_eq!(means(&film, None, &|y| y < 1).colors[1], [0.0; 3]);
+    }
+}

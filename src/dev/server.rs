@@ -1,0 +1,234 @@
+//! The page and what it is told: a small server of four files and one WebSocket.
+
+use std::io;
+use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use axum::Router;
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::extract::{Request, State};
+use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use serde::{Deserialize, Serialize};
+use tokio::sync::{Semaphore, watch};
+
+use super::guard::Guard;
+use super::picture::Frame;
+use super::session::{self, Command, Session};
+
+/// So many may look at once.
+const VIEWERS: usize = 16;
+/// The largest message of a viewer, in bytes: a command is far smaller.
+const LARGEST_MESSAGE: usize = 4096;
+/// A viewer that takes nothing for so long is gone.
+const SEND: Duration = Duration::from_secs(30);
+/// So often a viewer is asked whether it is there; after three times without a word it is gone.
+const BEAT: Duration = Duration::from_secs(15);
+
+/// A place to listen that is open.
+pub struct Listener {
+    listener: TcpListener,
+    guard: Guard,
+}
+
+impl Listener {
+    /// Opens a place such as `127.0.0.1:7878` or `localhost:0`; port 0 is any that is free.
+    ///
+    /// # Errors
+    ///
+    /// Places that do not exist, are not this machine's or are taken.
+    pub fn open(place: &str) -> io::Result<Listener> {
+        let named = |error: io::Error| io::Error::new(error.kind(), format!("{place}: {error}"));
+        let addresses: Vec<SocketAddr> = place.to_socket_addrs().map_err(named)?.collect();
+        let listener = TcpListener::bind(addresses.as_slice()).map_err(named)?;
+        listener.set_nonblocking(true)?;
+        let name = place.rsplit_once(':').map_or(place, |(name, _)| name).to_string();
+        let guard = Guard {
+            name: Some(name),
+            loopback: listener.local_addr()?.ip().is_loopback(),
+        };
+        Ok(Listener { listener, guard })
+    }
+
+    /// Where it is.
+    pub fn address(&self) -> io::Result<SocketAddr> {
+        self.listener.local_addr()
+    }
+
+    /// Shows a session to whoever comes, for ever.
+    ///
+    /// # Errors
+    ///
+    /// What the system does not allow.
+    pub fn serve(self, session: &Session) -> io::Result<()> {
+        let shared = Shared {
+            guard: self.guard,
+            state: session.state.clone(),
+            frames: session.frames.clone(),
+            send: Arc::new(session.commands()),
+            viewers: Arc::new(Semaphore::new(VIEWERS)),
+        };
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        runtime.block_on(async {
+            let listener = tokio::net::TcpListener::from_std(self.listener)?;
+            axum::serve(listener, routes(shared)).await
+        })
+    }
+}
+
+#[derive(Clone)]
+struct Shared {
+    guard: Guard,
+    state: watch::Receiver<Arc<session::State>>,
+    frames: watch::Receiver<Option<Arc<Frame>>>,
+    send: Arc<dyn Fn(Command) -> bool + Send + Sync>,
+    viewers: Arc<Semaphore>,
+}
+
+fn routes(shared: Shared) -> Router {
+    const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
+    let file =
+        |kind: &'static str, text: &'static str| get(move || async move { ([(header::CONTENT_TYPE, kind)], text) });
+    Router::new()
+        .route("/", file("text/html; charset=utf-8", include_str!("page/index.html")))
+        .route(
+            "/style.css",
+            file("text/css; charset=utf-8", include_str!("page/style.css")),
+        )
+        .route("/page.js", file(JAVASCRIPT, include_str!("page/page.js")))
+        .route("/picture.js", file(JAVASCRIPT, include_str!("page/picture.js")))
+        .route("/socket", get(socket))
+        .layer(middleware::from_fn_with_state(shared.clone(), guarded))
+        .with_state(shared)
+}
+
+/// Refuses what comes from elsewhere, and tells the browser to load nothing from there.
+async fn guarded(State(shared): State<Shared>, request: Request, next: Next) -> Response {
+    let socket = request.uri().path() == "/socket";
+    let mut response = match shared.guard.check(request.headers(), socket) {
+        Ok(()) => next.run(request).await,
+        Err(why) => (StatusCode::FORBIDDEN, why).into_response(),
+    };
+    let policy = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; \
+                  base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+    let headers: [(HeaderName, &'static str); 5] = [
+        (header::CONTENT_SECURITY_POLICY, policy),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
+        (header::CACHE_CONTROL, "no-store"),
+        (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+    ];
+    for (name, value) in headers {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+async fn socket(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Response {
+    let Ok(seat) = shared.viewers.clone().try_acquire_owned() else {
+        return (StatusCode::SERVICE_UNAVAILABLE, "too many viewers").into_response();
+    };
+    let upgrade = upgrade
+        .max_message_size(LARGEST_MESSAGE)
+        .max_frame_size(LARGEST_MESSAGE);
+    upgrade.on_upgrade(async move |socket| {
+        let _gone = view(socket, &shared).await; // how a viewer goes does not matter
+        drop(seat);
+    })
+}
+
+/// What a viewer may say.
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Ask {
+    /// What is known of a pixel?
+    Pixel([u32; 2]),
+    #[serde(untagged)]
+    Command(Command),
+}
+
+/// What a viewer is told, beside frames.
+#[derive(Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Tell<'a> {
+    State(&'a session::State),
+    Pixel {
+        x: u32,
+        y: u32,
+        values: Vec<(&'static str, String)>,
+    },
+    Refused(String),
+}
+
+/// Tells one viewer what there is to tell, as fast as it takes it: it gets the newest frame, not every frame.
+async fn view(mut socket: WebSocket, shared: &Shared) -> Option<()> {
+    let (mut state, mut frames) = (shared.state.clone(), shared.frames.clone());
+    state.mark_changed();
+    frames.mark_changed();
+    let mut beat = tokio::time::interval(BEAT);
+    let mut heard = Instant::now();
+    loop {
+        let message = tokio::select! {
+            changed = state.changed() => {
+                changed.ok()?;
+                let state = state.borrow_and_update().clone();
+                text(&Tell::State(&state))?
+            }
+            changed = frames.changed() => {
+                changed.ok()?;
+                match frames.borrow_and_update().clone() {
+                    Some(frame) => Message::Binary(bytes(&frame)?.into()),
+                    None => continue,
+                }
+            }
+            message = socket.recv() => {
+                heard = Instant::now();
+                match message?.ok()? {
+                    Message::Text(asked) => match answer(&asked, shared) {
+                        Some(answer) => text(&answer)?,
+                        None => continue,
+                    },
+                    Message::Binary(_) | Message::Close(_) => return None,
+                    Message::Ping(_) | Message::Pong(_) => continue,
+                }
+            }
+            _ = beat.tick() => {
+                if heard.elapsed() > 3 * BEAT {
+                    return None;
+                }
+                Message::Ping(Vec::new().into())
+            }
+        };
+        tokio::time::timeout(SEND, socket.send(message)).await.ok()?.ok()?;
+    }
+}
+
+fn answer(asked: &str, shared: &Shared) -> Option<Tell<'static>> {
+    match serde_json::from_str(asked) {
+        Ok(Ask::Pixel([x, y])) => {
+            let frame = shared.frames.borrow().clone();
+            let values = frame.and_then(|frame| frame.pixel(x, y)).unwrap_or_default();
+            Some(Tell::Pixel { x, y, values })
+        }
+        Ok(Ask::Command(command)) => {
+            (!(shared.send)(command)).then(|| Tell::Refused("busy: a command was dropped".to_string()))
+        }
+        Err(error) => Some(Tell::Refused(format!("not understood: {error}"))),
+    }
+}
+
+fn text(tell: &Tell) -> Option<Message> {
+    Some(Message::Text(serde_json::to_string(tell).ok()?.into()))
+}
+
+/// A frame: the length of its header as four bytes, little-endian, the header as JSON, and the pictures.
+fn bytes(frame: &Frame) -> Option<Vec<u8>> {
+    let header = serde_json::to_vec(&frame.header).ok()?;
+    let mut bytes = u32::try_from(header.len()).ok()?.to_le_bytes().to_vec();
+    bytes.extend(header);
+    frame.pictures.iter().for_each(|picture| bytes.extend(picture));
+    Some(bytes)
+}

@@ -1,0 +1,361 @@
+//! A session: the files of a scene, watched and rendered, and what those who look at it get and may ask for.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+use tokio::sync::watch;
+
+use super::build::{Builder, Built};
+use super::camera::Move;
+use super::diagnostic::Diagnostic;
+use super::painter::Painter;
+use super::picture::{Frame, View};
+use super::source::{Snapshot, Sources};
+use super::watch::Watch;
+use crate::error::RenderError;
+use crate::gpu::{Choice, choose};
+
+/// What a session is told at its start.
+pub struct Settings {
+    /// The files.
+    pub sources: Sources,
+    /// What renders.
+    pub device: Choice,
+    /// A PNG file that is replaced after each reload.
+    pub out: Option<PathBuf>,
+    /// Is told what happens, for the terminal.
+    pub report: Box<dyn Fn(Report) + Send>,
+}
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Report {
+    /// Something is wrong.
+    Problem(Diagnostic),
+    /// Nothing is wrong any more.
+    Mended,
+    /// The first picture of a saved file was shown, so many seconds after the save was noticed; if a kernel was compiled,
+    /// that took so many.
+    Reloaded {
+        /// From the save to the picture.
+        seconds: f64,
+        /// To compile.
+        compiled: Option<f64>,
+    },
+    /// The picture has all its samples.
+    Finished {
+        /// Since the first picture.
+        seconds: f64,
+    },
+    /// The camera was written into the scene file, or could not be.
+    Saved(Result<(), String>),
+}
+
+/// What someone who looks asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Command {
+    /// To move the camera.
+    Move(Move),
+    /// The scene file's camera.
+    ResetCamera,
+    /// To write the camera into the scene file.
+    SaveCamera,
+    /// Another view.
+    View(View),
+    /// The factor of the difference of [`View::Compare`].
+    Gain(f32),
+}
+
+/// What is known beside the picture; it goes to the page as JSON.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct State {
+    /// The scene file.
+    pub scene: String,
+    /// The shaders' folder; the program's own if absent.
+    pub shaders: Option<String>,
+    /// The device and its driver.
+    pub device: String,
+    /// What is shown.
+    pub view: View,
+    /// The factor of the difference of [`View::Compare`].
+    pub gain: f32,
+    /// The camera, as the section of a scene file.
+    pub camera: String,
+    /// Whether it is not that of the file.
+    pub camera_moved: bool,
+    /// What is wrong now.
+    pub problems: Vec<Diagnostic>,
+    /// Whether a kernel is being compiled.
+    pub compiling: bool,
+    /// Seconds that the last one took.
+    pub compile_seconds: Option<f64>,
+    /// The last thing that was said, and how many were before it.
+    pub notice: Option<Notice>,
+}
+
+/// An answer to a command.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Notice {
+    /// Counts them.
+    pub number: u64,
+    /// What is said.
+    pub text: String,
+    /// Whether it is bad.
+    pub bad: bool,
+}
+
+/// What reaches the thread that renders.
+pub enum Event {
+    /// The files have changed; noticed at that time.
+    Files(Box<Snapshot>, Instant),
+    /// A kernel has been compiled.
+    Built(Box<Built>),
+    /// Someone asks for something.
+    Command(Command),
+    /// A driver loses its device.
+    #[cfg(test)]
+    Lose,
+    /// The session ends.
+    Stop,
+}
+
+/// So many events may wait for one call to end.
+const WAITING: usize = 256;
+
+/// A running session; it ends when this is dropped.
+pub struct Session {
+    events: SyncSender<Event>,
+    /// What is known.
+    pub state: watch::Receiver<Arc<State>>,
+    /// The newest picture, once there is one. Whoever is slow misses some.
+    pub frames: watch::Receiver<Option<Arc<Frame>>>,
+    watch: Option<Watch>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// Why there is no session.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// There is no scene file.
+    #[error("{0}: cannot be read: {1}")]
+    NoScene(PathBuf, std::io::Error),
+    /// No device.
+    #[error(transparent)]
+    Device(#[from] RenderError),
+    /// The system does not let files be watched.
+    #[error("files cannot be watched: {0}")]
+    Watch(#[from] notify::Error),
+    /// The system gives no thread.
+    #[error(transparent)]
+    System(#[from] std::io::Error),
+}
+
+impl Session {
+    /// Opens the device, reads the files and starts to render. Errors in the files are told, and waited for to be mended.
+    ///
+    /// # Errors
+    ///
+    /// No device, a scene file that does not exist, and what the system does not allow.
+    pub fn start(settings: Settings) -> Result<Session, StartError> {
+        let Settings {
+            sources,
+            device: choice,
+            out,
+            report,
+        } = settings;
+        std::fs::metadata(&sources.scene).map_err(|error| StartError::NoScene(sources.scene.clone(), error))?;
+        let device = choose(&choice)?;
+        let snapshot = sources.read();
+        let (events, inbox) = sync_channel(WAITING);
+        let started = Instant::now();
+        let first = Event::Files(Box::new(snapshot.clone()), started);
+        let _ = events.send(first); // the inbox is here
+        let watch = Watch::start(sources.clone(), snapshot, {
+            let events = events.clone();
+            move |snapshot, noticed| events.send(Event::Files(Box::new(snapshot), noticed)).is_ok()
+        })?;
+        let builder = Builder::start(choice, {
+            let events = events.clone();
+            move |built| {
+                let _ = events.send(Event::Built(Box::new(built))); // after the session's end nobody wants it
+            }
+        })?;
+        let (state_sender, state) = watch::channel(Arc::default());
+        let (frame_sender, frames) = watch::channel(None);
+        let painter = Painter::new(sources, device, builder, out, report, state_sender, frame_sender);
+        let thread = std::thread::Builder::new()
+            .name("render".to_string())
+            .spawn(move || run(painter, inbox))?;
+        Ok(Session {
+            events,
+            state,
+            frames,
+            watch: Some(watch),
+            thread: Some(thread),
+        })
+    }
+
+    /// Asks for something.
+    pub fn send(&self, command: Command) {
+        let _ = self.events.send(Event::Command(command)); // the thread lives as long as this
+    }
+
+    /// A way to ask for things from other threads, without ever waiting: false if too much is asked for already.
+    pub fn commands(&self) -> impl Fn(Command) -> bool + Send + Sync + 'static {
+        let events = self.events.clone();
+        move |command| !matches!(events.try_send(Event::Command(command)), Err(TrySendError::Full(_)))
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.watch = None;
+        let _ = self.events.send(Event::Stop); // the thread may have ended by itself
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Takes what has come before any work is done, so that nothing waits for more than one call.
+fn run(mut painter: Painter, inbox: Receiver<Event>) {
+    loop {
+        let event = if painter.has_work() {
+            inbox.try_recv().ok()
+        } else {
+            inbox.recv().ok().or(Some(Event::Stop))
+        };
+        match event {
+            Some(Event::Stop) => break,
+            Some(event) => painter.take(event),
+            None => painter.work(),
+        }
+    }
+    drop(inbox); // first: other threads may wait for room in it, and the painter for them
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::time::Duration;
+
+    use super::*;
+    use crate::dev::picture::Content;
+    use crate::gpu::compose::{BUILT_IN, Shaders};
+    use crate::image::Pixels;
+    use crate::scene::Overrides;
+
+    const SCENE: &str = "
+        image = { width = 8, height = 8 }
+        camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }
+        render = { ambient = [1, 1, 1], pixel_samples = { count = 4 } }
+        materials.m = { type = 'phong', color = [0.5, 0.5, 0.5] }
+        shapes = [{ type = 'sphere', material = 'm', center = [0, 0, 0], radius = 1 }]
+    ";
+
+    fn wait<T>(what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(40) {
+            if let Some(value) = ready() {
+                return value;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        panic!("{what} does not come");
+    }
+
+    fn finished(session: &Session, after: u64) -> (u64, Pixels) {
+        wait("a picture", || {
+            let frame = session.frames.borrow().clone()?;
+            let header = &frame.header;
+            match &frame.content {
+                Content::Color(pixels) if header.done && header.revision > after => {
+                    Some((header.revision, pixels.clone()))
+                }
+                _ => None,
+            }
+        })
+    }
+
+    #[test]
+    fn a_lost_device_is_opened_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::create_dir_all(path("shaders/kernels")).unwrap();
+        for (name, text) in BUILT_IN {
+            fs::write(path("shaders").join(name), text).unwrap();
+        }
+        fs::write(path("scene.toml"), SCENE).unwrap();
+        let (told, reports) = std::sync::mpsc::channel();
+        let session = Session::start(Settings {
+            sources: Sources {
+                scene: path("scene.toml"),
+                overrides: Overrides::default(),
+                shaders: Some(path("shaders")),
+            },
+            device: Choice::Auto,
+            out: None,
+            report: Box::new(move |report| drop(told.send(report))),
+        })
+        .unwrap();
+        let (first, wanted) = finished(&session, 0);
+
+        // Lost while nothing happens: the next move finds it out, and is shown all the same.
+        session.events.send(Event::Lose).unwrap();
+        session.send(Command::Move(Move::Orbit(0.1, 0.0)));
+        let (second, _) = finished(&session, first);
+        session.send(Command::ResetCamera);
+        let (third, again) = finished(&session, second);
+        assert_eq!(again, wanted);
+        assert!(session.state.borrow().problems.is_empty());
+        let lost = reports.try_iter().find_map(|report| match report {
+            Report::Problem(problem) => Some(problem.kind),
+            _ => None,
+        });
+        assert_eq!(lost, Some("device"), "it was lost indeed");
+
+        // Lost while a kernel is compiled, with shaders that are wrong: the last good ones go on.
+        let good = Shaders::built_in().text("kernels/render.wgsl").to_string();
+        session.events.send(Event::Lose).unwrap();
+        fs::write(path("shaders/kernels/render.wgsl"), good.replace("= sum;", "= sun;")).unwrap();
+        wait("the shader's error", || {
+            session
+                .state
+                .borrow()
+                .problems
+                .iter()
+                .any(|problem| problem.kind == "shader")
+                .then_some(())
+        });
+        session.send(Command::Move(Move::Orbit(0.1, 0.0)));
+        session.send(Command::ResetCamera);
+        let (_, again) = wait("the picture", || {
+            Some(finished(&session, third)).filter(|(_, pixels)| *pixels == wanted)
+        });
+        assert_eq!(again, wanted);
+        fs::write(path("shaders/kernels/render.wgsl"), good).unwrap();
+        wait("no error", || session.state.borrow().problems.is_empty().then_some(()));
+    }
+
+    #[test]
+    fn a_scene_that_does_not_exist_is_an_error_at_once() {
+        let sources = Sources {
+            scene: "/nowhere/scene.toml".into(),
+            overrides: Overrides::default(),
+            shaders: None,
+        };
+        let settings = Settings {
+            sources,
+            device: Choice::Auto,
+            out: None,
+            report: Box::new(|_| ()),
+        };
+        let error = Session::start(settings).err().unwrap().to_string();
+        assert!(error.starts_with("/nowhere/scene.toml: cannot be read: "), "{error}");
+    }
+}

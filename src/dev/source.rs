@@ -1,0 +1,160 @@
+//! The files that a session renders: read as they are now, whatever happened to them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use super::diagnostic::Diagnostic;
+use crate::gpu::compose::{BUILT_IN, Shaders};
+use crate::pack::{Packed, Specialization, pack};
+use crate::scene::{CameraDescription, Description, Overrides, Scene, TextureDescription};
+
+/// Where the files are.
+#[derive(Clone, Debug)]
+pub struct Sources {
+    /// The scene file.
+    pub scene: PathBuf,
+    /// Values that stand in for those of the scene file.
+    pub overrides: Overrides,
+    /// The folder of the shaders; without one the shaders in the program are used.
+    pub shaders: Option<PathBuf>,
+}
+
+/// A scene that has been read and packed.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The camera as the file describes it.
+    pub camera: CameraDescription,
+    /// Names of the materials, in the order of their numbers.
+    pub materials: Vec<String>,
+    /// The scene.
+    pub scene: Scene,
+    /// What the backends read.
+    pub packed: Packed,
+}
+
+/// What a kernel is compiled for: its constants, and whether sampling is adaptive.
+pub type Constants = (Specialization, bool);
+
+/// What a scene's kernel is compiled for.
+pub fn constants(packed: &Packed) -> Constants {
+    (packed.specialization, packed.adaptive)
+}
+
+/// What the files say at one moment.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// The scene, or what is wrong with it.
+    pub scene: Result<Arc<Loaded>, Diagnostic>,
+    /// The shaders, or what is wrong with them.
+    pub shaders: Result<Arc<Shaders>, Diagnostic>,
+    /// The scene file and the files that the scene uses, and their state: what decides whether to read again.
+    pub files: Vec<(PathBuf, Stamp)>,
+}
+
+/// What tells two states of a file apart: a scene file's content; of large files length and time of change.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Stamp {
+    /// It cannot be read.
+    Absent,
+    /// The bytes of a text.
+    Content(Vec<u8>),
+    /// Length and time of change.
+    Changed(u64, Option<SystemTime>),
+}
+
+impl Sources {
+    /// Reads everything.
+    pub fn read(&self) -> Snapshot {
+        self.read_scene(self.read_shaders())
+    }
+
+    /// Reads what has changed since a snapshot; `None` if nothing has.
+    pub fn reread(&self, last: &Snapshot) -> Option<Snapshot> {
+        let shaders = match (self.read_shaders(), &last.shaders) {
+            (Ok(new), Ok(old)) if new == *old => Ok(old.clone()), // the same pointer, which later stages compare
+            (shaders, _) => shaders,
+        };
+        let same_shaders = match (&shaders, &last.shaders) {
+            (Ok(new), Ok(old)) => Arc::ptr_eq(new, old),
+            (Err(new), Err(old)) => new == old,
+            _ => false,
+        };
+        let same_scene = last.files.iter().all(|(path, stamp)| self.stamp(path) == *stamp);
+        match (same_scene, same_shaders) {
+            (true, true) => None,
+            (true, false) => Some(Snapshot {
+                shaders,
+                ..last.clone()
+            }),
+            (false, _) => {
+                let mut new = self.read_scene(shaders);
+                if new.files.len() == 1 {
+                    // It may be half a scene: what the last whole one named stays watched.
+                    new.files.extend(
+                        last.files
+                            .iter()
+                            .skip(1)
+                            .map(|(path, _)| (path.clone(), self.stamp(path))),
+                    );
+                }
+                Some(new)
+            }
+        }
+    }
+
+    fn read_shaders(&self) -> Result<Arc<Shaders>, Diagnostic> {
+        let shaders = match &self.shaders {
+            Some(folder) => Shaders::read(folder).map_err(|error| Diagnostic::plain("file", error.to_string()))?,
+            None => Shaders::built_in(),
+        };
+        Ok(Arc::new(shaders))
+    }
+
+    fn read_scene(&self, shaders: Result<Arc<Shaders>, Diagnostic>) -> Snapshot {
+        // The stamps are taken first: a file that changes while it is read is read again.
+        let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
+        let text = fs::read_to_string(&self.scene).unwrap_or_default();
+        let described = Description::parse(&text, &self.scene.display().to_string());
+        if let Ok(described) = &described {
+            files.extend(self.assets(described).map(|path| (path.clone(), self.stamp(&path))));
+        }
+        let scene = Scene::load(&self.scene, &self.overrides).and_then(|scene| Ok((scene, described?)));
+        let scene = scene
+            .map_err(|error| Diagnostic::scene(&error, &text))
+            .map(|(scene, described)| {
+                let packed = pack(&scene);
+                let materials = described.materials.into_keys().collect();
+                Arc::new(Loaded {
+                    camera: described.camera,
+                    materials,
+                    scene,
+                    packed,
+                })
+            });
+        Snapshot { scene, shaders, files }
+    }
+
+    /// The files that a scene names: the one place to add to when scenes name more.
+    fn assets(&self, described: &Description) -> impl Iterator<Item = PathBuf> {
+        let folder = self.scene.parent().unwrap_or(Path::new(""));
+        described.textures.values().filter_map(move |texture| match texture {
+            TextureDescription::Image(image) => Some(folder.join(&image.file)),
+            _ => None,
+        })
+    }
+
+    fn stamp(&self, path: &Path) -> Stamp {
+        if path == self.scene {
+            return fs::read(path).map_or(Stamp::Absent, Stamp::Content);
+        }
+        fs::metadata(path).map_or(Stamp::Absent, |data| Stamp::Changed(data.len(), data.modified().ok()))
+    }
+
+    /// The shader files' paths.
+    pub fn shader_files(&self) -> impl Iterator<Item = PathBuf> {
+        let folder = self.shaders.iter();
+        folder.flat_map(|folder| BUILT_IN.iter().map(move |(name, _)| folder.join(name)))
+    }
+}

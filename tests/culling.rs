@@ -1,0 +1,73 @@
+//! What is left out because it cannot matter does not matter: a primitive whose sphere is outside of the cone to a light
+//! hides none of its samples.
+
+use glam::{UVec2, Vec3};
+use proptest::strategy::{Strategy, ValueTree};
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use wgray::cpu::shadow::{Block, cone_to_light, may_block, shadow_bits};
+use wgray::pack::{Packed, RANDOM, Sphere};
+
+use crate::random::Random;
+use crate::{random_scenes, scenes};
+
+/// Small scenes of all kinds.
+fn some_scenes(count: usize) -> Vec<Packed> {
+    let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
+    let strategy = random_scenes::description();
+    let scene = |_| scenes::packed(&strategy.new_tree(&mut runner).expect("a scene").current());
+    (0..count).map(scene).collect()
+}
+
+/// How many times a primitive was left out, and how many times that was wrong, up to 30 radii away from something: from
+/// thousands of radii away both tests are about rounding. `bound` changes the spheres.
+fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usize) {
+    let random = Random::new(11);
+    let (mut left_out, mut wrong) = (0, 0);
+    for scene in scenes
+        .iter()
+        .filter(|scene| !scene.lights.is_empty() && !scene.primitives.is_empty())
+    {
+        for _ in 0..200 {
+            let near = scene.bounds[random.below(scene.bounds.len() as u32) as usize];
+            let reach = random.pick(&[0.5, 1.0, 4.0, 30.0]) * near.radius;
+            if reach > 1e9 {
+                continue; // around a plane
+            }
+            let p = near.center + Vec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0) as f32)) * reach;
+            let light = &scene.lights[random.below(scene.lights.len() as u32) as usize];
+            let cone = cone_to_light(light, p);
+            let block = Block {
+                pattern: RANDOM,
+                side: 32,
+                first: 0,
+                count: 32,
+                group: 0,
+                key: UVec2::new(random.bits() as u32, random.bits() as u32),
+            };
+            for (q, sphere) in scene.primitives.iter().zip(&scene.bounds) {
+                if !may_block(&bound(*sphere), &cone) {
+                    left_out += 1;
+                    wrong += usize::from(shadow_bits(q.kind, q, p, light, block) != 0);
+                }
+            }
+        }
+    }
+    (left_out, wrong)
+}
+
+#[test]
+fn what_is_left_out_hides_nothing() {
+    let scenes = some_scenes(400);
+    let (left_out_rightly, wrong) = left_out(&scenes, |sphere| sphere);
+    println!("{left_out_rightly} primitives were left out, {wrong} of them wrongly");
+    assert!(left_out_rightly > 10_000, "only {left_out_rightly} were left out");
+    assert_eq!(wrong, 0);
+    let smaller = |sphere: Sphere| Sphere {
+        radius: 0.9 * sphere.radius,
+        ..sphere
+    };
+    assert!(
+        left_out(&scenes, smaller).1 > 0,
+        "spheres that are too small are not found"
+    );
+}

@@ -1,0 +1,307 @@
+// The page of `wgray dev` in a real browser.
+
+import assert from "node:assert/strict";
+import http from "node:http";
+import { after, afterEach, before, beforeEach, test } from "node:test";
+
+import { LONGEST, SCENE, Studio, decoded, finished, launch, open, revision, settled, shown, showsRendered } from "./studio.mjs";
+
+let browser;
+let studio;
+
+before(async () => (browser = await launch(["--host-resolver-rules=MAP evil.example 127.0.0.1"])));
+after(() => browser.close());
+beforeEach(async () => {
+  studio = new Studio();
+  await studio.start();
+});
+afterEach(async () => {
+  await Promise.all(browser.contexts().map((context) => context.close()));
+  await studio.remove();
+});
+
+const text = (page, selector) => page.locator(selector).innerText();
+
+async function drag(page, dx, dy, modifier) {
+  const box = await page.locator("[data-part=picture] canvas").boundingBox();
+  const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+  if (modifier) await page.keyboard.down(modifier);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.mouse.move(x + dx, y + dy, { steps: 4 });
+  await page.mouse.up();
+  if (modifier) await page.keyboard.up(modifier);
+}
+
+test("the picture is the one that render makes", async () => {
+  const page = await open(browser, studio);
+  await showsRendered(page, studio);
+  assert.equal(await text(page, "#samples"), "4 of 4");
+  assert.equal(await text(page, "#link"), "live");
+  // The comparison can fail.
+  const before = await decoded(page, studio.render());
+  studio.edit("scene.toml", "fov = 40", "fov = 42");
+  assert.notDeepEqual(await decoded(page, studio.render()), before);
+  await showsRendered(page, studio);
+  assert.deepEqual(page.faults, []);
+});
+
+test("a saved shader changes the picture", async () => {
+  const page = await open(browser, studio);
+  const [seen, old] = [await shown(page), await revision(page)];
+  studio.redden();
+  await finished(page, old);
+  const [, , reddened] = await shown(page);
+  const bytes = reddened.split(",").map(Number);
+  assert.ok(bytes.every((value, i) => i % 3 === 0 || value === 0), "only red is left");
+  const red = (data) => data.split(",").filter((_, i) => i % 3 === 0);
+  assert.deepEqual(red(reddened), red(seen[2]));
+});
+
+test("a broken shader shows file and line and keeps the picture, a mended one recovers", async () => {
+  const page = await open(browser, studio);
+  const seen = await shown(page);
+  studio.breakShader();
+  const place = `shaders/kernels/render.wgsl:${studio.brokenLine()}:`;
+  await page.locator("#problems h2", { hasText: place }).waitFor();
+  assert.match(await text(page, "#problems"), /simple/);
+  assert.match(await text(page, "#problems pre"), /\^\^\^\^\^\^/);
+  assert.match(await page.title(), /^✗/);
+  await page.waitForTimeout(500);
+  assert.deepEqual(await shown(page), seen);
+  studio.mendShader();
+  await page.locator("#problems h2").waitFor({ state: "detached" });
+  await showsRendered(page, studio);
+  // It was told in the terminal too.
+  assert.match(studio.said, new RegExp(`error: ${place.replaceAll(".", "\\.")}\\d+: .*simple`));
+  assert.doesNotMatch(studio.said, /\x1b/, "a pipe gets no colours");
+});
+
+test("a broken scene shows its line", async () => {
+  const page = await open(browser, studio);
+  studio.edit("scene.toml", "radius = 0.5", "radius = -0.5");
+  await page.locator("#problems h2", { hasText: /scene\.toml:\d+$/ }).waitFor();
+  assert.match(await text(page, "#problems pre"), /radius = -0\.5/);
+  studio.write("scene.toml", SCENE);
+  await page.locator("#problems h2").waitFor({ state: "detached" });
+});
+
+test("drags move the camera, and saving writes what the page shows", async () => {
+  const page = await open(browser, studio);
+  const start = await text(page, "#camera-text");
+  assert.ok(await page.locator("#save").isDisabled());
+  let last = start;
+  for (const [modifier, dx, dy] of [[null, 90, 30], ["Shift", 30, -20], ["Control", 0, 40]]) {
+    await drag(page, dx, dy, modifier);
+    await settled(page);
+    assert.notEqual(await text(page, "#camera-text"), last);
+    last = await text(page, "#camera-text");
+  }
+  const seen = await shown(page);
+  await page.click("#save");
+  await page.locator("#notice", { hasText: "camera saved into scene.toml" }).waitFor();
+  await page.locator("#save:disabled").waitFor();
+  assert.deepEqual(await decoded(page, studio.render()), seen);
+  const saved = studio.read("scene.toml");
+  for (const kept of ["# a small scene\n", "[camera] # from the front\n", "] # a comment\n"]) {
+    assert.ok(saved.includes(kept), saved);
+  }
+  for (const line of last.split("\n").filter((line) => /^(position|look_at)/.test(line))) {
+    assert.ok(saved.includes(line), `${line} in ${saved}`);
+  }
+  assert.equal(await text(page, "#camera-text"), last);
+  assert.deepEqual(page.faults, []);
+});
+
+test("the camera is copied as text and reset", async () => {
+  const page = await open(browser, studio, { permissions: ["clipboard-read", "clipboard-write"] });
+  const start = await text(page, "#camera-text");
+  await drag(page, 60, 0);
+  await page.locator("#reset:enabled").waitFor();
+  await settled(page);
+  await page.click("#copy");
+  await page.locator("#notice", { hasText: "camera copied" }).waitFor();
+  const copied = await page.evaluate(() => navigator.clipboard.readText());
+  assert.equal(copied.trim(), (await text(page, "#camera-text")).trim());
+  assert.match(copied, /^\[camera\]\nposition = \[/);
+  assert.notEqual(copied.trim(), start.trim());
+  await page.click("#reset");
+  await page.locator("#reset:disabled").waitFor();
+  assert.equal(await text(page, "#camera-text"), start);
+});
+
+test("a pixel's linear value is read under the pointer", async () => {
+  const page = await open(browser, studio);
+  const [width, , bytes] = await shown(page);
+  const canvas = page.locator("[data-part=picture] canvas");
+  const { left, top } = await canvas.evaluate((canvas) => ({ ...canvas.dataset }));
+  await canvas.hover({ position: { x: Number(left) + 60.5, y: Number(top) + 45.5 } });
+  await page.locator("#values", { hasText: "pixel 60 45" }).waitFor();
+  const linear = /linear RGB ([\d.e+-]+) +([\d.e+-]+) +([\d.e+-]+)/.exec(await text(page, "#values"));
+  const encoded = linear.slice(1).map((v) => Math.round(255 * Math.min(1, Number(v)) ** (1 / 2.2)));
+  const at = 3 * (45 * width + 60);
+  assert.deepEqual(encoded, bytes.split(",").slice(at, at + 3).map(Number));
+});
+
+test("the views show what they say, the GPU agrees with the CPU", async () => {
+  const page = await open(browser, studio);
+  const seen = new Set([String(await shown(page))]);
+  for (const [i, view] of ["normal", "depth", "uv", "primitive", "samples"].entries()) {
+    await page.keyboard.press(String(i + 2));
+    await page.waitForFunction((view) => {
+      const shown = document.getElementById("panels").dataset;
+      return shown.view === view && shown.done === "true";
+    }, view);
+    assert.ok(await page.locator(`input[value=${view}]`).isChecked());
+    seen.add(String(await shown(page)));
+  }
+  assert.equal(seen.size, 6, "all views differ");
+  await page.getByLabel("GPU against CPU").check();
+  await page.locator("#differing", { hasText: /^0 pixels differ: all bits are the same$/ }).waitFor();
+  assert.deepEqual(await shown(page, "gpu"), await shown(page, "cpu"));
+  assert.match((await shown(page, "difference"))[2], /^[0,]+$/);
+  studio.redden();
+  await page.locator("#differing", { hasText: /^[\d,]+ pixels differ, by 0\.\d+ at most$/ }).waitFor();
+  await page.selectOption("#gain", "1");
+  await page.waitForFunction(() => document.getElementById("gain-shown").textContent === "× 1");
+  const faint = await shown(page, "difference");
+  await page.selectOption("#gain", "4096");
+  await page.waitForFunction(() => document.getElementById("gain-shown").textContent === "× 4096");
+  await settled(page);
+  assert.notDeepEqual(await shown(page, "difference"), faint);
+  assert.deepEqual(page.faults, []);
+});
+
+test("a second viewer sees the same, and what the first does", async () => {
+  const [first, second] = [await open(browser, studio), await open(browser, studio)];
+  assert.deepEqual(await shown(second), await shown(first));
+  const old = await revision(second);
+  await drag(first, 80, 10);
+  await finished(second, old);
+  await second.locator("#moved").waitFor();
+  await settled(first);
+  await settled(second);
+  assert.equal(await text(second, "#camera-text"), await text(first, "#camera-text"));
+  assert.deepEqual(await shown(second), await shown(first));
+});
+
+test("the page comes back when the program does", async () => {
+  const page = await open(browser, studio);
+  const { port } = studio;
+  await studio.stop();
+  await page.locator("#link.lost").waitFor();
+  assert.match(await text(page, "#link"), /connection lost/);
+  studio.edit("scene.toml", "fov = 40", "fov = 55");
+  await studio.start(port);
+  await page.locator("#link.live").waitFor();
+  await showsRendered(page, studio);
+});
+
+test("the keyboard alone is enough", async () => {
+  const page = await open(browser, studio);
+  const start = await text(page, "#camera-text");
+  const focused = () => page.evaluate(() => document.activeElement.tagName + (document.activeElement.id || document.activeElement.value || ""));
+  const reached = [];
+  for (let i = 0; i < 20; i++) {
+    await page.keyboard.press("Tab");
+    reached.push(await focused());
+  }
+  for (const wanted of ["CANVAS", "INPUTcolor", "INPUTorbit", "BUTTONzoom-in", "BUTTONcopy", "SUMMARY"]) {
+    assert.ok(reached.includes(wanted), `${wanted} in ${reached}`);
+  }
+  await page.locator("[data-part=picture] canvas").focus();
+  let last = start;
+  for (const key of ["ArrowLeft", "Shift+ArrowUp", "PageUp"]) {
+    await page.keyboard.press(key);
+    await page.waitForFunction((last) => document.getElementById("camera-text").innerText !== last, last);
+    last = await text(page, "#camera-text");
+  }
+  await page.keyboard.press("l");
+  await page.locator("#values", { hasText: /pixel 61 45 .*linear RGB/ }).waitFor();
+  await page.keyboard.press("+");
+  await page.locator("#zoom", { hasText: /^\d+ %$/ }).waitFor();
+  await page.keyboard.press("0");
+  await page.locator("#zoom", { hasText: /^fit/ }).waitFor();
+  await page.keyboard.press("r");
+  await page.locator("#reset:disabled").waitFor();
+  assert.equal(await text(page, "#camera-text"), start);
+});
+
+test("the wheel zooms about the pointer, and the hand shifts the picture", async () => {
+  const page = await open(browser, studio);
+  const canvas = page.locator("[data-part=picture] canvas");
+  const view = () => canvas.evaluate((canvas) => ["left", "top", "scale"].map((key) => Number(canvas.dataset[key])));
+  await shown(page);
+  const [left, top] = await view();
+  const box = await canvas.boundingBox();
+  await page.mouse.move(box.x + left + 30, box.y + top + 20);
+  await page.mouse.wheel(0, -400);
+  await page.waitForFunction(() => Number(document.querySelector("[data-part=picture] canvas").dataset.scale) > 2);
+  const [newLeft, newTop, scale] = await view();
+  assert.ok(Math.abs(newLeft + 30 * scale - (left + 30)) <= 1 && Math.abs(newTop + 20 * scale - (top + 20)) <= 1);
+  await page.getByLabel("Shift picture").check();
+  const camera = await text(page, "#camera-text");
+  await drag(page, 50, 0);
+  await page.waitForFunction((old) => Number(document.querySelector("[data-part=picture] canvas").dataset.left) > old + 40, newLeft);
+  assert.equal(await text(page, "#camera-text"), camera, "the camera stays");
+});
+
+test("it fits 360 pixels, in light and dark", async () => {
+  const colors = [];
+  for (const colorScheme of ["light", "dark"]) {
+    const page = await open(browser, studio, { viewport: { width: 360, height: 700 }, colorScheme });
+    const wide = await page.evaluate(() => document.scrollingElement.scrollWidth);
+    assert.ok(wide <= 360, `${wide} pixels wide`);
+    for (const id of ["save", "copy", "reset", "zoom-fit"]) {
+      const box = await page.locator(`#${id}`).boundingBox();
+      assert.ok(box.x >= 0 && box.x + box.width <= 360, `${id}: ${JSON.stringify(box)}`);
+    }
+    studio.breakShader();
+    const problem = page.locator("#problems article");
+    await problem.waitFor();
+    const box = await problem.boundingBox();
+    assert.ok(box.x >= 0 && box.x + box.width <= 360, JSON.stringify(box));
+    studio.mendShader();
+    await problem.waitFor({ state: "detached" });
+    colors.push(await page.evaluate(() => getComputedStyle(document.body).backgroundColor));
+  }
+  assert.notEqual(colors[0], colors[1]);
+});
+
+test("pages from elsewhere are refused", async () => {
+  // By another name for the same address, as after DNS rebinding.
+  const context = await browser.newContext();
+  const page = await context.newPage();
+  const answer = await page.goto(`http://evil.example:${studio.port}/`);
+  assert.equal(answer.status(), 403);
+  // By a WebSocket of another page; the same code on the own page connects.
+  const connects = (url) =>
+    new Promise((resolve) => {
+      const socket = new WebSocket(url);
+      socket.onopen = () => resolve(true);
+      socket.onerror = () => resolve(false);
+    });
+  const server = http.createServer((_, response) => response.end("<!doctype html><title>elsewhere</title>"));
+  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+  try {
+    const socket = `ws://127.0.0.1:${studio.port}/socket`;
+    await page.goto(`http://127.0.0.1:${server.address().port}/`);
+    assert.equal(await page.evaluate(connects, socket), false);
+    const own = await open(browser, studio);
+    assert.equal(await own.evaluate(connects, socket), true);
+  } finally {
+    server.closeAllConnections();
+    server.close();
+  }
+});
+
+test("a save is on the screen soon", async (t) => {
+  const page = await open(browser, studio);
+  const old = await revision(page);
+  const start = Date.now();
+  studio.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.1, 0.8");
+  await page.waitForFunction((old) => Number(document.getElementById("panels").dataset.revision) > old, old, { polling: 5 });
+  const took = Date.now() - start;
+  t.diagnostic(`${took} ms from the save to the screen`);
+  assert.ok(took < LONGEST / 10, `${took} ms`);
+});

@@ -1,0 +1,249 @@
+// What the tests of the page share: a scene in a folder of its own, the program, and the browser.
+
+import assert from "node:assert/strict";
+import { spawn, execFileSync } from "node:child_process";
+import fs from "node:fs";
+import { createRequire } from "node:module";
+import os from "node:os";
+import path from "node:path";
+import { fileURLToPath } from "node:url";
+
+const ROOT = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../..");
+export const PROGRAM = process.env.WGRAY_PROGRAM;
+const { chromium } = createRequire(path.join(process.env.WGRAY_PAGE_MODULES, "/"))("playwright-core");
+
+// However busy the machine is, what is waited for comes within this time, or never.
+export const LONGEST = 40_000;
+
+export const SCENE = `# a small scene
+[image]
+width = 120
+height = 90
+
+[camera] # from the front
+position = [0, -4, 1] # a comment
+look_at = [0, 0, 0.5]
+fov = 40
+
+[render]
+ambient = [0.2, 0.2, 0.2]
+pixel_samples = { pattern = "grid", count = 4 }
+light_samples = { pattern = "grid", count = 4 }
+
+[materials.red]
+type = "phong"
+color = [0.8, 0.1, 0.1]
+shininess = 16
+
+[materials.grey]
+type = "phong"
+color = [0.6, 0.6, 0.6]
+shininess = 16
+
+[[lights]]
+type = "rectangle"
+center = [0, 0, 3]
+size = [1, 1]
+normal = [0, 0, -1]
+tangent = [1, 0, 0]
+color = [0.8, 0.8, 0.8]
+
+[[shapes]]
+type = "sphere"
+material = "red"
+center = [0, 0, 0.5]
+radius = 0.5
+
+[[shapes]]
+type = "plane"
+material = "grey"
+point = [0, 0, 0]
+normal = [0, 0, 1]
+tangent = [1, 0, 0]
+`;
+
+const KERNEL = "shaders/kernels/render.wgsl";
+const RADIANCE = "pixel_radiance(pixel, sample)";
+
+// A scene and shaders in a folder, and the program that watches them.
+export class Studio {
+  constructor() {
+    this.folder = fs.mkdtempSync(path.join(os.tmpdir(), "wgray-page-"));
+    fs.cpSync(path.join(ROOT, "shaders"), this.path("shaders"), { recursive: true });
+    this.write("scene.toml", SCENE);
+  }
+
+  path(name) {
+    return path.join(this.folder, name);
+  }
+
+  read(name) {
+    return fs.readFileSync(this.path(name), "utf8");
+  }
+
+  write(name, text) {
+    fs.writeFileSync(this.path(name), text);
+  }
+
+  edit(name, old, replacement) {
+    const text = this.read(name);
+    assert.ok(text.includes(old), `${name} has no '${old}'`);
+    this.write(name, text.replace(old, replacement));
+  }
+
+  // Saves a shader so that the picture is red alone.
+  redden() {
+    this.edit(KERNEL, RADIANCE, `(${RADIANCE} * vec4f(1.0, 0.0, 0.0, 1.0))`);
+  }
+
+  breakShader() {
+    this.edit(KERNEL, RADIANCE, "pixel_radiance(pixel, simple)");
+  }
+
+  mendShader() {
+    this.edit(KERNEL, "simple", "sample");
+  }
+
+  // The line of the broken shader, counted from 1.
+  brokenLine() {
+    return this.read(KERNEL).split("\n").findIndex((line) => line.includes("simple")) + 1;
+  }
+
+  // The picture that `wgray render` makes of the scene, as the bytes of a PNG file.
+  render() {
+    const out = this.path("rendered.png");
+    execFileSync(PROGRAM, ["render", this.path("scene.toml"), "--output", out, "--quiet"], { stdio: "pipe" });
+    return [...fs.readFileSync(out)];
+  }
+
+  // Starts the program; resolves once it says where the page is.
+  async start(port = 0) {
+    const args = ["dev", "scene.toml", "--shaders", "shaders", "--listen", `127.0.0.1:${port}`];
+    this.program = spawn(PROGRAM, args, { cwd: this.folder, stdio: ["ignore", "inherit", "pipe"] });
+    this.said = "";
+    const found = new Promise((resolve, reject) => {
+      this.program.stderr.on("data", (data) => {
+        this.said += data;
+        const url = /http:\/\/[\d.:]+\//.exec(this.said);
+        if (url) resolve(url[0]);
+      });
+      this.program.on("exit", () => reject(new Error(`the program ended: ${this.said}`)));
+    });
+    this.url = await found;
+    this.port = Number(new URL(this.url).port);
+  }
+
+  async stop() {
+    if (this.program?.exitCode === null) {
+      const ended = new Promise((resolve) => this.program.on("exit", resolve));
+      this.program.kill("SIGKILL");
+      await ended;
+    }
+  }
+
+  async remove() {
+    await this.stop();
+    fs.rmSync(this.folder, { recursive: true, force: true });
+  }
+}
+
+export function launch(more = []) {
+  return chromium.launch({
+    executablePath: process.env.WGRAY_CHROMIUM,
+    args: [
+      "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+      "--disable-component-update", "--disable-sync", ...more,
+    ],
+  });
+}
+
+// A page in a browser, and what went wrong in it.
+export async function open(browser, studio, options = {}) {
+  const context = await browser.newContext({ viewport: { width: 1200, height: 800 }, ...options });
+  const page = await context.newPage();
+  page.setDefaultTimeout(LONGEST);
+  page.faults = [];
+  page.on("console", (message) => {
+    if (message.type() === "error") page.faults.push(message.text());
+  });
+  page.on("pageerror", (error) => page.faults.push(error.message));
+  page.on("request", (request) => {
+    if (!/^(data|blob):/.test(request.url()) && new URL(request.url()).port !== String(studio.port)) {
+      page.faults.push(`asks for ${request.url()}`);
+    }
+  });
+  await page.goto(studio.url);
+  await finished(page);
+  return page;
+}
+
+// Waits until the page shows a finished picture that is later than a revision; returns its revision.
+export async function finished(page, after = 0) {
+  const handle = await page.waitForFunction((after) => {
+    const { revision, done } = document.getElementById("panels").dataset;
+    return done === "true" && Number(revision) > after ? Number(revision) : null;
+  }, after);
+  return handle.jsonValue();
+}
+
+// Waits until nothing on the page changes any more and the picture is finished.
+export async function settled(page) {
+  const now = () =>
+    page.evaluate(() => {
+      const { revision, done } = document.getElementById("panels").dataset;
+      return [revision, done, document.getElementById("camera-text").innerText].join();
+    });
+  const deadline = Date.now() + LONGEST;
+  let [last, alike] = ["", 0];
+  while (alike < 5) {
+    assert.ok(Date.now() < deadline, "the page does not settle");
+    await page.waitForTimeout(80);
+    const seen = await now();
+    alike = seen === last && seen.includes("true") ? alike + 1 : 0;
+    last = seen;
+  }
+}
+
+export function revision(page) {
+  return page.evaluate(() => Number(document.getElementById("panels").dataset.revision));
+}
+
+// The pixels that the page shows, or those of a PNG file, as [width, height, RGB bytes joined by commas].
+export async function shown(page, part = "picture") {
+  await page.click("#zoom-one");
+  await page.waitForFunction((part) => document.querySelector(`[data-part=${part}] canvas`).dataset.scale === "1", part);
+  return page.evaluate(async (part) => {
+    await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+    const canvas = document.querySelector(`[data-part=${part}] canvas`);
+    const [width, height] = document.getElementById("size").textContent.split(" × ").map(Number);
+    const { left, top } = canvas.dataset;
+    const { data } = canvas.getContext("2d").getImageData(Number(left), Number(top), width, height);
+    return [width, height, data.filter((_, i) => i % 4 !== 3).join()];
+  }, part);
+}
+
+export function decoded(page, png) {
+  return page.evaluate(async (png) => {
+    const blob = new Blob([new Uint8Array(png)], { type: "image/png" });
+    const image = await createImageBitmap(blob, { colorSpaceConversion: "none" });
+    const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height);
+    return [image.width, image.height, data.filter((_, i) => i % 4 !== 3).join()];
+  }, png);
+}
+
+// Waits until the page shows the picture that `wgray render` makes.
+export async function showsRendered(page, studio) {
+  const wanted = await decoded(page, studio.render());
+  const deadline = Date.now() + LONGEST;
+  let seen;
+  do {
+    await finished(page);
+    seen = await shown(page);
+    if (String(seen) === String(wanted)) return;
+    await page.waitForTimeout(50);
+  } while (Date.now() < deadline);
+  const differing = seen[2].split(",").filter((value, i) => value !== wanted[2].split(",")[i]).length;
+  assert.fail(`the page shows ${seen[0]} x ${seen[1]} with ${differing} bytes that differ from the rendered picture`);
+}
