@@ -7,6 +7,8 @@ mod analytic;
 mod bounds;
 mod cli;
 mod culling;
+#[cfg(feature = "dev")]
+mod dev;
 mod inputs;
 mod kernel;
 mod layout;
