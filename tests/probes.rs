@@ -46,6 +46,9 @@ use crate::random::Random;
 use crate::sources::{parse, shared_source, type_name};
 use crate::words::{Argument, Words};
 
+/// Compares this function alone.
+const FUNCTION: &str = "WGRAY_TEST_FUNCTION";
+
 /// Calls of each function.
 const CALLS: usize = 8192;
 
@@ -178,13 +181,6 @@ probes! {
     vector_to_world(q: &Primitive, v: Vec3) -> Vec3;
     local_tangents(q: &Primitive, local: Vec3) -> Tangents;
     mapped_normal(q: &Primitive, local: Vec3, surface: Surface, t: &Texture, n: Vec3) -> Vec3;
-    filter_bin(u: f32, bins: u32) -> u32;
-    filter_offset(u: f32, bin: u32, bins: u32, low: f32, high: f32) -> f32;
-    moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
-    mean_of(sum: Vec4) -> Vec3;
-    variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3;
-    display_variance(sum: Vec4, moments: Vec4) -> f32;
-    display_slope_squared(value: f32) -> f32;
 }
 
 /// Shared functions that are not probed, and why.
@@ -300,10 +296,15 @@ fn functions_give_the_same_bits_on_gpu_and_cpu() {
     let source = shared_source();
     let module = parse(&source);
     let functions = functions(&module, &source);
-    let probed = functions
+    let only = std::env::var(FUNCTION).ok();
+    let wanted = |name: &str| only.as_ref().is_none_or(|only| only == name);
+    let probed: Vec<_> = functions
         .iter()
-        .filter(|(_, f)| !EXCEPTIONS.iter().any(|(exception, _)| *exception == f.name()));
+        .filter(|(_, f)| wanted(f.name()) && !EXCEPTIONS.iter().any(|(exception, _)| *exception == f.name()))
+        .collect();
+    assert!(!probed.is_empty(), "{FUNCTION}: no shared function is called {only:?}");
     let problems: Vec<String> = probed
+        .iter()
         .filter_map(|(file, f)| compare(device, f).err().map(|message| format!("{file}: {message}")))
         .collect();
     assert!(problems.is_empty(), "{}", problems.join("\n"));

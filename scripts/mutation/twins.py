@@ -1,58 +1,25 @@
 #!/usr/bin/env python3
-"""Makes the mistakes of scripts/mutations.toml, one at a time, and asks whether the tests find them.
+"""Makes the mistakes of twins.toml, one at a time, and asks whether the tests find them.
 
 Each is made in four ways: in the shader alone and in its twin alone, which the comparisons of GPU and CPU must find; in
 both, which these must not find (else the two mistakes are not the same); and in both again for the tests that know right
 answers, which must find it.  All twins' mistakes are built at once, behind a switch that an environment variable sets;
 shaders are read from a folder.  So nothing is compiled for a mutation but its kernels.
 
-    scripts/mutate                     all of them (about an hour on two cores)
-    scripts/mutate --only ray,shadow   those of some files
-    scripts/mutate --list              which there are, and whether each place is found once; runs nothing
+    scripts/mutation/twins.py                     all of them (about an hour on two cores)
+    scripts/mutation/twins.py --only ray,shadow   those of some files
+    scripts/mutation/twins.py --list              which there are, and whether each place is found once; runs nothing
 
 Exit code 1 if fewer than 95 % are found, in either way.
 """
 
 import argparse
-import json
-import os
 import re
 import shutil
-import subprocess
 import sys
 import tomllib
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
-WORK = TARGET / "mutants"
-ENOUGH = 0.95
-PATIENCE = 600  # seconds; a test that takes longer has found a mistake: a loop without end
-
-SWITCH = """
-/// Whether the mistake of this number is made.
-#[doc(hidden)]
-pub fn mutant(number: u32) -> bool {
-    static MADE: std::sync::LazyLock<u32> =
-        std::sync::LazyLock::new(|| std::env::var("WGRAY_MUTANT").map_or(0, |n| n.parse().expect("a number")));
-    *MADE == number
-}
-"""
-
-# Comparisons of GPU and CPU, fast ones first.
-AGREEMENT = [
-    ["main", "probes::functions_give_the_same_bits"],
-    ["main", "render::pictures_of_all_scenes", "render::first_hits_of_all_scenes", "textures::agreement"],
-    ["main", "random_scenes::random_scenes_are_the_same"],
-]
-# What knows right answers, on the CPU alone: where both paths agree, it speaks for both.
-ANSWERS = [
-    ["lib", "cpu::"],
-    ["main", "bounds::", "analytic::", "radiance::", "culling::", "--skip", "is_found"],
-    ["main", "against_oracle::", "statistics::", "textures::", "sampling::", "robust::", "--skip", "is_found",
-     "--skip", "textures::agreement"],
-]
-
+from project import AGREEMENT, ANSWERS, ENOUGH, ROOT, WORK, build, check_unchanged, copy, finds
 
 class Mutation:
     def __init__(self, number, file, entry):
@@ -66,7 +33,7 @@ class Mutation:
 
 
 def mutations():
-    tables = tomllib.loads((ROOT / "scripts/mutations.toml").read_text())
+    tables = tomllib.loads((ROOT / "scripts/mutation/twins.toml").read_text())
     entries = [(file, entry) for file, list_ in tables.items() for entry in list_]
     return [Mutation(number, file, entry) for number, (file, entry) in enumerate(entries, 1)]
 
@@ -78,20 +45,13 @@ def place(text, expression, where):
     body = re.sub(r"//[^\n]*", lambda comment: " " * len(comment[0]), body)
     found = re.search(r"\s+".join(words), body)
     if not found:
-        raise SystemExit(f"scripts/mutations.toml: {where} has no '{expression}' any more")
+        raise SystemExit(f"scripts/mutation/twins.toml: {where} has no '{expression}' any more")
     return found.span()
 
 
 def make_twins(all_mutations, folder):
     """A copy of the project whose twins make the mistake of the number in WGRAY_MUTANT."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in ["Cargo.toml", "Cargo.lock", "rustfmt.toml", "src", "shaders", "scenes", "tests", "benches", "docs", "README.md"]:
-        if (ROOT / name).is_dir():
-            shutil.copytree(ROOT / name, folder / name, dirs_exist_ok=True)
-        elif (ROOT / name).exists():
-            shutil.copy2(ROOT / name, folder / name)
-    lib = folder / "src/lib.rs"
-    lib.write_text(lib.read_text() + SWITCH)
+    copy(folder)
     for file in sorted({m.file for m in all_mutations}):
         path = folder / f"src/cpu/{file}.rs"
         text = path.read_text()
@@ -102,35 +62,6 @@ def make_twins(all_mutations, folder):
             here = text[start:end]
             text = f"{text[:start]}(if crate::mutant({m.number}) {{ {m.rust[1]} }} else {{ {here} }}){text[end:]}"
         path.write_text(text)
-
-
-def build(folder):
-    """The test binaries: the library's own and tests/main.rs."""
-    command = ["cargo", "test", "--release", "--no-run", "--lib", "--test", "main", "--message-format=json"]
-    environment = os.environ | {"CARGO_TARGET_DIR": str(WORK / "build"), "RUSTFLAGS": "--cap-lints=allow"}
-    out = subprocess.run(command, cwd=folder, env=environment, stdout=subprocess.PIPE, check=True, text=True).stdout
-    binaries = {}
-    for line in out.splitlines():
-        message = json.loads(line)
-        if message.get("executable") and message.get("profile", {}).get("test"):
-            binaries["lib" if message["target"]["kind"] == ["lib"] else message["target"]["name"]] = message["executable"]
-    return binaries
-
-
-def finds(binaries, stages, folder, **environment):
-    """Whether any test of these fails; stages in order, to the first that does."""
-    for binary, *filters in stages:
-        try:
-            run = subprocess.run(
-                [binaries[binary], "--quiet", *filters], cwd=folder, env=os.environ | environment,
-                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE, errors="replace",
-            )
-        except subprocess.TimeoutExpired:
-            return "a loop without end"
-        if run.returncode != 0:
-            failed = re.findall(r"^---- (\S+) stdout", run.stdout, re.M)
-            return failed[0] if failed else f"exit code {run.returncode}"
-    return None
 
 
 def main():
@@ -146,13 +77,9 @@ def main():
         print("\n".join(map(str, all_mutations)))
         return 0
     twins = WORK / "project"
-    shutil.rmtree(twins, ignore_errors=True)
     make_twins(all_mutations, twins)
     binaries = build(twins)
-    for name, stages, environment in [("agreement", AGREEMENT, {}), ("answers", ANSWERS, {"WGRAY_TEST_WITHOUT_GPU": "1"})]:
-        failed = finds(binaries, stages, twins, **environment)
-        if failed:
-            raise SystemExit(f"scripts/mutate: without any mutation, the tests of {name} fail: {failed}")
+    check_unchanged(binaries, twins)
     chosen = [m for m in all_mutations if not arguments.only or m.file in arguments.only.split(",")]
     survivors = {"apart": [], "together": []}
     for m in chosen:
@@ -184,7 +111,7 @@ def main():
         good &= share >= ENOUGH and all(m.survives for m in left)
         print(f"\n{way}: {len(chosen) - len(left)} of {len(chosen)} found ({share:.1%})")
         for m in left:
-            print(f"  {m}\n      {m.survives or 'no reason is known: give it one in scripts/mutations.toml, or a test'}")
+            print(f"  {m}\n      {m.survives or 'no reason is known: give it one in scripts/mutation/twins.toml, or a test'}")
     return 0 if good else 1
 
 

@@ -1,0 +1,228 @@
+#!/usr/bin/env python3
+"""Makes every mistake that cargo-mutants knows in src/cpu, one at a time, and asks whether the tests find it.
+
+cargo-mutants would compile the project anew for each of two thousand.  Here it only lists them; all are built at once,
+behind a switch that an environment variable sets.  What does not compile is left out, as cargo-mutants does.
+
+    scripts/mutation/operators.py                     all of them (about an hour on two cores)
+    scripts/mutation/operators.py --only ray,shadow   those of some files
+    scripts/mutation/operators.py --sample 10         every tenth
+
+Needs cargo-mutants (`cargo install cargo-mutants`) and the Python packages tree-sitter and tree-sitter-rust.
+Exit code 1 if fewer than 95 % are found, or one survives that survivors.toml does not explain.
+"""
+
+import argparse
+import concurrent.futures
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+import tomllib
+from collections import defaultdict
+
+import tree_sitter
+import tree_sitter_rust
+
+from project import AGREEMENT, ANSWERS, ENOUGH, ROOT, WORK, build, cargo, check_unchanged, copy, finds
+
+REASONS = ROOT / "scripts/mutation/survivors.toml"
+
+
+class Mutation:
+    def __init__(self, number, entry, text):
+        self.number, self.file, self.genre = number, entry["file"], entry["genre"]
+        self.name = entry["name"]
+        self.function = (entry["function"] or {}).get("function_name", "")
+        self.replacement = entry["replacement"]
+        start, end = entry["span"]["start"], entry["span"]["end"]
+        lines = text.split("\n")
+        offset = lambda at: len("\n".join(lines[: at["line"] - 1] + [lines[at["line"] - 1][: at["column"] - 1]]).encode())
+        self.start, self.end = offset(start), offset(end)
+        line = lines[start["line"] - 1]
+        self.line = line.strip()
+        if self.genre == "BinaryOperator":
+            found = re.search(r"replace (\S+) with (\S+)", self.name)
+            self.change = f"{found[1]} to {found[2]}"
+        else:
+            self.change = re.sub(r"^\S+ ", "", self.name)
+        # A place that survives other lines' changes: the function, the line's text, the column within it.
+        self.key = f"{self.function}: {self.line} | {self.change} @{start['column'] - (len(line) - len(line.lstrip()))}"
+
+    def when(self, mistaken, right):
+        """An expression that is one thing with the mistake and another without; marked, to find what does not compile."""
+        return f"if crate::mutant({self.number}) {{ /*<{self.number}*/ {mistaken} /*{self.number}>*/ }} else {{ {right} }}"
+
+
+def all_mutations():
+    out = subprocess.run(
+        ["cargo", "mutants", "--list", "--json", "--file", "src/cpu/*.rs"], cwd=ROOT, stdout=subprocess.PIPE, check=True
+    ).stdout
+    text = {path: (ROOT / path).read_text() for path in {entry["file"] for entry in json.loads(out)}}
+    return [Mutation(number, entry, text[entry["file"]]) for number, entry in enumerate(json.loads(out), 1)]
+
+
+class Writer:
+    """Writes a file anew with its mutations behind the switch."""
+
+    def __init__(self, source, mutations):
+        self.source, self.at = source, defaultdict(list)
+        for m in mutations:
+            self.at[m.start].append(m)
+        self.done = set()
+
+    def text(self, node):
+        """A node's text, those of its parts in place."""
+        out, at = "", node.start_byte
+        for child in node.children:
+            out += self.source[at : child.start_byte].decode() + self.write(child)
+            at = child.end_byte
+        return out + self.source[at : node.end_byte].decode()
+
+    def mutations(self, genre, start):
+        found = [m for m in self.at[start] if m.genre == genre]
+        self.done.update(m.number for m in found)
+        return found
+
+    def write(self, node):
+        field = node.child_by_field_name
+        if node.type in ("binary_expression", "compound_assignment_expr"):
+            operator = field("operator")
+            found = self.mutations("BinaryOperator", operator.start_byte)
+            if found:
+                return self.operation(node, operator.text.decode(), found)
+        if node.type == "unary_expression":
+            found = self.mutations("UnaryOperator", node.start_byte)
+            if found:
+                operator, operand = node.children
+                right = f"{operator.text.decode()} a_"
+                return f"({{ let a_ = {self.write(operand)}; {found[0].when('a_', right)} }})"
+        if node.type == "match_arm":
+            found = self.mutations("MatchArm", node.start_byte)
+            if found:
+                pattern, value = field("pattern"), field("value")
+                rest = self.source[value.end_byte : node.end_byte].decode()
+                return f"{pattern.text.decode()} if !crate::mutant({found[0].number}) => {self.write(value)}{rest}"
+        if node.type == "field_initializer":
+            found = self.mutations("StructField", node.start_byte)
+            if found:
+                base = next(n for n in node.parent.children if n.type == "base_field_initializer").text.decode().lstrip(".")
+                name, value = field("field").text.decode(), self.write(field("value"))
+                return f"{name}: " + found[0].when(f"({base}).{name}", value)
+        if node.type == "block" and node.parent.type == "function_item":
+            inner = [child for child in node.children if child.is_named]
+            found = self.mutations("FnValue", inner[0].start_byte) if inner else []
+            first = "".join(
+                f"if crate::mutant({m.number}) {{ /*<{m.number}*/ return {m.replacement}; /*{m.number}>*/ }}\n" for m in found
+            )
+            return "{ " + first + self.text(node)[1:]
+        return self.text(node)
+
+    def operation(self, node, operator, found):
+        left, right = self.write(node.child_by_field_name("left")), self.write(node.child_by_field_name("right"))
+        if operator in ("&&", "||"):
+            parts, a, b = f"let (a_, b_) = ({left}, || {right});", "a_", "b_()"
+        elif node.type == "compound_assignment_expr":
+            parts, a, b = f"let b_ = {right};", left, "b_"
+        else:
+            parts, a, b = f"let (a_, b_) = ({left}, {right});", "a_", "b_"
+        text = f"{a} {operator} {b}"
+        for m in found:
+            text = m.when(f"{a} {m.replacement} {b}", text)
+        return f"({{ {parts} {text} }})"
+
+
+def write_mutations(mutations, folder):
+    """Writes all mutations into a copy of the project."""
+    parser = tree_sitter.Parser(tree_sitter.Language(tree_sitter_rust.language()))
+    missed = []
+    for file in {m.file for m in mutations}:
+        source = (ROOT / file).read_bytes()
+        of_file = [m for m in mutations if m.file == file]
+        writer = Writer(source, of_file)
+        (folder / file).write_text(writer.write(parser.parse(source).root_node))
+        missed += [m for m in of_file if m.number not in writer.done]
+    if missed:
+        raise SystemExit("no place was found for\n" + "\n".join(m.name for m in missed))
+
+
+def unviable(messages, folder):
+    """The numbers of the mutations that the compiler complains about."""
+    numbers = set()
+    for message in messages:
+        diagnostic = message.get("message") or {}
+        if message.get("reason") != "compiler-message" or diagnostic.get("level") != "error":
+            continue
+        here = set()
+        for span in diagnostic["spans"]:
+            text = (folder / span["file_name"]).read_bytes()[: span["byte_start"]].decode()
+            opened = re.findall(r"/\*<(\d+)\*/", text)
+            closed = set(re.findall(r"/\*(\d+)>\*/", text))
+            here.update(int(n) for n in opened if n not in closed)
+        if not here and diagnostic["spans"]:
+            raise SystemExit(f"no mutation's, but does not compile:\n{diagnostic['rendered']}")
+        numbers |= here
+    return numbers
+
+
+def probed():
+    """The functions that tests/probes.rs compares one by one."""
+    text = (ROOT / "tests/probes.rs").read_text()
+    listed = text[text.index("probes! {\n") :]
+    return set(re.findall(r"^    (\w+)\(", listed[: listed.index("\n}")], re.M))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", help="names of files, without .rs, separated by commas")
+    parser.add_argument("--sample", type=int, default=1, metavar="N", help="only every N-th")
+    arguments = parser.parse_args()
+    listed = all_mutations()
+    chosen = [m for m in listed if not arguments.only or m.file[8:-3] in arguments.only.split(",")][:: arguments.sample]
+    folder = WORK / "operators"
+    copy(folder)
+    left_out = []
+    while True:
+        write_mutations(chosen, folder)
+        code, messages = cargo(folder, "check", "--release", "--lib")
+        if code == 0:
+            break
+        numbers = unviable(messages, folder)
+        left_out += [m for m in chosen if m.number in numbers]
+        chosen = [m for m in chosen if m.number not in numbers]
+    print(f"{len(chosen)} mutations; {len(left_out)} more do not compile", flush=True)
+    binaries = build(folder)
+    check_unchanged(binaries, folder)
+    functions = probed()
+    probe = AGREEMENT[0]
+
+    def found(m):
+        mutant = {"WGRAY_MUTANT": str(m.number)}
+        own = m.function in functions and finds(binaries, [probe], folder, 30, WGRAY_TEST_FUNCTION=m.function, **mutant)
+        return own or finds(binaries, AGREEMENT[1:], folder, 200, **mutant) or finds(binaries, ANSWERS, folder, 200, **mutant)
+
+    begin = time.monotonic()
+    survivors, by = [], defaultdict(int)
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        for done, (m, test) in enumerate(zip(chosen, pool.map(found, chosen)), 1):
+            by[test] += 1
+            if not test:
+                survivors.append(m)
+                print(f"survives: {m.name}\n    {m.key}", flush=True)
+            if done % 100 == 0:
+                print(f"{done} of {len(chosen)}, {time.monotonic() - begin:.0f} s, {len(survivors)} survive", flush=True)
+    reasons = tomllib.loads(REASONS.read_text()) if REASONS.exists() else {}
+    unexplained = [m for m in survivors if m.key not in reasons]
+    share = 1 - len(survivors) / len(chosen)
+    print(f"\n{len(chosen) - len(survivors)} of {len(chosen)} found ({share:.1%}), by")
+    for test, number in sorted(by.items(), key=lambda item: -item[1]):
+        print(f"  {number:5} {test or 'nothing'}")
+    for m in unexplained:
+        print(f"no reason is known for {m.name}\n    {m.key}")
+    return 0 if share >= ENOUGH and not unexplained else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

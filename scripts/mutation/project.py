@@ -1,0 +1,101 @@
+"""What both mutation runs share: a copy of the project that makes its mistakes behind a switch, and its tests."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
+WORK = TARGET / "mutants"
+
+# The least share of the mistakes that the tests must find.
+ENOUGH = 0.95
+# Seconds; a test that takes longer has found a mistake: a loop without end.
+PATIENCE = 200
+
+SWITCH = """
+/// Whether the mistake of this number is made.
+#[doc(hidden)]
+pub fn mutant(number: u32) -> bool {
+    static MADE: std::sync::LazyLock<u32> =
+        std::sync::LazyLock::new(|| std::env::var("WGRAY_MUTANT").map_or(0, |n| n.parse().expect("a number")));
+    *MADE == number
+}
+"""
+
+# Comparisons of GPU and CPU, fast ones first.
+AGREEMENT = [
+    ["main", "probes::functions_give_the_same_bits"],
+    ["main", "render::pictures_of_all_scenes", "render::first_hits_of_all_scenes", "textures::agreement"],
+    ["main", "random_scenes::random_scenes_are_the_same"],
+]
+# What knows right answers, on the CPU alone: where both paths agree, it speaks for both.
+ANSWERS = [
+    ["lib", "cpu::"],
+    ["main", "bounds::", "analytic::", "radiance::", "culling::", "--skip", "is_found"],
+    ["main", "against_oracle::", "statistics::", "textures::", "sampling::", "robust::", "--skip", "is_found",
+     "--skip", "textures::agreement"],
+]
+
+
+def copy(folder):
+    """A copy of the project with the switch, in which mistakes can be made."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    for name in ["Cargo.toml", "Cargo.lock", "rustfmt.toml", "src", "shaders", "scenes", "tests", "benches", "docs", "README.md"]:
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, folder / name)
+        else:
+            shutil.copy2(ROOT / name, folder / name)
+    lib = folder / "src/lib.rs"
+    lib.write_text(lib.read_text() + SWITCH)
+
+
+def cargo(folder, *arguments):
+    """Runs cargo in a copy; returns its exit code and messages."""
+    environment = os.environ | {"CARGO_TARGET_DIR": str(WORK / "build"), "RUSTFLAGS": "--cap-lints=allow"}
+    run = subprocess.run(
+        ["cargo", *arguments, "--message-format=json"], cwd=folder, env=environment, stdout=subprocess.PIPE, text=True
+    )
+    return run.returncode, [json.loads(line) for line in run.stdout.splitlines() if line.startswith("{")]
+
+
+def build(folder):
+    """The test binaries of a copy: the library's own, `lib`, and that of tests/main.rs, `main`."""
+    code, messages = cargo(folder, "test", "--release", "--no-run", "--lib", "--test", "main")
+    if code != 0:
+        raise SystemExit("the copy of the project does not compile")
+    binaries = {}
+    for message in messages:
+        if message.get("executable") and message.get("profile", {}).get("test"):
+            binaries["lib" if message["target"]["kind"] == ["lib"] else message["target"]["name"]] = message["executable"]
+    return binaries
+
+
+def finds(binaries, stages, folder, patience=PATIENCE, **environment):
+    """The first test of these that fails, by stages in order; None if none does."""
+    for binary, *filters in stages:
+        try:
+            run = subprocess.run(
+                [binaries[binary], "--quiet", *filters], cwd=folder, env=os.environ | environment,
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=patience, errors="replace",
+            )
+        except subprocess.TimeoutExpired:
+            return "a loop without end"
+        if run.returncode != 0:
+            failed = re.findall(r"^---- (\S+) stdout", run.stdout, re.M)
+            return failed[0] if failed else f"exit code {run.returncode}"
+        if not re.search(r"[1-9]\d* passed", run.stdout):
+            raise SystemExit(f"no test is called {' or '.join(filters)}")
+    return None
+
+
+def check_unchanged(binaries, folder):
+    """Ends the run where a test fails without any mistake."""
+    for name, stages, environment in [("agreement", AGREEMENT, {}), ("answers", ANSWERS, {"WGRAY_TEST_WITHOUT_GPU": "1"})]:
+        failed = finds(binaries, stages, folder, **environment)
+        if failed:
+            raise SystemExit(f"without any mistake, the tests of {name} fail: {failed}")
