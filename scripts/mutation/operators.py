@@ -26,8 +26,9 @@ from collections import defaultdict
 import tree_sitter
 import tree_sitter_rust
 
-from project import AGREEMENT, ANSWERS, ENOUGH, ROOT, WORK, build, cargo, check_unchanged, copy, finds
+from project import AGREEMENT, ANSWERS, ENOUGH, ROOT, WITHOUT_GPU, WORK, Tests, cargo, copy
 
+PROBES, PICTURES = AGREEMENT[:1], AGREEMENT[1:]
 REASONS = ROOT / "scripts/mutation/survivors.toml"
 
 
@@ -193,15 +194,12 @@ def main():
         left_out += [m for m in chosen if m.number in numbers]
         chosen = [m for m in chosen if m.number not in numbers]
     print(f"{len(chosen)} mutations; {len(left_out)} more do not compile", flush=True)
-    binaries = build(folder)
-    check_unchanged(binaries, folder)
-    functions = probed()
-    probe = AGREEMENT[0]
+    tests, functions = Tests(folder), probed()
 
     def found(m):
         mutant = {"WGRAY_MUTANT": str(m.number)}
-        own = m.function in functions and finds(binaries, [probe], folder, 30, WGRAY_TEST_FUNCTION=m.function, **mutant)
-        return own or finds(binaries, AGREEMENT[1:], folder, 200, **mutant) or finds(binaries, ANSWERS, folder, 200, **mutant)
+        alone = m.function in functions and tests.first_failing(PROBES, WGRAY_TEST_FUNCTION=m.function, **mutant)
+        return alone or tests.first_failing(PICTURES, **mutant) or tests.first_failing(ANSWERS, **WITHOUT_GPU, **mutant)
 
     begin = time.monotonic()
     survivors, by = [], defaultdict(int)

@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import subprocess
+import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -39,6 +40,8 @@ ANSWERS = [
     ["main", "against_oracle::", "statistics::", "textures::", "sampling::", "robust::", "--skip", "is_found",
      "--skip", "textures::agreement"],
 ]
+
+WITHOUT_GPU = {"WGRAY_TEST_WITHOUT_GPU": "1"}
 
 
 def copy(folder):
@@ -75,27 +78,35 @@ def build(folder):
     return binaries
 
 
-def finds(binaries, stages, folder, patience=PATIENCE, **environment):
-    """The first test of these that fails, by stages in order; None if none does."""
-    for binary, *filters in stages:
-        try:
-            run = subprocess.run(
-                [binaries[binary], "--quiet", *filters], cwd=folder, env=os.environ | environment,
-                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=patience, errors="replace",
-            )
-        except subprocess.TimeoutExpired:
-            return "a loop without end"
-        if run.returncode != 0:
-            failed = re.findall(r"^---- (\S+) stdout", run.stdout, re.M)
-            return failed[0] if failed else f"exit code {run.returncode}"
-        if not re.search(r"[1-9]\d* passed", run.stdout):
-            raise SystemExit(f"no test is called {' or '.join(filters)}")
-    return None
+class Tests:
+    """The tests of a copy."""
 
+    def __init__(self, folder):
+        self.folder, self.binaries, self.seconds = folder, build(folder), {}
+        for name, stages, environment in [("agreement", AGREEMENT, {}), ("answers", ANSWERS, WITHOUT_GPU)]:
+            for stage in stages:
+                begin = time.monotonic()
+                failed = self.first_failing([stage], **environment)
+                if failed:
+                    raise SystemExit(f"without any mistake, the tests of {name} fail: {failed}")
+                self.seconds[str(stage)] = time.monotonic() - begin
 
-def check_unchanged(binaries, folder):
-    """Ends the run where a test fails without any mistake."""
-    for name, stages, environment in [("agreement", AGREEMENT, {}), ("answers", ANSWERS, {"WGRAY_TEST_WITHOUT_GPU": "1"})]:
-        failed = finds(binaries, stages, folder, **environment)
-        if failed:
-            raise SystemExit(f"without any mistake, the tests of {name} fail: {failed}")
+    def first_failing(self, stages, **environment):
+        """The name of the first test that fails, by stages in order; None if none does. What takes ten times as long as
+        without a mistake loops without end, and counts as failed."""
+        for stage in stages:
+            binary, *filters = stage
+            patience = 10 * self.seconds[str(stage)] + 10 if str(stage) in self.seconds else None
+            try:
+                run = subprocess.run(
+                    [self.binaries[binary], "--quiet", *filters], cwd=self.folder, env=os.environ | environment,
+                    stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=patience, errors="replace",
+                )
+            except subprocess.TimeoutExpired:
+                return "a loop without end"
+            if run.returncode != 0:
+                failed = re.findall(r"^---- (\S+) stdout", run.stdout, re.M)
+                return failed[0] if failed else f"exit code {run.returncode}"
+            if not re.search(r"[1-9]\d* passed", run.stdout):
+                raise SystemExit(f"no test is called {' or '.join(filters)}")
+        return None

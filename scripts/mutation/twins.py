@@ -14,12 +14,15 @@ Exit code 1 if fewer than 95 % are found, in either way.
 """
 
 import argparse
+import concurrent.futures
+import os
 import re
 import shutil
 import sys
 import tomllib
 
-from project import AGREEMENT, ANSWERS, ENOUGH, ROOT, WORK, build, check_unchanged, copy, finds
+from project import AGREEMENT, ANSWERS, ENOUGH, ROOT, WITHOUT_GPU, WORK, Tests, copy
+
 
 class Mutation:
     def __init__(self, number, file, entry):
@@ -64,6 +67,26 @@ def make_twins(all_mutations, folder):
         path.write_text(text)
 
 
+def try_out(tests, m):
+    """Which tests find it: in WGSL alone, in Rust alone; whether the two differ; in both."""
+    shaders = WORK / f"shaders-{m.number}"
+    shutil.rmtree(shaders, ignore_errors=True)
+    shutil.copytree(tests.folder / "shaders", shaders)
+    path = shaders / f"{m.file}.wgsl"
+    text = path.read_text()
+    start, end = place(text, m.wgsl[0], path)
+    path.write_text(text[:start] + m.wgsl[1] + text[end:])
+    wgsl, rust = {"WGRAY_TEST_SHADERS": str(shaders)}, {"WGRAY_MUTANT": str(m.number)}
+    found = (
+        tests.first_failing(AGREEMENT, **wgsl),
+        tests.first_failing(AGREEMENT, **rust),
+        tests.first_failing(AGREEMENT[:1], **wgsl, **rust),
+        tests.first_failing(ANSWERS, **WITHOUT_GPU, **rust),
+    )
+    shutil.rmtree(shaders)
+    return found
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", help="names of files, without .wgsl, separated by commas")
@@ -78,33 +101,21 @@ def main():
         return 0
     twins = WORK / "project"
     make_twins(all_mutations, twins)
-    binaries = build(twins)
-    check_unchanged(binaries, twins)
+    tests = Tests(twins)
     chosen = [m for m in all_mutations if not arguments.only or m.file in arguments.only.split(",")]
     survivors = {"apart": [], "together": []}
-    for m in chosen:
-        shaders = WORK / "shaders"
-        shutil.rmtree(shaders, ignore_errors=True)
-        shutil.copytree(ROOT / "shaders", shaders)
-        path = shaders / f"{m.file}.wgsl"
-        text = path.read_text()
-        start, end = place(text, m.wgsl[0], path)
-        path.write_text(text[:start] + m.wgsl[1] + text[end:])
-        wgsl = {"WGRAY_TEST_SHADERS": str(shaders)}
-        rust = {"WGRAY_MUTANT": str(m.number)}
-        by_wgsl, by_rust = finds(binaries, AGREEMENT, twins, **wgsl), finds(binaries, AGREEMENT, twins, **rust)
-        differ = finds(binaries, AGREEMENT[:1], twins, **wgsl, **rust)
-        if differ:
-            raise SystemExit(f"{m}\n  the mistakes in WGSL and in Rust are not the same: {differ}")
-        together = finds(binaries, ANSWERS, twins, WGRAY_TEST_WITHOUT_GPU="1", **rust)
-        print(f"{m}\n    WGSL alone: {by_wgsl}; Rust alone: {by_rust}; together: {together}", flush=True)
-        if not (by_wgsl and by_rust):
-            survivors["apart"].append(m)
-        if not together:
-            survivors["together"].append(m)
-        elif m.survives:
-            print("    it survives no more: its reason must go")
-            survivors["together"].append(m)
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        for m, (by_wgsl, by_rust, differ, together) in zip(chosen, pool.map(lambda m: try_out(tests, m), chosen)):
+            print(f"{m}\n    WGSL alone: {by_wgsl}; Rust alone: {by_rust}; together: {together}", flush=True)
+            if differ:
+                raise SystemExit(f"{m}\n  the mistakes in WGSL and in Rust are not the same: {differ}")
+            if not (by_wgsl and by_rust):
+                survivors["apart"].append(m)
+            if not together:
+                survivors["together"].append(m)
+            elif m.survives:
+                print("    it survives no more: its reason must go")
+                survivors["together"].append(m)
     good = True
     for way, left in survivors.items():
         share = 1 - len(left) / len(chosen)
