@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use naga::{Handle, Module, ScalarKind, Type, TypeInner};
 use wgpu::util::DeviceExt;
 use wgray::gpu::compose::Source;
-use wgray::gpu::{Device, check};
+use wgray::gpu::{Device, Rounding, check};
 
 use crate::sources::{file_of, shared_source, type_name};
 
@@ -155,10 +155,15 @@ impl Function<'_> {
 
     /// The same with another text of the shared files.
     pub fn run_in(&self, device: &Device, shared: &Source, words: &[u32]) -> Vec<u32> {
+        self.run_rounded(device, shared, words, Rounding::Device)
+    }
+
+    /// The same with quotients and square roots of either kind.
+    pub fn run_rounded(&self, device: &Device, shared: &Source, words: &[u32], rounding: Rounding) -> Vec<u32> {
         let mut source = shared.clone();
         source.append("probe", &self.kernel());
         let calls = words.len() / self.words_in();
-        run(device, &source, words, calls, calls * self.words_out().len())
+        run(device, &source, rounding, words, calls, calls * self.words_out().len())
     }
 }
 
@@ -185,13 +190,13 @@ fn write_word(kind: ScalarKind, value: &str, next: &mut u32, text: &mut String) 
 
 /// Runs the entry point `probe` of a text for `calls` invocations: `input` in, `output` words out. On devices that
 /// take SPIR-V it goes the way of the renderer's exact kernels.
-fn run(device: &Device, source: &Source, input: &[u32], calls: usize, output: usize) -> Vec<u32> {
+fn run(device: &Device, source: &Source, rounding: Rounding, input: &[u32], calls: usize, output: usize) -> Vec<u32> {
     let (wgpu, queue) = device.wgpu();
     let checked =
         check(source).unwrap_or_else(|error| panic!("{error}\n{}", error.excerpt.clone().unwrap_or_default()));
     let module = if device.info.exact {
         let spirv = checked
-            .exact_entry("probe", &[])
+            .exact_entry("probe", &[], rounding)
             .expect("SPIR-V of a kernel that naga accepts");
         let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
             entry_points: vec![wgpu::PassthroughShaderEntryPoint {

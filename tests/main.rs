@@ -21,6 +21,7 @@ mod random;
 mod random_scenes;
 mod render;
 mod robust;
+mod rounding;
 mod sampling;
 mod scenes;
 mod sources;

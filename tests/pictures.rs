@@ -3,7 +3,7 @@
 use glam::Vec4;
 use wgray::cpu::Cpu;
 use wgray::film::{Film, Region};
-use wgray::gpu::{Gpu, Options};
+use wgray::gpu::{Gpu, Options, Rounding};
 use wgray::job::{Backend, Cut};
 use wgray::pack::{FirstHit, Packed};
 
@@ -18,6 +18,8 @@ pub enum Way {
     Baked,
     /// The same, the scene in buffers.
     Buffers,
+    /// The same, quotients and square roots rounded by software.
+    Rounded,
     /// Plain WGSL through wgpu, the scene in buffers.
     Plain,
 }
@@ -36,7 +38,11 @@ pub fn backend<'a>(packed: &'a Packed, way: Way) -> Box<dyn Backend + 'a> {
     }
     let device = adapter::device().expect("a device");
     let options = Options {
-        exact: way != Way::Plain && device.info.exact,
+        exact: match way {
+            Way::Plain => None,
+            Way::Rounded => device.info.exact.then_some(Rounding::Software),
+            _ => device.info.exact.then_some(Rounding::Device),
+        },
         baked: way == Way::Baked,
     };
     let gpu = Gpu::new(device, packed, sources::shaders(), options);

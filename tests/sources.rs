@@ -27,15 +27,22 @@ pub fn shaders() -> &'static Shaders {
 
 /// The shaders with one place of a file changed.
 pub fn edited_shaders(file: &str, from: &str, to: &str) -> Shaders {
+    shaders_with(file, &edited(shaders().text(file), from, to))
+}
+
+/// A text with one place changed.
+pub fn edited(text: &str, from: &str, to: &str) -> String {
+    assert!(text.contains(from), "'{from}' is not there to be changed");
+    text.replacen(from, to, 1)
+}
+
+/// The shaders with another text of a file.
+pub fn shaders_with(file: &str, text: &str) -> Shaders {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, _) in wgray::gpu::compose::BUILT_IN {
         let path = folder.path().join(name);
         fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
-        let mut text = shaders().text(name).to_string();
-        if *name == file {
-            assert!(text.contains(from), "{file}: '{from}' is not there to be changed");
-            text = text.replacen(from, to, 1);
-        }
+        let text = if *name == file { text } else { shaders().text(name) };
         fs::write(path, text).expect("a copy of a shader");
     }
     Shaders::read(folder.path()).expect("the copies")

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use wgray::gpu::compose::{Kernel, SHARED, Source};
 use wgray::gpu::spirv::instructions;
-use wgray::gpu::{bake, check};
+use wgray::gpu::{Rounding, bake, check};
 use wgray::pack::Packed;
 
 use crate::scenes;
@@ -17,6 +17,10 @@ const RECORDS: &[&str] = &["layout.wgsl", "constants.wgsl"];
 /// Files without a twin, and why.
 const WITHOUT_TWIN: &[(&str, &str)] = &[
     ("bindings.wgsl", "buffers only"),
+    (
+        "rounding.wgsl",
+        "Rust's own quotients and square roots are rounded correctly",
+    ),
     ("specialization.wgsl", "overrides only"),
     (
         "scene.wgsl",
@@ -226,10 +230,12 @@ fn only_made_integer(module: &[u32], result: u32) -> bool {
     users.all(|(op, _)| opcode::FLOAT_TO_INTEGER.contains(&op))
 }
 
-fn spirv(source: &Source, kernel: Kernel, packed: &Packed) -> Vec<u32> {
+fn spirv(source: &Source, kernel: Kernel, packed: &Packed, rounding: Rounding) -> Vec<u32> {
     let checked =
         check(source).unwrap_or_else(|error| panic!("{error}\n{}", error.excerpt.clone().unwrap_or_default()));
-    checked.exact_spirv(kernel, &packed.specialization).expect("a kernel")
+    checked
+        .exact_spirv(kernel, &packed.specialization, rounding)
+        .expect("a kernel")
 }
 
 #[test]
@@ -237,15 +243,20 @@ fn kernels_hold_no_operation_that_devices_may_compute_differently() {
     let mut operations = 0;
     for (name, packed) in scenes::all() {
         for kernel in sources::KERNELS {
-            for baked in [None, Some(bake(&packed))] {
-                let module = spirv(&sources::shaders().compose(kernel, baked.as_deref()), kernel, &packed);
+            for (baked, rounding) in [
+                (None, Rounding::Device),
+                (Some(bake(&packed)), Rounding::Device),
+                (None, Rounding::Software),
+            ] {
+                let source = sources::shaders().compose(kernel, baked.as_deref());
+                let module = spirv(&source, kernel, &packed, rounding);
                 operations += instructions(&module)
                     .filter(|(op, _)| opcode::PROTECTED.contains(op))
                     .count();
                 let problems = violations(&module);
                 assert!(
                     problems.is_empty(),
-                    "{name}, {kernel:?}, baked {}: {problems:?}",
+                    "{name}, {kernel:?}, baked {}, {rounding:?}: {problems:?}",
                     baked.is_some()
                 );
             }
@@ -276,11 +287,11 @@ fn an_operation_that_devices_may_compute_differently_is_found() {
         let mut changed = Source::default();
         changed.append("changed", &source.text.replacen(from, to, 1));
         assert!(
-            !violations(&spirv(&changed, Kernel::Render, &packed)).is_empty(),
+            !violations(&spirv(&changed, Kernel::Render, &packed, Rounding::Device)).is_empty(),
             "{to}"
         );
     }
-    let module = spirv(&source, Kernel::Render, &packed);
+    let module = spirv(&source, Kernel::Render, &packed, Rounding::Device);
     assert_eq!(violations(&module), Vec::<String>::new());
     let decorations: Vec<usize> = positions(&module)
         .filter(|at| module[*at] as u16 == opcode::DECORATE && module[at + 2] == opcode::NO_CONTRACTION)

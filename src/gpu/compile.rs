@@ -6,8 +6,9 @@ use naga::back::{pipeline_constants::process_overrides, spv};
 use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
 use naga::{Module, WithSpan};
 
-use super::compose::{Kernel, Source};
+use super::compose::{Kernel, ROUNDING, Source};
 use super::prune::prune;
+use super::rounding::{Rounding, round_in_software};
 use super::spirv;
 use crate::error::ShaderError;
 use crate::pack::Specialization;
@@ -33,26 +34,37 @@ fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>
 
 impl Checked {
     /// The kernel as SPIR-V for one specialisation, computed on the device exactly as it is written.
-    pub fn exact_spirv(&self, kernel: Kernel, constants: &Specialization) -> Result<Vec<u32>, ShaderError> {
-        self.exact_entry(kernel.entry_point(), &constants.constants())
+    pub fn exact_spirv(
+        &self,
+        kernel: Kernel,
+        constants: &Specialization,
+        rounding: Rounding,
+    ) -> Result<Vec<u32>, ShaderError> {
+        self.exact_entry(kernel.entry_point(), &constants.constants(), rounding)
     }
 
     /// The same for any compute entry point, with the values of its overrides.
-    pub fn exact_entry(&self, entry: &str, constants: &[(&str, u32)]) -> Result<Vec<u32>, ShaderError> {
+    pub fn exact_entry(
+        &self,
+        entry: &str,
+        constants: &[(&str, u32)],
+        rounding: Rounding,
+    ) -> Result<Vec<u32>, ShaderError> {
+        let rounded = match rounding {
+            Rounding::Device => None,
+            Rounding::Software => Some(self.rounded_in_software()?),
+        };
+        let Checked { module, info } = rounded.as_ref().unwrap_or(self);
         let constants = constants
             .iter()
             .map(|(name, value)| (name.to_string(), f64::from(*value)));
-        let (specialised, _): (Cow<'_, _>, Cow<'_, _>) = process_overrides(
-            &self.module,
-            &self.info,
-            Some((naga::ShaderStage::Compute, entry)),
-            &constants.collect(),
-        )
-        .map_err(|error| ShaderError::other("specialisation", &error))?;
+        let entry_point = Some((naga::ShaderStage::Compute, entry));
+        let (specialised, _): (Cow<'_, _>, Cow<'_, _>) =
+            process_overrides(module, info, entry_point, &constants.collect())
+                .map_err(|error| ShaderError::other("specialisation", &error))?;
         let mut module = specialised.into_owned();
         prune(&mut module);
         let info = validate(&module).map_err(|error| ShaderError::other("specialisation", &error))?;
-        // The kernels' loops all count to a bound, so that naga need not bound them again.
         let options = spv::Options {
             lang_version: (1, 3),
             force_loop_bounding: false,
@@ -72,5 +84,13 @@ impl Checked {
         let words = spv::write_vec(&module, &info, &options, Some(&pipeline))
             .map_err(|error| ShaderError::other("SPIR-V", &error))?;
         Ok(spirv::forbid_contraction(&words))
+    }
+
+    /// The same kernel with quotients and square roots by `shaders/rounding.wgsl`.
+    fn rounded_in_software(&self) -> Result<Checked, ShaderError> {
+        let mut module = self.module.clone();
+        round_in_software(&mut module, &self.info).map_err(|error| ShaderError::other(ROUNDING, &error))?;
+        let info = validate(&module).map_err(|error| ShaderError::other("rounding", &error))?;
+        Ok(Checked { module, info })
     }
 }

@@ -32,6 +32,7 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "ray.wgsl",
     "rectangle.wgsl",
     "rng.wgsl",
+    "rounding.wgsl",
     "sampling.wgsl",
     "scene.wgsl",
     "sequence.wgsl",
@@ -74,6 +75,9 @@ pub const SHARED: &[&str] = &[
     "filter.wgsl",
     "adaptive.wgsl",
 ];
+
+/// What may take the place of quotients and square roots. It comes first, as naga wants functions before their calls.
+pub const ROUNDING: &str = "rounding.wgsl";
 
 /// What every kernel adds to [`SHARED`]: its constants, its buffers and the way through the scene.
 const KERNEL: &[&str] = &[
@@ -150,7 +154,12 @@ impl Shaders {
     /// it as constants.
     pub fn compose(&self, kernel: Kernel, baked: Option<&str>) -> Source {
         let mut source = Source::default();
-        for name in SHARED.iter().chain(KERNEL).chain([&kernel.file()]) {
+        for name in [&ROUNDING]
+            .into_iter()
+            .chain(SHARED)
+            .chain(KERNEL)
+            .chain([&kernel.file()])
+        {
             source.append(name, self.text(name));
         }
         match baked {

@@ -7,6 +7,7 @@ mod device;
 mod pipeline;
 mod prune;
 mod renderer;
+mod rounding;
 pub mod spirv;
 mod validate;
 
@@ -14,4 +15,5 @@ pub use bake::bake;
 pub use compile::{Checked, check};
 pub use device::{Choice, Device, HOW_TO_GET_VULKAN, Info, adapters, choose};
 pub use renderer::{Gpu, Options};
+pub use rounding::Rounding;
 pub use validate::check_kernels;

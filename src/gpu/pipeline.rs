@@ -7,6 +7,7 @@ use wgpu::{BindingType, BufferBindingType};
 use super::compile::check;
 use super::compose::{Kernel, Source};
 use super::device::Device;
+use super::rounding::Rounding;
 use crate::error::RenderError;
 use crate::pack::Specialization;
 
@@ -49,10 +50,12 @@ pub fn pipeline(
     kernel: Kernel,
     source: &Source,
     constants: &Specialization,
-    exact: bool,
+    exact: Option<Rounding>,
 ) -> Result<wgpu::ComputePipeline, RenderError> {
     let checked = check(source)?;
-    let exact = exact.then(|| checked.exact_spirv(kernel, constants)).transpose()?;
+    let exact = exact
+        .map(|rounding| checked.exact_spirv(kernel, constants, rounding))
+        .transpose()?;
     let constants = constants.constants();
     let mut constants: Vec<(&str, f64)> = constants.iter().map(|(name, v)| (*name, f64::from(*v))).collect();
     device.checked(|| {

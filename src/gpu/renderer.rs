@@ -10,6 +10,7 @@ use super::bake::{MOST_PRIMITIVES, bake};
 use super::compose::{Kernel, Shaders};
 use super::device::Device;
 use super::pipeline::{WORKGROUP, bind_group_layout, pipeline};
+use super::rounding::Rounding;
 use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::job::Backend;
@@ -18,8 +19,8 @@ use crate::pack::{Camera, FirstHit, Packed, Specialization, Work};
 /// How a scene is put on a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// SPIR-V that is computed as written, where the device takes it; else plain WGSL through wgpu.
-    pub exact: bool,
+    /// SPIR-V that is computed as written, with quotients and square roots of whom; else plain WGSL through wgpu.
+    pub exact: Option<Rounding>,
     /// The scene as constants of the kernel, if it is small.
     pub baked: bool,
 }
@@ -28,7 +29,7 @@ impl Options {
     /// What is fastest on a device.
     pub fn best(device: &Device) -> Options {
         Options {
-            exact: device.info.exact,
+            exact: device.info.exact.then_some(Rounding::Device),
             baked: device.info.kind == "software",
         }
     }
@@ -53,7 +54,7 @@ struct Kernels {
     baked: Option<String>,
     constants: Specialization,
     layout: wgpu::BindGroupLayout,
-    exact: bool,
+    exact: Option<Rounding>,
 }
 
 /// A buffer with a record for each pixel of a region, bound for the kernel that writes it.

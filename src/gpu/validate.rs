@@ -3,6 +3,7 @@
 use super::bake::{MOST_PRIMITIVES, bake};
 use super::compile::check;
 use super::compose::{Kernel, Shaders};
+use super::rounding::Rounding;
 use crate::error::ShaderError;
 use crate::pack::Packed;
 
@@ -15,7 +16,7 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders) -> Result<(), ShaderErr
             .into_iter()
             .take(1 + usize::from(baked.is_some()))
         {
-            check(&shaders.compose(kernel, scene))?.exact_spirv(kernel, &packed.specialization)?;
+            check(&shaders.compose(kernel, scene))?.exact_spirv(kernel, &packed.specialization, Rounding::Device)?;
         }
     }
     Ok(())

@@ -132,6 +132,18 @@ fn devices_are_chosen_by_kind_and_by_part_of_a_name() {
     }
 }
 
+/// Software Vulkan's own quotients and square roots are rounded correctly, so that nothing changes.
+#[test]
+fn rounding_in_software_gives_the_same_picture() {
+    let place = Place::new();
+    for device in ["auto", "cpu"] {
+        let arguments = ["render", "small.toml", "--device", device, "-o"];
+        place.quietly(&[&arguments[..], &["own.exr"]].concat());
+        place.quietly(&[&arguments[..], &["exact.exr", "--exact-rounding"]].concat());
+        assert_eq!(place.read("own.exr"), place.read("exact.exr"), "{device}");
+    }
+}
+
 #[test]
 fn any_number_of_threads_gives_the_same_picture() {
     let place = Place::new();

@@ -1,0 +1,99 @@
+// Quotients and square roots rounded correctly (IEEE 754-2019, 4.3.1: to nearest, ties to even), on devices whose own are
+// only near: WGSL allows 2.5 units in the last place. The device's answer is a guess; its remainder, which integers modulo
+// 2^32 hold exactly, tells what is missing. `src/gpu/rounding.rs` puts these in the place of a kernel's own.
+
+const INFINITE = 0x7f800000u;
+
+// A number above 0: mantissa x 2^(exponent - 150), the mantissa from 2^23 to 2^24.
+struct Digits {
+    mantissa: u32,
+    exponent: i32,
+}
+
+fn digits_of(bits: u32) -> Digits {
+    if bits < 0x800000u {
+        let shift = countLeadingZeros(bits) - 8u;
+        return Digits(bits << shift, 1 - i32(shift));
+    }
+    return Digits((bits & 0x7fffffu) | 0x800000u, i32(bits >> 23u));
+}
+
+// The bits of 2^(exponent - 127) x (digits / 2^24), for digits from 2^24 to 2^25, and a little more than that if `more`.
+fn rounded(exponent: i32, digits: u32, more: bool) -> u32 {
+    if exponent >= 255 {
+        return INFINITE;
+    }
+    let dropped = u32(clamp(2 - exponent, 1, 26));
+    let kept = digits >> dropped;
+    let rest = digits & ((1u << dropped) - 1u);
+    let half = 1u << (dropped - 1u);
+    let up = (rest > half) | ((rest == half) & (more | ((kept & 1u) == 1u)));
+    let below = u32(select(0, exponent - 1, exponent > 1)) << 23u; // the mantissa's first bit adds the last 1
+    return below + kept + select(0u, 1u, up);
+}
+
+fn quotient(a: f32, b: f32) -> f32 {
+    let sign = (bitcast<u32>(a) ^ bitcast<u32>(b)) & 0x80000000u;
+    let x = bitcast<u32>(a) & 0x7fffffffu;
+    let y = bitcast<u32>(b) & 0x7fffffffu;
+    let none = (x > INFINITE) | (y > INFINITE) | ((x == y) & ((x == 0u) | (x == INFINITE)));
+    if none | (x == 0u) | (y == 0u) | (x == INFINITE) | (y == INFINITE) {
+        let result = select(0u, INFINITE, (x == INFINITE) | (y == 0u));
+        return bitcast<f32>(sign | select(result, 0x7fc00000u, none));
+    }
+    let over = digits_of(x);
+    let under = digits_of(y);
+    let less = over.mantissa < under.mantissa;
+    let numerator = over.mantissa << select(0u, 1u, less); // so that the quotient is from 1 to 2
+    let exponent = over.exponent - under.exponent + select(127, 126, less);
+    let guess = i32(f32(numerator) / f32(under.mantissa) * 16777216.0);
+    let denominator = i32(under.mantissa);
+    var rest = i32(numerator << 24u) - guess * denominator;
+    let step = i32(f32(rest) / f32(denominator)) - select(0, 1, rest < 0);
+    rest -= step * denominator;
+    var digits = guess + step;
+    if rest < 0 {
+        digits -= 1;
+        rest += denominator;
+    }
+    if rest >= denominator {
+        digits += 1;
+        rest -= denominator;
+    }
+    return bitcast<f32>(sign | rounded(exponent, u32(digits), rest != 0));
+}
+
+fn quotient2(a: vec2f, b: vec2f) -> vec2f {
+    return vec2f(quotient(a.x, b.x), quotient(a.y, b.y));
+}
+
+fn quotient3(a: vec3f, b: vec3f) -> vec3f {
+    return vec3f(quotient2(a.xy, b.xy), quotient(a.z, b.z));
+}
+
+fn square_root(x: f32) -> f32 {
+    let bits = bitcast<u32>(x);
+    if (bits == 0u) | (bits == 0x80000000u) | (bits == INFINITE) {
+        return x;
+    }
+    if bits > INFINITE { // no number, or below 0
+        return bitcast<f32>(bits | 0x7fc00000u);
+    }
+    let number = digits_of(bits);
+    let even = (number.exponent & 1) == 0;
+    let mantissa = number.mantissa << select(0u, 1u, even);
+    let exponent = (number.exponent - select(0, 1, even) + 127) / 2;
+    var digits = i32(sqrt(f32(mantissa) * 33554432.0)); // from 2^24 to 2^25
+    var rest = i32(mantissa << 25u) - digits * digits;
+    digits += i32(f32(rest) / f32(2 * digits)) - select(0, 1, rest < 0);
+    rest = i32(mantissa << 25u) - digits * digits;
+    if rest < 0 {
+        digits -= 1;
+        rest += 2 * digits + 1;
+    }
+    if rest > 2 * digits {
+        rest -= 2 * digits + 1;
+        digits += 1;
+    }
+    return bitcast<f32>(rounded(exponent, u32(digits), rest != 0));
+}

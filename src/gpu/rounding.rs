@@ -1,0 +1,156 @@
+//! Quotients and square roots that are rounded correctly on devices whose own are not.
+
+use std::collections::HashMap;
+
+use naga::valid::ModuleInfo;
+use naga::{
+    Arena, BinaryOperator, Block, Expression, Function, Handle, MathFunction, Module, Range, ScalarKind, Statement,
+    TypeInner,
+};
+
+/// Who rounds quotients and square roots.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rounding {
+    /// The device: lavapipe correctly, GPUs within 2.5 units in the last place (WGSL, section 15.7.4).
+    #[default]
+    Device,
+    /// The functions of `shaders/rounding.wgsl`, correctly everywhere, at some cost.
+    Software,
+}
+
+/// Calls that take the place of expressions, by the expression.
+type Calls = HashMap<Handle<Expression>, (Handle<Function>, Vec<Handle<Expression>>)>;
+
+/// What takes the place of a quotient, by the number of components.
+const QUOTIENTS: [&str; 4] = ["quotient", "quotient2", "quotient3", "quotient4"];
+/// The same for square roots.
+const SQUARE_ROOTS: [&str; 4] = ["square_root", "square_root2", "square_root3", "square_root4"];
+
+/// A function that `shaders/rounding.wgsl` lacks.
+#[derive(Debug, thiserror::Error)]
+#[error("there is no function '{0}'")]
+pub struct Missing(&'static str);
+
+/// Puts calls of the functions of `shaders/rounding.wgsl` in the place of all quotients and square roots of floats.
+pub fn round_in_software(module: &mut Module, info: &ModuleInfo) -> Result<(), Missing> {
+    let named = |name: &'static str| {
+        let found = module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name));
+        found.map(|(handle, _)| handle).ok_or(Missing(name))
+    };
+    // the two that divide and take roots themselves
+    let own = [named(QUOTIENTS[0])?, named(SQUARE_ROOTS[0])?];
+    let function_of = |expression: &Expression, ty: &TypeInner| {
+        let names = match expression {
+            Expression::Binary {
+                op: BinaryOperator::Divide,
+                ..
+            } => QUOTIENTS,
+            Expression::Math {
+                fun: MathFunction::Sqrt,
+                ..
+            } => SQUARE_ROOTS,
+            _ => return Ok(None),
+        };
+        match ty {
+            TypeInner::Scalar(s) if s.kind == ScalarKind::Float => named(names[0]).map(Some),
+            TypeInner::Vector { size, scalar } if scalar.kind == ScalarKind::Float => {
+                named(names[*size as usize - 1]).map(Some)
+            }
+            _ => Ok(None), // of integers
+        }
+    };
+    let calls_of = |function: &Function, info: &naga::valid::FunctionInfo| -> Result<Calls, Missing> {
+        let mut calls = Calls::new();
+        for (handle, expression) in function.expressions.iter() {
+            if let Some(called) = function_of(expression, info[handle].ty.inner_with(&module.types))? {
+                let arguments = match *expression {
+                    Expression::Binary { left, right, .. } => vec![left, right],
+                    Expression::Math { arg, .. } => vec![arg],
+                    _ => unreachable!("neither quotient nor square root"),
+                };
+                calls.insert(handle, (called, arguments));
+            }
+        }
+        Ok(calls)
+    };
+    let mut in_functions = Vec::new();
+    for (handle, function) in module.functions.iter() {
+        if !own.contains(&handle) {
+            in_functions.push((handle, calls_of(function, &info[handle])?));
+        }
+    }
+    let in_entry_points: Vec<Calls> = (0..)
+        .zip(&module.entry_points)
+        .map(|(i, entry_point)| calls_of(&entry_point.function, info.get_entry_point(i)))
+        .collect::<Result<_, _>>()?;
+    for (handle, calls) in in_functions {
+        replace(&mut module.functions[handle], &calls);
+    }
+    for (entry_point, calls) in module.entry_points.iter_mut().zip(in_entry_points) {
+        replace(&mut entry_point.function, &calls);
+    }
+    Ok(())
+}
+
+fn replace(function: &mut Function, calls: &Calls) {
+    call(&mut function.body, &mut function.expressions, calls);
+}
+
+/// Evaluates expressions up to each that a call replaces, then calls.
+fn call(block: &mut Block, expressions: &mut Arena<Expression>, calls: &Calls) {
+    for (statement, span) in std::mem::take(block).span_into_iter() {
+        let Statement::Emit(range) = statement else {
+            block.push(with_calls(statement, expressions, calls), span);
+            continue;
+        };
+        let mut emitted: Option<(Handle<Expression>, Handle<Expression>)> = None;
+        let emit = |block: &mut Block, emitted: &mut Option<_>| {
+            if let Some((first, last)) = emitted.take() {
+                block.push(Statement::Emit(Range::new_from_bounds(first, last)), span);
+            }
+        };
+        for handle in range {
+            if let Some((function, arguments)) = calls.get(&handle) {
+                emit(block, &mut emitted);
+                expressions[handle] = Expression::CallResult(*function);
+                let (function, arguments, result) = (*function, arguments.clone(), Some(handle));
+                block.push(
+                    Statement::Call {
+                        function,
+                        arguments,
+                        result,
+                    },
+                    span,
+                );
+            } else {
+                emitted = Some((emitted.map_or(handle, |(first, _)| first), handle));
+            }
+        }
+        emit(block, &mut emitted);
+    }
+}
+
+/// A statement whose inner blocks call.
+fn with_calls(mut statement: Statement, expressions: &mut Arena<Expression>, calls: &Calls) -> Statement {
+    match &mut statement {
+        Statement::Block(block) => call(block, expressions, calls),
+        Statement::If {
+            accept: first,
+            reject: second,
+            ..
+        }
+        | Statement::Loop {
+            body: first,
+            continuing: second,
+            ..
+        } => {
+            call(first, expressions, calls);
+            call(second, expressions, calls);
+        }
+        Statement::Switch { cases, .. } => cases
+            .iter_mut()
+            .for_each(|case| call(&mut case.body, expressions, calls)),
+        _ => {}
+    }
+    statement
+}

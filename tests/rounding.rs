@@ -1,0 +1,216 @@
+//! Quotients and square roots in software are rounded correctly, whatever the device's own are like; and what pictures
+//! promise of a device whose own are only near.
+
+use std::sync::OnceLock;
+
+use wgray::film::Film;
+use wgray::gpu::compose::{ROUNDING, Shaders, Source};
+use wgray::gpu::{Gpu, Options, Rounding};
+use wgray::job::Cut;
+use wgray::pack::Packed;
+
+use crate::adapter::{self, bit_exact};
+use crate::kernel::functions;
+use crate::pictures::{Way, differing, film, reference, render, whole};
+use crate::random::Random;
+use crate::render::{Nearly, small_scenes};
+use crate::sources::{edited, parse, shaders, shaders_with};
+
+/// Moves a number by up to 3 units in the last place, as a function of its digits: more than WGSL allows a quotient.
+const NUDGED: &str = "
+fn nudged(x: f32) -> f32 {
+    let bits = bitcast<u32>(x);
+    let e = (bits >> 23u) & 255u;
+    let step = i32(((bits * 0x9e3779b9u) >> 16u) % 7u) - 3;
+    return select(x, bitcast<f32>(bitcast<i32>(bits) + step), (e > 1u) & (e < 254u));
+}
+";
+
+/// The functions over a device's own operations that are near only.
+fn over_a_poor_device() -> String {
+    let mut text = shaders().text(ROUNDING).to_string();
+    for (from, to) in [
+        (
+            "f32(numerator) / f32(under.mantissa)",
+            "nudged(f32(numerator) / f32(under.mantissa))",
+        ),
+        ("f32(rest) / f32(denominator)", "nudged(f32(rest) / f32(denominator))"),
+        (
+            "sqrt(f32(mantissa) * 33554432.0)",
+            "nudged(sqrt(f32(mantissa) * 33554432.0))",
+        ),
+        ("f32(rest) / f32(2 * digits)", "nudged(f32(rest) / f32(2 * digits))"),
+    ] {
+        text = edited(&text, from, to);
+    }
+    text + NUDGED
+}
+
+/// A device's own operations that are near only, in place of the functions.
+fn poor_device() -> String {
+    "fn quotient(a: f32, b: f32) -> f32 { return nudged(a / b); }
+    fn quotient2(a: vec2f, b: vec2f) -> vec2f { return vec2f(quotient(a.x, b.x), quotient(a.y, b.y)); }
+    fn quotient3(a: vec3f, b: vec3f) -> vec3f { return vec3f(quotient2(a.xy, b.xy), quotient(a.z, b.z)); }
+    fn square_root(x: f32) -> f32 { return nudged(sqrt(x)); }
+    "
+    .to_string()
+        + NUDGED
+}
+
+/// Numbers of all kinds, and those around which something changes.
+fn numbers(random: &Random) -> f32 {
+    const EDGES: [u32; 12] = [
+        0,
+        1,
+        2,
+        0x7f_ffff,
+        0x80_0000,
+        0x80_0001,
+        0x3f7f_ffff,
+        0x3f80_0000,
+        0x3f80_0001,
+        0x7f7f_ffff,
+        0x7f80_0000,
+        0x7fc0_0000,
+    ];
+    let sign = random.pick(&[0, 0x8000_0000]);
+    let few_digits = || (random.below(64) << random.below(25)) | 1 << random.below(31);
+    let bits = match random.below(5) {
+        0 => random.bits() as u32,
+        1 => random.pick(&EDGES),
+        2 => few_digits(),
+        3 => 0x3f80_0000 | (random.bits() as u32 & 0x7f_ffff), // from 1 to 2
+        _ => random.bits() as u32 & 0xff_ffff,                 // denormal and a little larger
+    };
+    f32::from_bits(bits ^ sign)
+}
+
+/// A function that is or is not rounded correctly.
+struct Case {
+    name: &'static str,
+    arguments: usize,
+    truth: fn(&[f32]) -> f32,
+    /// Mistakes that must be found.
+    mistakes: [(&'static str, &'static str); 2],
+}
+
+const CASES: [Case; 2] = [
+    Case {
+        name: "quotient",
+        arguments: 2,
+        truth: |x| x[0] / x[1],
+        mistakes: [
+            ("rest > half", "rest >= half"),
+            ("rest >= denominator", "rest > denominator"),
+        ], // the first concerns ties
+    },
+    Case {
+        name: "square_root",
+        arguments: 1,
+        truth: |x| x[0].sqrt(),
+        mistakes: [
+            ("    rest = i32(mantissa", "    rest = 33554432 + i32(mantissa"),
+            ("(more | (", "(!more | ("),
+        ],
+    },
+];
+
+/// How many of a million results are not those of IEEE 754, and the first of them.
+fn wrong(case: &Case, text: &str) -> (usize, Option<String>) {
+    let mut source = Source::default();
+    source.append("rounding", text);
+    let module = parse(&source);
+    let functions = functions(&module, &source);
+    let (_, function) = functions
+        .iter()
+        .find(|(_, f)| f.name() == case.name)
+        .expect("the function");
+    let random = Random::new(5);
+    let arguments: Vec<f32> = (0..case.arguments << 20).map(|_| numbers(&random)).collect();
+    let device = adapter::device().expect("a device");
+    let results = function.run_in(device, &source, bytemuck::cast_slice(&arguments));
+    let calls = arguments
+        .chunks_exact(case.arguments)
+        .zip(results.into_iter().map(f32::from_bits));
+    let wrong = calls.filter(|(x, result)| {
+        let truth = (case.truth)(x);
+        truth.to_bits() != result.to_bits() && !(truth.is_nan() && result.is_nan())
+    });
+    let mut wrong = wrong.map(|(x, result)| format!("{}{x:?} is {result:?}, not {:?}", case.name, (case.truth)(x)));
+    let first = wrong.next();
+    (wrong.count() + usize::from(first.is_some()), first)
+}
+
+#[test]
+fn quotients_and_square_roots_are_rounded_correctly_on_any_device() {
+    if adapter::device().is_none() {
+        return;
+    }
+    for case in &CASES {
+        for (device, text) in [
+            ("this device", shaders().text(ROUNDING)),
+            ("a poor one", &over_a_poor_device()),
+        ] {
+            let (number, first) = wrong(case, text);
+            assert_eq!(number, 0, "on {device}: {first:?}");
+        }
+        // negative controls
+        assert!(
+            wrong(case, &poor_device()).0 > 100_000,
+            "{}: a poor device is found out",
+            case.name
+        );
+        for (from, to) in case.mistakes {
+            let (number, _) = wrong(case, &edited(&over_a_poor_device(), from, to));
+            assert!(number > 0, "{}: '{to}'", case.name);
+        }
+    }
+}
+
+/// A poor device, as shaders of kernels that are rounded in software.
+pub fn poor_shaders() -> &'static Shaders {
+    static POOR: OnceLock<Shaders> = OnceLock::new();
+    POOR.get_or_init(|| shaders_with(ROUNDING, &poor_device()))
+}
+
+/// The picture with quotients and square roots by another text of the functions.
+pub fn picture(packed: &Packed, shaders: &Shaders) -> Film {
+    let device = adapter::device().expect("a device");
+    let options = Options {
+        exact: Some(Rounding::Software),
+        baked: false,
+    };
+    let mut gpu = Gpu::new(device, packed, shaders, options).unwrap_or_else(|error| panic!("{error}"));
+    film(&mut gpu, packed, whole(packed), &Cut::default())
+}
+
+/// A device with quotients and square roots that are wrong in the last digits keeps the promise of nearly the same
+/// pictures, and with the functions that of the same.
+#[test]
+fn pictures_keep_their_promise_on_a_poor_device() {
+    if !adapter::device().is_some_and(bit_exact) {
+        return; // the other tests tell what that device is like by itself
+    }
+    for (name, packed) in small_scenes() {
+        let cpu = reference(&packed);
+        let found = picture(&packed, poor_shaders());
+        let (differ, nearly) = (differing(&found, &cpu), Nearly::of(&packed, &found, &cpu));
+        println!(
+            "{name} on a poor device: {differ} of {} pixels differ, {nearly:?}",
+            cpu.sums.len()
+        );
+        assert!(differ * 4 > cpu.sums.len(), "{name}: only {differ} pixels differ");
+        assert!(
+            nearly.judge().is_ok(),
+            "{name}, poor device: {}",
+            nearly.judge().unwrap_err()
+        );
+        let corrected = shaders_with(ROUNDING, &over_a_poor_device());
+        assert_eq!(differing(&picture(&packed, &corrected), &cpu), 0, "{name}, corrected");
+        assert_eq!(
+            differing(&render(&packed, Way::Rounded), &cpu),
+            0,
+            "{name}, this device"
+        );
+    }
+}
