@@ -423,6 +423,7 @@ fn random_scenes_are_the_same_on_gpu_and_cpu() {
         let path = save(&d, "failing-scene.toml");
         panic!("{reason}: wgray render {}", path.display());
     }
+    println!("{number} random scenes, each from buffers and as constants: every pixel has the same bits");
 }
 
 /// Where bits are not promised, the pixels of random scenes are near, together: by plain WGSL, on devices that are not
@@ -450,7 +451,7 @@ fn random_scenes_are_nearly_the_same_where_bits_are_not_promised() {
         moved.sums.rotate_right(1);
         shifted.add(Nearly::of(&packed, &moved, &cpu));
     }
-    println!("random scenes: plain WGSL {plain:?}, poor quotients {poor:?}");
+    println!("random scenes: by plain WGSL {plain}; with poor quotients {poor}");
     assert!(plain.judge().is_ok(), "plain WGSL: {}", plain.judge().unwrap_err());
     assert!(poor.judge().is_ok(), "poor quotients: {}", poor.judge().unwrap_err());
     assert!(shifted.judge().is_err(), "the comparison cannot fail");

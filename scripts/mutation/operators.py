@@ -26,7 +26,7 @@ from collections import defaultdict
 import tree_sitter
 import tree_sitter_rust
 
-from project import AGREEMENT, ANSWERS, ENOUGH, ROOT, WITHOUT_GPU, WORK, Tests, cargo, copy
+from project import AGREEMENT, ANSWERS, ENOUGH, REST, ROOT, WITHOUT_GPU, WORK, Tests, cargo, copy
 
 PROBES, PICTURES = AGREEMENT[:1], AGREEMENT[1:]
 REASONS = ROOT / "scripts/mutation/survivors.toml"
@@ -198,8 +198,11 @@ def main():
 
     def found(m):
         mutant = {"WGRAY_MUTANT": str(m.number)}
-        alone = m.function in functions and tests.first_failing(PROBES, WGRAY_TEST_FUNCTION=m.function, **mutant)
-        return alone or tests.first_failing(PICTURES, **mutant) or tests.first_failing(ANSWERS, **WITHOUT_GPU, **mutant)
+        if m.function in functions:
+            found = tests.first_failing(PROBES, WGRAY_TEST_FUNCTION=m.function, **mutant)
+            if found:
+                return found
+        return tests.first_failing(ANSWERS, **WITHOUT_GPU, **mutant) or tests.first_failing(PICTURES + REST, **mutant)
 
     begin = time.monotonic()
     survivors, by = [], defaultdict(int)
