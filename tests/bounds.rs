@@ -181,6 +181,7 @@ fn functions_have_their_exact_answers() {
         ("log2", &[f32::MIN_POSITIVE], -126.0),
         ("exp2", &[0.0], 1.0),
         ("exp2", &[-126.0], f32::MIN_POSITIVE),
+        ("exp2", &[-126.5], 0.0),
         ("exp2", &[-126.6], 0.0),
         ("exp2", &[f32::NEG_INFINITY], 0.0),
         ("exp2", &[127.0], 1.701_411_8e38),

@@ -1,6 +1,6 @@
 //! Inputs for the probes. Most are arguments as they occur, so that every branch is taken: a primitive, a ray at a
-//! point of it, in its inside, on its edge or past it. Some of these have single numbers replaced by edge values, and
-//! some are random bits of all magnitudes.
+//! point of it, in its inside, on its edge or past it. Some of these have single numbers replaced by edge values or by
+//! one another, some are brought to halves, so that what is compared is often equal, and some are of all magnitudes.
 
 use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
 use naga::{Handle, Module, ScalarKind, Type};
@@ -41,7 +41,11 @@ const EDGES: &[f32] = &[
     f32::NAN,
     1e10,
     1e-10,
+    8_388_608.0,
     16_777_216.0,
+    -126.5,
+    0.0001, // the least and the largest width of pattern.wgsl
+    4096.0,
     0.333_333_34,
 ];
 
@@ -57,7 +61,8 @@ pub fn inputs(function: &Function, calls: usize, seed: u64) -> Vec<u32> {
 
 fn call(function: &Function, random: &Random, words: &mut Vec<u32>) {
     let situation = Situation::new(random);
-    let manner = random.below(8);
+    let manner = random.below(12);
+    let mut before = 0.0;
     for (name, ty) in function.arguments() {
         let start = words.len();
         situation.argument((function.name(), &name), function.module, ty, random, words);
@@ -68,9 +73,12 @@ fn call(function: &Function, random: &Random, words: &mut Vec<u32>) {
                     0 => wild(random),
                     1 if random.once_in(4) => random.pick(EDGES),
                     2 if random.once_in(8) => neighbour(x, random),
+                    3 => (x * 2.0).round() / 2.0,
+                    4 if random.once_in(4) => before,
                     _ => x,
                 }
                 .to_bits();
+                before = f32::from_bits(*word);
             }
         }
     }

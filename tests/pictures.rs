@@ -31,6 +31,16 @@ pub fn both() -> Vec<Way> {
     ways
 }
 
+/// The CPU, and the device where it gives the same bits as the CPU.
+pub fn exact_ways() -> Vec<Way> {
+    let exact = adapter::device().is_some_and(adapter::bit_exact);
+    if exact {
+        vec![Way::Cpu, Way::Baked, Way::Buffers]
+    } else {
+        vec![Way::Cpu]
+    }
+}
+
 /// A backend with a scene. Panics where the way asks for a device and there is none.
 pub fn backend<'a>(packed: &'a Packed, way: Way) -> Box<dyn Backend + 'a> {
     if way == Way::Cpu {

@@ -12,7 +12,7 @@ use wgray::pack::{FirstHit, Packed};
 use wgray::scene::{Description, Pattern};
 
 use crate::adapter::{self, KNOWN, allowed, bit_exact, judge};
-use crate::pictures::{Way, backend, crop, differing, film, first_hits, reference, render, whole};
+use crate::pictures::{Way, backend, crop, differing, exact_ways, film, first_hits, reference, render, whole};
 use crate::{patterns, scenes, sources};
 
 /// Where bits are not promised, a pixel is within this of its value ...
@@ -301,16 +301,6 @@ fn pieces(backend: &mut dyn Backend, region: Region, pieces: &[(Region, Range<u3
         backend.film()
     };
     run().unwrap_or_else(|error: wgray::error::RenderError| panic!("{error}"))
-}
-
-/// The CPU, and the device where it gives the same bits as the CPU.
-fn exact_ways() -> Vec<Way> {
-    let exact = adapter::device().is_some_and(bit_exact);
-    if exact {
-        vec![Way::Cpu, Way::Baked, Way::Buffers]
-    } else {
-        vec![Way::Cpu]
-    }
 }
 
 fn tile(x0: u32, y0: u32, x1: u32, y1: u32) -> Region {

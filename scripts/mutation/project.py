@@ -41,7 +41,7 @@ ANSWERS = [
     ["main", "sampling::", "--skip", "is_found"],
 ]
 # What else there is, of the command line and of how work is cut.
-REST = [["main", "render::", "cli::"], ["lib"]]
+REST = [["main", "render::", "cli::", "sampling::"], ["lib"]]
 WITHOUT_GPU = {"WGRAY_TEST_WITHOUT_GPU": "1"}
 
 
