@@ -347,13 +347,13 @@ fn color(random: &Random) -> Vec3 {
 fn local_point(random: &Random) -> DVec3 {
     let coordinate = || random.between(-1.2, 1.2);
     let p = DVec3::new(coordinate(), coordinate(), coordinate());
-    match random.below(10) {
+    match random.below(11) {
         0 | 1 => DVec3::new(p.x, p.y, 0.0),
         2 | 3 => p.normalize(),
         4 => DVec3::new(random.pick(&[-1.0, 0.0, 1.0]), p.y, 0.0),
         5 => DVec3::new(random.pick(&[-1.0, 0.0, 1.0]), random.pick(&[-1.0, 0.0, 1.0]), 0.0),
         6 => DVec3::new(p.x.abs(), 1.0 - p.x.abs(), 0.0),
-        7 | 8 => DVec3::new(random.between(0.0, 0.6), random.between(0.0, 0.6), 0.0),
+        7..=9 => DVec3::new(random.between(0.0, 0.6), random.between(0.0, 0.6), 0.0),
         _ => p,
     }
 }
