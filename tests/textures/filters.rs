@@ -8,7 +8,8 @@ use wgray::cpu::texel::{near_coordinate, srgb_to_linear, wrapped_index};
 use wgray::cpu::texture::texture_color;
 use wgray::pack::{CLAMP, MIRRORED, Packed, REPEAT};
 
-use super::{Numbers, scene, write_exr, write_png};
+use super::{scene, write_exr, write_png};
+use crate::random::Random;
 
 /// A scene with one texture, of a file in the folder.
 pub fn textured(folder: &Path, keys: &str) -> Packed {
@@ -30,7 +31,7 @@ fn color(scene: &Packed, uv: Vec2, dx: Vec2, dy: Vec2) -> Vec3 {
 
 /// Footprints of all sizes and shapes, and what grazing rays make.
 fn footprints() -> Vec<(Vec2, Vec2, Vec2)> {
-    let mut numbers = Numbers::new(1);
+    let numbers = Random::new(1);
     let mut footprints = Vec::new();
     for i in 0..300 {
         let mut vector =
@@ -137,8 +138,8 @@ fn coordinates_go_on_beyond_the_image_as_they_should() {
 
 /// Random texels, and the file that has them.
 fn noise(folder: &Path, width: u32, height: u32) -> Vec<f64> {
-    let mut numbers = Numbers::new(5);
-    let texels: Vec<f32> = (0..width * height).map(|_| numbers.next() as f32).collect();
+    let numbers = Random::new(5);
+    let texels: Vec<f32> = (0..width * height).map(|_| numbers.unit() as f32).collect();
     write_exr(&folder.join("noise.exr"), width, height, |x, y| {
         [texels[(y * width + x) as usize]; 3]
     });
@@ -173,11 +174,11 @@ fn ewa_of_a_round_footprint_is_a_gaussian_mean() {
         }
         sum / total
     };
-    let mut numbers = Numbers::new(9);
+    let numbers = Random::new(9);
     let texel = 1.0 / n as f32;
     let mut narrower_differs = false;
     for _ in 0..200 {
-        let uv = Vec2::new(numbers.next() as f32, numbers.next() as f32);
+        let uv = Vec2::new(numbers.unit() as f32, numbers.unit() as f32);
         let angle = numbers.between(0.0, std::f64::consts::TAU) as f32;
         let (dx, dy) = (Vec2::from_angle(angle) * texel, Vec2::from_angle(angle).perp() * texel);
         let found = f64::from(color(&scene, uv, dx, dy).x);
@@ -237,10 +238,10 @@ fn ewa_keeps_what_lies_across_a_long_footprint() {
 
 #[test]
 fn a_footprints_ellipse_has_its_conjugate_axes() {
-    let mut numbers = Numbers::new(3);
+    let numbers = Random::new(3);
     let mut clamped = 0;
     for _ in 0..1000 {
-        let mut vector = || Vec2::new(numbers.between(-9.0, 9.0) as f32, numbers.between(-9.0, 9.0) as f32);
+        let vector = || Vec2::new(numbers.between(-9.0, 9.0) as f32, numbers.between(-9.0, 9.0) as f32);
         let (dx, dy) = (vector(), vector());
         let (a, b) = (dx.as_dvec2(), dy.as_dvec2());
         let m = DVec3::new(a.x * a.x + b.x * b.x, a.x * a.y + b.x * b.y, a.y * a.y + b.y * b.y);

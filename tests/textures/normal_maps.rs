@@ -8,7 +8,8 @@ use wgray::cpu::surface::surface_at;
 use wgray::cpu::texture::appearance;
 use wgray::pack::Packed;
 
-use super::{Numbers, scene, write_exr};
+use super::{scene, write_exr};
+use crate::random::Random;
 
 /// Shapes with a map whose normal is (x, y, z) / |(x, y, z)| everywhere.
 fn shapes(normal: Vec3, keys: &str, strength: f32) -> Packed {
@@ -126,9 +127,9 @@ fn strength_is_a_factor_of_the_slope() {
 #[test]
 fn a_flat_map_changes_nothing() {
     let flat = shapes(Vec3::Z, "", 1.0);
-    let mut numbers = Numbers::new(8);
+    let numbers = Random::new(8);
     for _ in 0..200 {
-        let mut unit = || Vec3::from_array([0; 3].map(|_| numbers.between(-1.0, 1.0) as f32)).normalize();
+        let unit = || Vec3::from_array([0; 3].map(|_| numbers.between(-1.0, 1.0) as f32)).normalize();
         let target = Vec3::new(9.0, 0.0, 0.0) + unit();
         let origin = target + (target - Vec3::new(9.0, 0.0, 0.0)) * 3.0 + unit();
         let q = &flat.primitives[1];

@@ -8,7 +8,7 @@ use wgray::cpu::pattern::pattern_share;
 use wgray::cpu::texture::texture_color;
 use wgray::pack::{CHECKER, LINES};
 
-use super::Numbers;
+use crate::random::Random;
 use super::filters::textured;
 
 fn point(kind: u32, width: f64, u: f64, v: f64) -> f64 {
@@ -35,7 +35,7 @@ fn mean(kind: u32, width: f64, f: Footprint, n: i32) -> f64 {
 
 #[test]
 fn upright_footprints_have_the_exact_mean() {
-    let mut numbers = Numbers::new(2);
+    let numbers = Random::new(2);
     let mut unfiltered = 0.0f64;
     for i in 0..150 {
         let kind = [CHECKER, LINES][i % 2];
@@ -53,7 +53,7 @@ fn upright_footprints_have_the_exact_mean() {
 
 #[test]
 fn slanted_footprints_have_nearly_the_mean() {
-    let mut numbers = Numbers::new(4);
+    let numbers = Random::new(4);
     let (mut square, mut worst) = (0.0, 0.0f64);
     let count = 300;
     for i in 0..count {
@@ -76,7 +76,7 @@ fn slanted_footprints_have_nearly_the_mean() {
 
 #[test]
 fn without_a_footprint_the_pattern_is_its_points() {
-    let mut numbers = Numbers::new(6);
+    let numbers = Random::new(6);
     for i in 0..1000 {
         let kind = [CHECKER, LINES][i % 2];
         let uv = Vec2::new(numbers.between(-9.0, 9.0) as f32, numbers.between(-9.0, 9.0) as f32);
