@@ -136,3 +136,33 @@ fn a_sphere_in_parallel_light_casts_a_disc() {
         assert!(largest_error(&film, disc(0.6)) > 0.5, "a larger disc is told from it");
     }
 }
+
+/// What two primitives hide is hidden, of whichever kinds they are.
+#[test]
+fn light_behind_two_primitives_is_hidden() {
+    let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
+    let light = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -2]\ncolor = [1, 1, 1]\n";
+    let shape = |text: &str| format!("[[shapes]]\nmaterial = 'ground'\n{text}\n");
+    // far away, so that all others have something on both sides: walls cast no shadow
+    let above = shape("type = 'sphere'\ncenter = [90, 90, 5]\nradius = 0.5");
+    let kinds = [
+        "type = 'rectangle'\ncenter = [0, 0, 1]\nsize = [9, 9]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
+        "type = 'triangle'\nvertices = [[-9, -9, 1.5], [9, -9, 1.5], [0, 18, 1.5]]",
+        "type = 'ellipsoid'\ncenter = [0, 0, 2]\na = [9, 0, 0]\nb = [0, 9, 0]\nc = [0, 0, 0.2]",
+        "type = 'plane'\npoint = [0, 0, 3]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
+    ]
+    .map(shape);
+    let dark = |shapes: &str| {
+        let films = films(&parse(&format!("{scene}{GROUND}{light}{above}{shapes}")));
+        films
+            .iter()
+            .all(|film| film.means().all(|color| color == [0.1f32 * 0.5, 0.2 * 0.5, 0.3]))
+    };
+    for (i, first) in kinds.iter().enumerate() {
+        assert!(dark(first), "{first}");
+        for second in &kinds[i + 1..] {
+            assert!(dark(&format!("{first}{second}")), "{first}{second}");
+        }
+    }
+    assert!(!dark(""), "without them there is light");
+}

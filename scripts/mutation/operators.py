@@ -7,9 +7,10 @@ behind a switch that an environment variable sets.  What does not compile is lef
     scripts/mutation/operators.py                     all of them (about an hour on two cores)
     scripts/mutation/operators.py --only ray,shadow   those of some files
     scripts/mutation/operators.py --sample 10         every tenth
+    scripts/mutation/operators.py --again LOG         those that survived a run whose output is in LOG
 
 Needs cargo-mutants (`cargo install cargo-mutants`) and the Python packages tree-sitter and tree-sitter-rust.
-Exit code 1 if fewer than 95 % are found, or one survives that survivors.toml does not explain.
+Exit code 1 if fewer than 95 % are found, one survives that survivors.toml does not explain, or one that it explains does not.
 """
 
 import argparse
@@ -179,9 +180,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", help="names of files, without .rs, separated by commas")
     parser.add_argument("--sample", type=int, default=1, metavar="N", help="only every N-th")
+    parser.add_argument("--again", type=argparse.FileType(), metavar="LOG", help="only those that LOG names as survivors")
     arguments = parser.parse_args()
     listed = all_mutations()
     chosen = [m for m in listed if not arguments.only or m.file[8:-3] in arguments.only.split(",")][:: arguments.sample]
+    if arguments.again:
+        names = {line.removeprefix("survives: ").strip() for line in arguments.again if line.startswith("survives: ")}
+        chosen = [m for m in chosen if m.name in names]
     folder = WORK / "operators"
     copy(folder)
     left_out = []
@@ -216,13 +221,17 @@ def main():
                 print(f"{done} of {len(chosen)}, {time.monotonic() - begin:.0f} s, {len(survivors)} survive", flush=True)
     reasons = tomllib.loads(REASONS.read_text()) if REASONS.exists() else {}
     unexplained = [m for m in survivors if m.key not in reasons]
+    killed = {m.key for m in chosen} - {m.key for m in survivors}
+    stale = [key for key in reasons if key in killed or key not in {m.key for m in listed}]
     share = 1 - len(survivors) / len(chosen)
     print(f"\n{len(chosen) - len(survivors)} of {len(chosen)} found ({share:.1%}), by")
     for test, number in sorted(by.items(), key=lambda item: -item[1]):
         print(f"  {number:5} {test or 'nothing'}")
     for m in unexplained:
         print(f"no reason is known for {m.name}\n    {m.key}")
-    return 0 if share >= ENOUGH and not unexplained else 1
+    for key in stale:
+        print(f"survives no more, its reason must go: {key}")
+    return 0 if share >= ENOUGH and not unexplained and not stale else 1
 
 
 if __name__ == "__main__":

@@ -42,6 +42,7 @@ ANSWERS = [
 ]
 # What else there is, of the command line and of how work is cut.
 REST = [["main", "render::", "cli::", "sampling::"], ["lib"]]
+LOOP = "a loop without end"
 WITHOUT_GPU = {"WGRAY_TEST_WITHOUT_GPU": "1"}
 
 
@@ -104,7 +105,7 @@ class Tests:
                     stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=patience, errors="replace",
                 )
             except subprocess.TimeoutExpired:
-                return "a loop without end"
+                return LOOP
             if run.returncode != 0:
                 failed = re.findall(r"^---- (\S+) stdout", run.stdout, re.M)
                 return failed[0] if failed else f"exit code {run.returncode}"

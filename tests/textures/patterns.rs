@@ -8,8 +8,8 @@ use wgray::cpu::pattern::pattern_share;
 use wgray::cpu::texture::texture_color;
 use wgray::pack::{CHECKER, LINES};
 
-use crate::random::Random;
 use super::filters::textured;
+use crate::random::Random;
 
 fn point(kind: u32, width: f64, u: f64, v: f64) -> f64 {
     let share = if kind == CHECKER {
