@@ -76,7 +76,9 @@ def build(folder):
     binaries = {}
     for message in messages:
         if message.get("executable") and message.get("profile", {}).get("test"):
-            binaries["lib" if message["target"]["kind"] == ["lib"] else message["target"]["name"]] = message["executable"]
+            name = "lib" if message["target"]["kind"] == ["lib"] else message["target"]["name"]
+            # cargo gives all copies' binaries the same path
+            binaries[name] = shutil.copy2(message["executable"], folder / f"tests-{name}")
     return binaries
 
 
