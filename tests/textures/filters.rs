@@ -34,8 +34,7 @@ fn footprints() -> Vec<(Vec2, Vec2, Vec2)> {
     let numbers = Random::new(1);
     let mut footprints = Vec::new();
     for i in 0..300 {
-        let mut vector =
-            |size: f64| Vec2::new(numbers.between(-size, size) as f32, numbers.between(-size, size) as f32);
+        let vector = |size: f64| Vec2::new(numbers.between(-size, size) as f32, numbers.between(-size, size) as f32);
         let size = 2f64.powi(i % 30 - 15);
         footprints.push((
             vector(3.0),
