@@ -137,32 +137,55 @@ fn a_sphere_in_parallel_light_casts_a_disc() {
     }
 }
 
+/// Large shapes of every kind at some height, that cover all of the picture; and a small one far away above them, so that
+/// all have something on both sides: walls cast no shadow.
+fn covers(heights: [f64; 4]) -> [String; 4] {
+    let [a, b, c, d] = heights;
+    [
+        format!("type = 'rectangle'\ncenter = [0, 0, {a}]\nsize = [9, 9]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]"),
+        format!("type = 'triangle'\nvertices = [[-9, -9, {b}], [9, -9, {b}], [0, 18, {b}]]"),
+        format!("type = 'ellipsoid'\ncenter = [0, 0, {c}]\na = [9, 0, 0]\nb = [0, 9, 0]\nc = [0, 0, 0.02]"),
+        format!("type = 'plane'\npoint = [0, 0, {d}]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]"),
+    ]
+    .map(|text| format!("[[shapes]]\nmaterial = 'ground'\n{text}\n"))
+}
+
+/// The ground under a light and covers, seen from below these: whether all of it is dark, and whether all of it is lit.
+fn dark_or_lit(light: &str, covers: &str) -> (bool, bool) {
+    let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
+    let above = "[[shapes]]\ntype = 'sphere'\nmaterial = 'ground'\ncenter = [90, 90, 5]\nradius = 0.5\n";
+    let films = films(&parse(&format!("{scene}{GROUND}{light}{above}{covers}")));
+    let ambient = [0.1f32 * 0.5, 0.2 * 0.5, 0.3];
+    let all = |dark: bool| {
+        films
+            .iter()
+            .all(|film| film.means().all(|color| (color == ambient) == dark))
+    };
+    (all(true), all(false))
+}
+
+const DARK: (bool, bool) = (true, false);
+const LIT: (bool, bool) = (false, true);
+
 /// What two primitives hide is hidden, of whichever kinds they are.
 #[test]
 fn light_behind_two_primitives_is_hidden() {
-    let scene = DOWN.replace("position = [0, 0, 5]", "position = [0, 0, 0.25]");
     let light = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -2]\ncolor = [1, 1, 1]\n";
-    let shape = |text: &str| format!("[[shapes]]\nmaterial = 'ground'\n{text}\n");
-    // far away, so that all others have something on both sides: walls cast no shadow
-    let above = shape("type = 'sphere'\ncenter = [90, 90, 5]\nradius = 0.5");
-    let kinds = [
-        "type = 'rectangle'\ncenter = [0, 0, 1]\nsize = [9, 9]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
-        "type = 'triangle'\nvertices = [[-9, -9, 1.5], [9, -9, 1.5], [0, 18, 1.5]]",
-        "type = 'ellipsoid'\ncenter = [0, 0, 2]\na = [9, 0, 0]\nb = [0, 9, 0]\nc = [0, 0, 0.2]",
-        "type = 'plane'\npoint = [0, 0, 3]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
-    ]
-    .map(shape);
-    let dark = |shapes: &str| {
-        let films = films(&parse(&format!("{scene}{GROUND}{light}{above}{shapes}")));
-        films
-            .iter()
-            .all(|film| film.means().all(|color| color == [0.1f32 * 0.5, 0.2 * 0.5, 0.3]))
-    };
+    let kinds = covers([1.0, 1.5, 2.0, 3.0]);
     for (i, first) in kinds.iter().enumerate() {
-        assert!(dark(first), "{first}");
+        assert_eq!(dark_or_lit(light, first), DARK, "{first}");
         for second in &kinds[i + 1..] {
-            assert!(dark(&format!("{first}{second}")), "{first}{second}");
+            assert_eq!(dark_or_lit(light, &format!("{first}{second}")), DARK, "{first}{second}");
         }
     }
-    assert!(!dark(""), "without them there is light");
+    assert_eq!(dark_or_lit(light, ""), LIT, "without them");
+}
+
+/// A light is hidden by what is just before it, and by nothing behind it.
+#[test]
+fn a_light_is_hidden_by_what_is_before_it_alone() {
+    for (before, behind) in covers([1.45; 4]).iter().zip(&covers([1.55; 4])) {
+        assert_eq!(dark_or_lit(LIGHT, before), DARK, "{before}");
+        assert_eq!(dark_or_lit(LIGHT, behind), LIT, "{behind}");
+    }
 }
