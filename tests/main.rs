@@ -12,6 +12,7 @@ mod dev;
 mod inputs;
 mod kernel;
 mod layout;
+mod nearly;
 mod oracle;
 mod patterns;
 mod pictures;

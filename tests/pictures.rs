@@ -3,6 +3,7 @@
 use glam::Vec4;
 use wgray::cpu::Cpu;
 use wgray::film::{Film, Region};
+use wgray::gpu::compose::Shaders;
 use wgray::gpu::{Gpu, Options, Rounding};
 use wgray::job::{Backend, Cut};
 use wgray::pack::{FirstHit, Packed};
@@ -43,6 +44,11 @@ pub fn exact_ways() -> Vec<Way> {
 
 /// A backend with a scene. Panics where the way asks for a device and there is none.
 pub fn backend<'a>(packed: &'a Packed, way: Way) -> Box<dyn Backend + 'a> {
+    backend_with(packed, way, sources::shaders())
+}
+
+/// The same with other shaders.
+fn backend_with<'a>(packed: &'a Packed, way: Way, shaders: &Shaders) -> Box<dyn Backend + 'a> {
     if way == Way::Cpu {
         return Box::new(Cpu::new(packed));
     }
@@ -55,7 +61,7 @@ pub fn backend<'a>(packed: &'a Packed, way: Way) -> Box<dyn Backend + 'a> {
         },
         baked: way == Way::Baked,
     };
-    let gpu = Gpu::new(device, packed, sources::shaders(), options);
+    let gpu = Gpu::new(device, packed, shaders, options);
     Box::new(gpu.unwrap_or_else(|error| panic!("{way:?}: {error}")))
 }
 
@@ -89,6 +95,16 @@ pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Cu
 /// The whole picture.
 pub fn render(packed: &Packed, way: Way) -> Film {
     film(&mut *backend(packed, way), packed, whole(packed), &Cut::default())
+}
+
+/// The whole picture by other shaders.
+pub fn render_with(packed: &Packed, way: Way, shaders: &Shaders) -> Film {
+    film(
+        &mut *backend_with(packed, way, shaders),
+        packed,
+        whole(packed),
+        &Cut::default(),
+    )
 }
 
 /// The whole picture on the CPU.

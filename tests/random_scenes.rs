@@ -9,13 +9,11 @@ use proptest::sample::select;
 use proptest::strategy::ValueTree as _;
 use proptest::test_runner::{Config, RngAlgorithm, TestError, TestRng, TestRunner};
 use wgray::gpu::compose::Shaders;
-use wgray::gpu::{Gpu, Options};
-use wgray::job::Cut;
 use wgray::scene::*;
 
 use crate::adapter::{self, bit_exact};
-use crate::pictures::{Way, differing, film, first_hits, reference, render as render_by, whole};
-use crate::render::Nearly;
+use crate::nearly::Nearly;
+use crate::pictures::{Way, differing, first_hits, reference, render_with};
 use crate::{patterns, rounding, scenes, sources};
 
 /// How many scenes; with this variable each run has others, else they are the same in every run.
@@ -359,17 +357,10 @@ fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
     if !cpu.sums.iter().all(|sum| sum.is_finite()) {
         return Err("a pixel is no number".into());
     }
-    let device = adapter::device().expect("a device");
-    for baked in [true, false] {
-        let options = Options {
-            baked,
-            ..Options::best(device)
-        };
-        let mut gpu = Gpu::new(device, &packed, shaders, options).map_err(|error| error.to_string())?;
-        let gpu = film(&mut gpu, &packed, whole(&packed), &Cut::default());
-        let differ = differing(&gpu, &cpu);
+    for way in [Way::Baked, Way::Buffers] {
+        let differ = differing(&render_with(&packed, way, shaders), &cpu);
         if differ > 0 {
-            return Err(format!("{differ} of {} pixels differ, baked {baked}", cpu.sums.len()));
+            return Err(format!("{differ} of {} pixels differ, {way:?}", cpu.sums.len()));
         }
     }
     // another kernel, so only now and then
@@ -440,13 +431,19 @@ fn random_scenes_are_nearly_the_same_where_bits_are_not_promised() {
         d.render.shadow_epsilon = d.render.shadow_epsilon.max(1e-5);
         let packed = scenes::packed(&d);
         let cpu = reference(&packed);
-        plain.add(Nearly::of(&packed, &render_by(&packed, Way::Plain), &cpu));
-        let exact = if bit_exact(device) {
-            rounding::picture(&packed, rounding::poor_shaders())
+        let by_plain_wgsl = render_with(&packed, Way::Plain, sources::shaders());
+        if bit_exact(device) {
+            plain.add(Nearly::by_plain_wgsl(&by_plain_wgsl, &cpu));
+            let found = render_with(&packed, Way::Rounded, rounding::poor_shaders());
+            poor.add(Nearly::of(&packed, &found, &cpu));
         } else {
-            render_by(&packed, Way::Buffers)
-        };
-        poor.add(Nearly::of(&packed, &exact, &cpu));
+            plain.add(Nearly::of(&packed, &by_plain_wgsl, &cpu));
+            poor.add(Nearly::of(
+                &packed,
+                &render_with(&packed, Way::Buffers, sources::shaders()),
+                &cpu,
+            ));
+        }
         let mut moved = cpu.clone();
         moved.sums.rotate_right(1);
         shifted.add(Nearly::of(&packed, &moved, &cpu));

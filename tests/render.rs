@@ -1,110 +1,33 @@
 //! Pictures are the same on GPU and CPU: all scenes, all ways, several sizes, seeds and patterns of samples; and
 //! however the work is cut.
 
-use std::fmt;
 use std::ops::Range;
 
 use glam::Vec4;
 use wgray::film::{Film, Region};
-use wgray::gpu::{Gpu, Options};
 use wgray::job::{Backend, Cut};
 use wgray::pack::{FirstHit, Packed};
 use wgray::scene::{Description, Pattern};
 
 use crate::adapter::{self, KNOWN, allowed, bit_exact, judge};
-use crate::pictures::{Way, backend, crop, differing, exact_ways, film, first_hits, reference, render, whole};
+use crate::nearly::{EDGES, Nearly};
+use crate::pictures::{
+    Way, backend, crop, differing, exact_ways, film, first_hits, reference, render, render_with, whole,
+};
 use crate::{patterns, scenes, sources};
-
-/// Where bits are not promised, a pixel is within this of its value ...
-const RELATIVE: f64 = 1e-4;
-/// ... or this where textures are: they have many texels for each digit of a coordinate ...
-const TEXTURED: f64 = 1e-3;
-/// ... but for this share of the pixels, on edges where a comparison flips ...
-const EDGES: f64 = 1e-3;
-/// ... of a picture with so many pixels on a side. Edges grow with the side, so that smaller pictures have more of them.
-const SIDE: f64 = 400.0;
-/// ... and the mean is within this of its own: of all pixels in such a picture, of those not on edges in a smaller one.
-const MEAN: f64 = 1e-5;
 
 /// How a picture of the device differs from the CPU's more than is promised.
 pub fn compare(way: Way, packed: &Packed, gpu: &Film, cpu: &Film) -> Result<(), String> {
     assert_eq!((gpu.region, gpu.sums.len()), (cpu.region, cpu.sums.len()));
     let device = adapter::device().expect("the device that rendered the picture");
-    if way == Way::Plain || !bit_exact(device) {
+    if !bit_exact(device) {
         return Nearly::of(packed, gpu, cpu).judge();
+    }
+    if way == Way::Plain {
+        return Nearly::by_plain_wgsl(gpu, cpu).judge();
     }
     let known = allowed(KNOWN, &device.info.name, &device.info.driver, "picture");
     judge(known, "picture", differing(gpu, cpu) as f64 / cpu.sums.len() as f64)
-}
-
-/// What is compared where bits are not promised; of one picture, or of several together.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Nearly {
-    /// Pixels that are no numbers: none may be.
-    no_numbers: usize,
-    /// Pixels that are not near, and how many may not be.
-    edges: usize,
-    budget: f64,
-    /// Sums of the pixels whose means are compared, of both pictures.
-    sums: [f64; 2],
-}
-
-impl Nearly {
-    pub fn of(packed: &Packed, gpu: &Film, cpu: &Film) -> Nearly {
-        let relative = if packed.textures.is_empty() { RELATIVE } else { TEXTURED };
-        let side = (cpu.sums.len() as f64).sqrt();
-        let mut all = Nearly {
-            budget: EDGES * side * side.max(SIDE),
-            ..Nearly::default()
-        };
-        for (gpu, cpu) in gpu.sums.iter().zip(&cpu.sums) {
-            let [a, b] = [gpu, cpu].map(|v| v.truncate().as_dvec3() / f64::from(v.w));
-            let near = (a - b).abs().cmple(b.abs() * relative).all();
-            all.no_numbers += usize::from(!a.is_finite());
-            all.edges += usize::from(!near);
-            if near || side >= SIDE {
-                all.sums[0] += a.element_sum();
-                all.sums[1] += b.element_sum();
-            }
-        }
-        all
-    }
-
-    pub fn add(&mut self, other: Nearly) {
-        self.no_numbers += other.no_numbers;
-        self.edges += other.edges;
-        self.budget += other.budget;
-        self.sums[0] += other.sums[0];
-        self.sums[1] += other.sums[1];
-    }
-
-    pub fn judge(&self) -> Result<(), String> {
-        if self.no_numbers > 0 {
-            return Err(format!("{} pixels are no numbers", self.no_numbers));
-        }
-        if self.edges as f64 > self.budget {
-            return Err(format!("{} pixels differ, of {:.0} that may", self.edges, self.budget));
-        }
-        if !(self.drift() <= MEAN) {
-            return Err(format!("the mean differs by {:.1e}", self.drift()));
-        }
-        Ok(())
-    }
-
-    fn drift(&self) -> f64 {
-        let [gpu, cpu] = self.sums;
-        if gpu == cpu { 0.0 } else { (gpu - cpu).abs() / cpu }
-    }
-}
-
-impl fmt::Display for Nearly {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (edges, budget, drift) = (self.edges, self.budget, self.drift());
-        write!(
-            f,
-            "{edges} pixels are not near, of {budget:.0} that may; the mean differs by {drift:.1e}"
-        )
-    }
 }
 
 /// The same for first hits: on other devices than software Vulkan only the integers, away from edges.
@@ -185,7 +108,7 @@ fn pictures_of_all_scenes_are_the_same() {
             let problem = compare(way, &packed, &gpu, &cpu);
             assert!(problem.is_ok(), "{name}, {way:?}: {}", problem.unwrap_err());
             if way == Way::Plain {
-                plain.add(Nearly::of(&packed, &gpu, &cpu));
+                plain.add(Nearly::by_plain_wgsl(&gpu, &cpu));
             } else {
                 (pixels, pictures) = (pixels + cpu.sums.len(), pictures + 1);
             }
@@ -217,7 +140,7 @@ fn a_picture_that_differs_is_found() {
         .find(|(name, _)| name == "cornell.toml")
         .expect("the scene");
     let cpu = reference(&packed);
-    let nearly = |film: &Film| Nearly::of(&packed, film, &cpu).judge();
+    let nearly = |film: &Film| Nearly::by_plain_wgsl(film, &cpu).judge();
     assert!(compare(Way::Baked, &packed, &cpu, &cpu).is_ok());
     for (file, from, to) in [
         ("light.wgsl", "(2.0 * at.x - 1.0)", "(2.0000002 * at.x - 1.0)"),
@@ -229,12 +152,7 @@ fn a_picture_that_differs_is_found() {
         ("math.wgsl", "v * (1.0 / sqrt(dot(v, v)))", "v / sqrt(dot(v, v))"),
     ] {
         let shaders = sources::edited_shaders(file, from, to);
-        let options = Options {
-            baked: true,
-            ..Options::best(device)
-        };
-        let mut gpu = Gpu::new(device, &packed, &shaders, options).expect("sound shaders");
-        let film = film(&mut gpu, &packed, whole(&packed), &Cut::default());
+        let film = render_with(&packed, Way::Baked, &shaders);
         if bit_exact(device) {
             assert!(
                 compare(Way::Baked, &packed, &film, &cpu).is_err(),
@@ -284,7 +202,7 @@ fn a_larger_picture_is_the_same() {
             "cornell.toml, 401 x 397, {way:?}: {} of {} pixels differ by a bit at least; {}",
             differing(&gpu, &cpu),
             cpu.sums.len(),
-            Nearly::of(&packed, &gpu, &cpu)
+            Nearly::by_plain_wgsl(&gpu, &cpu)
         );
         let problem = compare(way, &packed, &gpu, &cpu);
         assert!(problem.is_ok(), "{way:?}: {}", problem.unwrap_err());

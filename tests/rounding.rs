@@ -3,17 +3,14 @@
 
 use std::sync::OnceLock;
 
-use wgray::film::Film;
 use wgray::gpu::compose::{ROUNDING, Shaders, Source};
-use wgray::gpu::{Gpu, Options, Rounding};
-use wgray::job::Cut;
-use wgray::pack::Packed;
 
 use crate::adapter::{self, bit_exact};
 use crate::kernel::functions;
-use crate::pictures::{Way, differing, film, reference, render, whole};
+use crate::nearly::Nearly;
+use crate::pictures::{Way, differing, reference, render_with};
 use crate::random::Random;
-use crate::render::{Nearly, small_scenes};
+use crate::render::small_scenes;
 use crate::sources::{edited, parse, shaders, shaders_with};
 
 /// Moves a number by up to 3 units in the last place, as a function of its digits: more than WGSL allows a quotient.
@@ -178,17 +175,6 @@ pub fn poor_shaders() -> &'static Shaders {
     POOR.get_or_init(|| shaders_with(ROUNDING, &poor_device()))
 }
 
-/// The picture with quotients and square roots by another text of the functions.
-pub fn picture(packed: &Packed, shaders: &Shaders) -> Film {
-    let device = adapter::device().expect("a device");
-    let options = Options {
-        exact: Some(Rounding::Software),
-        baked: false,
-    };
-    let mut gpu = Gpu::new(device, packed, shaders, options).unwrap_or_else(|error| panic!("{error}"));
-    film(&mut gpu, packed, whole(packed), &Cut::default())
-}
-
 /// A device with quotients and square roots that are wrong in the last digits keeps the promise of nearly the same
 /// pictures, and with the functions that of the same.
 #[test]
@@ -196,9 +182,10 @@ fn pictures_keep_their_promise_on_a_poor_device() {
     if !adapter::device().is_some_and(bit_exact) {
         return; // the other tests tell what that device is like by itself
     }
+    let corrected = shaders_with(ROUNDING, &over_a_poor_device());
     for (name, packed) in small_scenes() {
         let cpu = reference(&packed);
-        let found = picture(&packed, poor_shaders());
+        let found = render_with(&packed, Way::Rounded, poor_shaders());
         let (differ, nearly) = (differing(&found, &cpu), Nearly::of(&packed, &found, &cpu));
         println!(
             "{name} on a poor device: {differ} of {} pixels differ by a bit at least; {nearly}",
@@ -210,12 +197,9 @@ fn pictures_keep_their_promise_on_a_poor_device() {
             "{name}, poor device: {}",
             nearly.judge().unwrap_err()
         );
-        let corrected = shaders_with(ROUNDING, &over_a_poor_device());
-        assert_eq!(differing(&picture(&packed, &corrected), &cpu), 0, "{name}, corrected");
-        assert_eq!(
-            differing(&render(&packed, Way::Rounded), &cpu),
-            0,
-            "{name}, this device"
-        );
+        for (device, shaders) in [("a corrected one", &corrected), ("this one", shaders())] {
+            let found = render_with(&packed, Way::Rounded, shaders);
+            assert_eq!(differing(&found, &cpu), 0, "{name} on {device}");
+        }
     }
 }

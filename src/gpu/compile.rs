@@ -65,6 +65,7 @@ impl Checked {
         let mut module = specialised.into_owned();
         prune(&mut module);
         let info = validate(&module).map_err(|error| ShaderError::other("specialisation", &error))?;
+        // The kernels' loops all count to a bound, so that naga need not bound them again.
         let options = spv::Options {
             lang_version: (1, 3),
             force_loop_bounding: false,

@@ -2,17 +2,16 @@
 
 use std::collections::HashMap;
 
-use naga::valid::ModuleInfo;
+use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{
     Arena, BinaryOperator, Block, Expression, Function, Handle, MathFunction, Module, Range, ScalarKind, Statement,
     TypeInner,
 };
 
 /// Who rounds quotients and square roots.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rounding {
     /// The device: lavapipe correctly, GPUs within 2.5 units in the last place (WGSL, section 15.7.4).
-    #[default]
     Device,
     /// The functions of `shaders/rounding.wgsl`, correctly everywhere, at some cost.
     Software,
@@ -33,67 +32,59 @@ pub struct Missing(&'static str);
 
 /// Puts calls of the functions of `shaders/rounding.wgsl` in the place of all quotients and square roots of floats.
 pub fn round_in_software(module: &mut Module, info: &ModuleInfo) -> Result<(), Missing> {
-    let named = |name: &'static str| {
-        let found = module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name));
-        found.map(|(handle, _)| handle).ok_or(Missing(name))
-    };
     // the two that divide and take roots themselves
-    let own = [named(QUOTIENTS[0])?, named(SQUARE_ROOTS[0])?];
-    let function_of = |expression: &Expression, ty: &TypeInner| {
-        let names = match expression {
-            Expression::Binary {
-                op: BinaryOperator::Divide,
-                ..
-            } => QUOTIENTS,
-            Expression::Math {
-                fun: MathFunction::Sqrt,
-                ..
-            } => SQUARE_ROOTS,
-            _ => return Ok(None),
-        };
-        match ty {
-            TypeInner::Scalar(s) if s.kind == ScalarKind::Float => named(names[0]).map(Some),
-            TypeInner::Vector { size, scalar } if scalar.kind == ScalarKind::Float => {
-                named(names[*size as usize - 1]).map(Some)
-            }
-            _ => Ok(None), // of integers
-        }
-    };
-    let calls_of = |function: &Function, info: &naga::valid::FunctionInfo| -> Result<Calls, Missing> {
-        let mut calls = Calls::new();
-        for (handle, expression) in function.expressions.iter() {
-            if let Some(called) = function_of(expression, info[handle].ty.inner_with(&module.types))? {
-                let arguments = match *expression {
-                    Expression::Binary { left, right, .. } => vec![left, right],
-                    Expression::Math { arg, .. } => vec![arg],
-                    _ => unreachable!("neither quotient nor square root"),
-                };
-                calls.insert(handle, (called, arguments));
-            }
-        }
-        Ok(calls)
-    };
+    let own = [named(module, QUOTIENTS[0])?, named(module, SQUARE_ROOTS[0])?];
     let mut in_functions = Vec::new();
     for (handle, function) in module.functions.iter() {
         if !own.contains(&handle) {
-            in_functions.push((handle, calls_of(function, &info[handle])?));
+            in_functions.push((handle, calls_of(module, function, &info[handle])?));
         }
     }
-    let in_entry_points: Vec<Calls> = (0..)
-        .zip(&module.entry_points)
-        .map(|(i, entry_point)| calls_of(&entry_point.function, info.get_entry_point(i)))
-        .collect::<Result<_, _>>()?;
+    let mut in_entry_points = Vec::new();
+    for (i, entry_point) in module.entry_points.iter().enumerate() {
+        in_entry_points.push(calls_of(module, &entry_point.function, info.get_entry_point(i))?);
+    }
     for (handle, calls) in in_functions {
-        replace(&mut module.functions[handle], &calls);
+        let function = &mut module.functions[handle];
+        call(&mut function.body, &mut function.expressions, &calls);
     }
     for (entry_point, calls) in module.entry_points.iter_mut().zip(in_entry_points) {
-        replace(&mut entry_point.function, &calls);
+        let function = &mut entry_point.function;
+        call(&mut function.body, &mut function.expressions, &calls);
     }
     Ok(())
 }
 
-fn replace(function: &mut Function, calls: &Calls) {
-    call(&mut function.body, &mut function.expressions, calls);
+fn named(module: &Module, name: &'static str) -> Result<Handle<Function>, Missing> {
+    let found = module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name));
+    found.map(|(handle, _)| handle).ok_or(Missing(name))
+}
+
+/// What is to be called in a function.
+fn calls_of(module: &Module, function: &Function, info: &FunctionInfo) -> Result<Calls, Missing> {
+    let mut calls = Calls::new();
+    for (handle, expression) in function.expressions.iter() {
+        let (names, arguments) = match *expression {
+            Expression::Binary {
+                op: BinaryOperator::Divide,
+                left,
+                right,
+            } => (QUOTIENTS, vec![left, right]),
+            Expression::Math {
+                fun: MathFunction::Sqrt,
+                arg,
+                ..
+            } => (SQUARE_ROOTS, vec![arg]),
+            _ => continue,
+        };
+        let components = match info[handle].ty.inner_with(&module.types) {
+            TypeInner::Scalar(s) if s.kind == ScalarKind::Float => 1,
+            TypeInner::Vector { size, scalar } if scalar.kind == ScalarKind::Float => *size as usize,
+            _ => continue, // of integers
+        };
+        calls.insert(handle, (named(module, names[components - 1])?, arguments));
+    }
+    Ok(calls)
 }
 
 /// Evaluates expressions up to each that a call replaces, then calls.
