@@ -1,4 +1,4 @@
-// Constants of the shared records. `src/pack.rs` has the same; a test compares them.
+// Constants of the shared records. `src/pack/constants.rs` has the same; a test compares them.
 
 const PERSPECTIVE: u32 = 0u;
 const ORTHOGRAPHIC: u32 = 1u;

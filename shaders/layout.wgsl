@@ -1,4 +1,4 @@
-// The records that the host uploads. `src/pack.rs` has the same structs; a test compares them field by field.
+// The records that the host uploads. `src/pack/layout.rs` has the same structs; a test compares them field by field.
 
 // Rays start at `position` and pass through the image plane, which is one unit ahead (perspective) or at it
 // (orthographic).

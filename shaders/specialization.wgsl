@@ -1,5 +1,5 @@
-// What a kernel may take as constant: it is compiled for its scene. `Specialization` in `src/pack.rs` has the same
-// names; a test compares them.
+// What a kernel may take as constant: it is compiled for its scene. `src/pack/specialization.rs` has the same names; a
+// test compares them.
 
 // Primitives are sorted by kind, in this order; in each kind those that can cast a shadow come first.
 override RECTANGLES: u32;

@@ -8,12 +8,13 @@ use wgray::cpu::shadow::{Block, cone_to_light, may_block, shadow_bits};
 use wgray::pack::{Packed, RANDOM, Sphere};
 
 use crate::random::Random;
-use crate::{random_scenes, scenes};
+use crate::random_scenes::any_scene;
+use crate::scenes;
 
 /// Small scenes of all kinds.
 fn some_scenes(count: usize) -> Vec<Packed> {
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
-    let strategy = random_scenes::description();
+    let strategy = any_scene::description();
     let scene = |_| scenes::packed(&strategy.new_tree(&mut runner).expect("a scene").current());
     (0..count).map(scene).collect()
 }

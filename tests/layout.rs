@@ -14,9 +14,6 @@ use crate::sources::{self, Signature, file_of, parse, shared_source};
 const LAYOUT: &str = "layout.wgsl";
 const CONSTANTS: &str = "constants.wgsl";
 
-/// Public constants of `src/pack.rs` that no shader has, and why.
-const HOST_ONLY: &[(&str, &str)] = &[];
-
 /// A record's fields with their offsets, and its size, in bytes.
 type Layout = (Vec<(String, String, u32)>, u32);
 
@@ -78,11 +75,8 @@ fn size(ty: &str) -> u32 {
     }
 }
 
-/// The structs of `src/pack.rs` that are uploaded.
 fn pack_records() -> Vec<Signature> {
-    sources::rust_records(&sources::rust("src/pack.rs"), |s| {
-        s.attrs.iter().any(|attribute| attribute.path().is_ident("repr"))
-    })
+    sources::rust_records(&sources::rust("src/pack/layout.rs"))
 }
 
 fn layout_differences(source: &Source, records: &[Signature]) -> Vec<String> {
@@ -116,17 +110,15 @@ fn records_have_the_same_layout() {
 
 #[test]
 fn every_uploaded_record_is_known_to_have_no_padding() {
-    for item in sources::rust("src/pack.rs").items {
+    for item in sources::rust("src/pack/layout.rs").items {
         let Item::Struct(record) = item else { continue };
-        if record.attrs.iter().any(|a| a.path().is_ident("repr")) {
-            let derives = |a: &syn::Attribute| {
-                a.path().is_ident("derive")
-                    && a.meta
-                        .require_list()
-                        .is_ok_and(|l| l.tokens.to_string().contains("Pod"))
-            };
-            assert!(record.attrs.iter().any(derives), "{} must derive Pod", record.ident);
-        }
+        let derives = |a: &syn::Attribute| {
+            a.path().is_ident("derive")
+                && a.meta
+                    .require_list()
+                    .is_ok_and(|l| l.tokens.to_string().contains("Pod"))
+        };
+        assert!(record.attrs.iter().any(derives), "{} must derive Pod", record.ident);
     }
 }
 
@@ -216,7 +208,7 @@ fn rust_constants(file: &syn::File) -> BTreeMap<String, Value> {
     for item in &file.items {
         let Item::Const(constant) = item else { continue };
         let name = constant.ident.to_string();
-        if matches!(constant.vis, Visibility::Public(_)) && !HOST_ONLY.iter().any(|(host, _)| *host == name) {
+        if matches!(constant.vis, Visibility::Public(_)) {
             let float = matches!(&*constant.ty, syn::Type::Path(path) if path.path.is_ident("f32"));
             values.insert(name, rust_value(&constant.expr, float));
         }
@@ -268,7 +260,7 @@ fn number(expression: &Expr) -> Option<f64> {
 fn constants_are_the_same() {
     let (wgsl, rust) = (
         wgsl_constants(&shared_source()),
-        rust_constants(&sources::rust("src/pack.rs")),
+        rust_constants(&sources::rust("src/pack/constants.rs")),
     );
     assert!(wgsl.len() >= 13, "the constants were not found");
     assert_eq!(wgsl, rust);
@@ -276,7 +268,7 @@ fn constants_are_the_same() {
 
 #[test]
 fn a_changed_constant_is_found() {
-    let rust = rust_constants(&sources::rust("src/pack.rs"));
+    let rust = rust_constants(&sources::rust("src/pack/constants.rs"));
     for (from, to) in [
         ("const PLANE: u32 = 3u;", "const PLANE: u32 = 4u;"),
         ("const PLANE: u32 = 3u;", ""),

@@ -178,8 +178,8 @@ pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
     file.items.iter().filter_map(function).collect()
 }
 
-/// The structs of a Rust file for which `wanted` holds, in its order.
-pub fn rust_records(file: &syn::File, wanted: impl Fn(&syn::ItemStruct) -> bool) -> Vec<Signature> {
+/// The structs of a Rust file, in its order.
+pub fn rust_records(file: &syn::File) -> Vec<Signature> {
     let field = |f: &syn::Field| {
         (
             f.ident.as_ref().map(|i| i.to_string()).unwrap_or_default(),
@@ -187,7 +187,7 @@ pub fn rust_records(file: &syn::File, wanted: impl Fn(&syn::ItemStruct) -> bool)
         )
     };
     let record = |item: &Item| match item {
-        Item::Struct(s) if wanted(s) => Some(Signature {
+        Item::Struct(s) => Some(Signature {
             name: s.ident.to_string(),
             parts: s.fields.iter().map(field).collect(),
             result: None,

@@ -11,7 +11,7 @@ use wgray::pack::Packed;
 use crate::scenes;
 use crate::sources::{self, Signature, differences, parse, rust_functions, rust_records, shared_source};
 
-/// Files of records and constants, whose other side is `src/pack.rs`: `layout` compares them.
+/// Files of records and constants, whose other side is in `src/pack/`: `layout` compares them.
 const RECORDS: &[&str] = &["layout.wgsl", "constants.wgsl"];
 
 /// Files without a twin, and why.
@@ -62,7 +62,7 @@ fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String
         }
     }
     let records = sources::wgsl_records(&module, source, file);
-    let twin_records: Vec<_> = rust_records(twin, |_| true).into_iter().filter(two_sided).collect();
+    let twin_records: Vec<_> = rust_records(twin).into_iter().filter(two_sided).collect();
     let mut problems = differences(file, &functions, &twins);
     problems.extend(differences(file, &records, &twin_records));
     problems

@@ -8,8 +8,8 @@ use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::description::{ReadError, Tagged, tagged};
-use super::{Encoding, Filter, Wrap};
+use super::tagged::{ReadError, Tagged, tagged};
+use crate::scene::{Encoding, Filter, Wrap};
 
 /// A colour of a material: `[r, g, b]` or `{ texture = "NAME" }`.
 #[derive(Clone, Debug, PartialEq, Serialize)]

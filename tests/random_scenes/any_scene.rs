@@ -1,23 +1,13 @@
-//! Random small scenes, both paths: the same bits. A scene that fails is made as small as it gets and written to a file.
+//! Small valid scenes of everything that a scene file can say, as strategies of proptest.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::collections::BTreeMap;
 
 use glam::DVec3;
 use proptest::prelude::*;
 use proptest::sample::select;
-use proptest::strategy::ValueTree as _;
-use proptest::test_runner::{Config, RngAlgorithm, TestError, TestRng, TestRunner};
-use wgray::gpu::compose::Shaders;
 use wgray::scene::*;
 
-use crate::adapter::{self, bit_exact};
-use crate::nearly::Nearly;
-use crate::pictures::{Way, differing, first_hits, reference, render_with};
-use crate::{patterns, rounding, scenes, sources};
-
-/// How many scenes; with this variable each run has others, else they are the same in every run.
-const CASES: &str = "WGRAY_TEST_CASES";
+use crate::patterns;
 
 /// Often one of a few numbers, so that things touch, coincide and lie in one plane.
 fn coordinate() -> impl Strategy<Value = f64> {
@@ -348,160 +338,4 @@ fn moved(d: &mut Description, scale: f64, offset: DVec3) {
             other => panic!("no random scene has the shape {other:?}"),
         }
     }
-}
-
-/// Renders a scene both ways.
-fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
-    let packed = scenes::packed(d);
-    let cpu = reference(&packed);
-    if !cpu.sums.iter().all(|sum| sum.is_finite()) {
-        return Err("a pixel is no number".into());
-    }
-    for way in [Way::Baked, Way::Buffers] {
-        let differ = differing(&render_with(&packed, way, shaders), &cpu);
-        if differ > 0 {
-            return Err(format!("{differ} of {} pixels differ, {way:?}", cpu.sums.len()));
-        }
-    }
-    // another kernel, so only now and then
-    if d.render.seed.is_multiple_of(4) {
-        let (gpu, cpu) = (first_hits(&packed, Way::Buffers), first_hits(&packed, Way::Cpu));
-        if bytemuck::cast_slice::<_, u8>(&gpu) != bytemuck::cast_slice::<_, u8>(&cpu) {
-            return Err("the first hits differ".into());
-        }
-    }
-    Ok(())
-}
-
-/// Runs a number of cases; returns a scene that fails, as small as it gets, and why it does.
-fn failing(cases: u32, shrinks: u32, always_the_same: bool, shaders: &Shaders) -> Option<(Description, String)> {
-    let config = Config {
-        cases,
-        max_shrink_iters: shrinks,
-        failure_persistence: None,
-        ..Config::default()
-    };
-    let mut runner = if always_the_same {
-        TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha))
-    } else {
-        TestRunner::new(config)
-    };
-    let result = runner.run(&description(), |d| check(&d, shaders).map_err(TestCaseError::fail));
-    match result {
-        Ok(()) => None,
-        Err(TestError::Fail(reason, d)) => Some((d, reason.to_string())),
-        Err(TestError::Abort(reason)) => panic!("{reason}"),
-    }
-}
-
-/// Writes a scene to a file that `wgray render` takes.
-fn save(d: &Description, name: &str) -> PathBuf {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    std::fs::write(&path, toml::to_string(d).expect("a scene as TOML")).expect("a place for the scene");
-    path
-}
-
-#[test]
-fn random_scenes_are_the_same_on_gpu_and_cpu() {
-    if !adapter::device().is_some_and(bit_exact) {
-        return;
-    }
-    let cases = std::env::var(CASES).ok();
-    let number = cases
-        .as_deref()
-        .map_or(12, |n| n.parse().expect("WGRAY_TEST_CASES is a number"));
-    if let Some((d, reason)) = failing(number, 300, cases.is_none(), sources::shaders()) {
-        let path = save(&d, "failing-scene.toml");
-        panic!("{reason}: wgray render {}", path.display());
-    }
-    println!("{number} random scenes, each from buffers and as constants: every pixel has the same bits");
-}
-
-/// Where bits are not promised, the pixels of random scenes are near, together: by plain WGSL, on devices that are not
-/// software Vulkan, and on one with poor quotients and square roots. But for scenes without `shadow_epsilon`: a surface
-/// hides its own light there, or does not, by the last digit.
-#[test]
-fn random_scenes_are_nearly_the_same_where_bits_are_not_promised() {
-    let Some(device) = adapter::device() else { return };
-    let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
-    let strategy = description();
-    let (mut plain, mut poor, mut shifted) = (Nearly::default(), Nearly::default(), Nearly::default());
-    for _ in 0..24 {
-        let mut d = strategy.new_tree(&mut runner).expect("a scene").current();
-        d.render.shadow_epsilon = d.render.shadow_epsilon.max(1e-5);
-        let packed = scenes::packed(&d);
-        let cpu = reference(&packed);
-        let by_plain_wgsl = render_with(&packed, Way::Plain, sources::shaders());
-        if bit_exact(device) {
-            plain.add(Nearly::by_plain_wgsl(&by_plain_wgsl, &cpu));
-            let found = render_with(&packed, Way::Rounded, rounding::poor_shaders());
-            poor.add(Nearly::of(&packed, &found, &cpu));
-        } else {
-            plain.add(Nearly::of(&packed, &by_plain_wgsl, &cpu));
-            poor.add(Nearly::of(
-                &packed,
-                &render_with(&packed, Way::Buffers, sources::shaders()),
-                &cpu,
-            ));
-        }
-        let mut moved = cpu.clone();
-        moved.sums.rotate_right(1);
-        shifted.add(Nearly::of(&packed, &moved, &cpu));
-    }
-    println!("random scenes: by plain WGSL {plain}; with poor quotients {poor}");
-    assert!(plain.judge().is_ok(), "plain WGSL: {}", plain.judge().unwrap_err());
-    assert!(poor.judge().is_ok(), "poor quotients: {}", poor.judge().unwrap_err());
-    assert!(shifted.judge().is_err(), "the comparison cannot fail");
-}
-
-/// One unit in the last place of one constant is found, and the scene that shows it is a scene.
-#[test]
-fn shaders_that_differ_by_one_ulp_are_found_by_random_scenes() {
-    if !adapter::device().is_some_and(bit_exact) {
-        return;
-    }
-    let shaders = sources::edited_shaders("camera.wgsl", "y = 1.0 - at.y", "y = 1.0000001 - at.y");
-    let (d, reason) = failing(40, 10, true, &shaders).expect("a scene that differs");
-    assert!(reason.contains("pixels differ"), "{reason}");
-    let path = save(&d, "scene-of-a-negative-control.toml");
-    let scene = Scene::load(&path, &Overrides::default()).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(wgray::pack::pack(&scene), scenes::packed(&d));
-}
-
-/// Random scenes have everything that scene files can: every type that the parser knows, but for these.
-#[test]
-fn random_scenes_have_everything() {
-    const NEVER: &[(&str, &str)] = &[("image", "files; tests/textures compares images on both paths")];
-    let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
-    let strategy = description();
-    let mut found = BTreeSet::new();
-    for _ in 0..300 {
-        let d = strategy.new_tree(&mut runner).expect("a scene").current();
-        let text = toml::to_string(&d).expect("a scene as TOML");
-        found.extend(
-            text.lines()
-                .filter_map(|line| line.strip_prefix("type = "))
-                .map(|t| t.trim_matches('"').to_string()),
-        );
-        found.extend(
-            text.lines()
-                .filter_map(|l| l.strip_prefix("pattern = "))
-                .map(|t| t.trim_matches('"').to_string()),
-        );
-    }
-    let mut known: BTreeSet<String> = patterns::all().into_iter().map(|(name, _)| name).collect();
-    for file in ["src/scene/description.rs", "src/scene/describe_texture.rs"] {
-        let text = std::fs::read_to_string(sources::path(file)).expect("the descriptions");
-        let tags = text
-            .lines()
-            .filter_map(|line| line.trim().strip_prefix('"')?.split_once("\" => "));
-        known.extend(
-            tags.filter(|(_, variant)| variant.ends_with("Description),"))
-                .map(|(tag, _)| tag.to_string()),
-        );
-    }
-    assert!(known.len() > 15, "the types were not found: {known:?}");
-    known.retain(|name| !NEVER.iter().any(|(never, _)| never == name));
-    let missing: Vec<_> = known.difference(&found).collect();
-    assert!(missing.is_empty(), "no random scene has {missing:?}");
 }

@@ -8,7 +8,8 @@ use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
-use super::description::{Description, ReadError, Tagged};
+use super::description::Description;
+use super::description::tagged::{ReadError, Tagged};
 use super::error::{At, KeyPath, Problem, SceneError, Segment};
 
 impl Description {

@@ -1,0 +1,307 @@
+//! The plain bytes that both backends read, and the constants that a kernel is compiled for.
+
+mod appearance;
+mod blocking;
+mod bounds;
+mod constants;
+pub mod filter;
+mod layout;
+mod pyramid;
+mod specialization;
+
+use bytemuck::Zeroable as _;
+use glam::{DMat3, DVec3, Vec2};
+
+use self::appearance::Appearances;
+pub use self::constants::*;
+pub use self::layout::*;
+pub use self::specialization::Specialization;
+use crate::scene::{self, Geometry, Parallelogram, Pattern, PixelFilter, PixelFilterKind, Projection, Samples, Scene};
+
+/// How far shadow rays to a directional light go: beyond any scene, yet small enough to be squared.
+const DISTANT: f32 = 1e10;
+
+/// A scene as both backends read it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Packed {
+    /// The camera.
+    pub camera: Camera,
+    /// What belongs to the scene as a whole.
+    pub environment: Environment,
+    /// The primitives, sorted by kind and in each kind by whether they can cast a shadow; lights' rectangles among them.
+    pub primitives: Vec<Primitive>,
+    /// A sphere around each primitive.
+    pub bounds: Vec<Sphere>,
+    /// The materials of the scene, then one for each area light.
+    pub materials: Vec<Material>,
+    /// The lights, rectangles first.
+    pub lights: Vec<Light>,
+    /// The textures that materials look up.
+    pub textures: Vec<Texture>,
+    /// Their images: tables of places, and texels.
+    pub texels: Vec<u32>,
+    /// The filter's bins ([`filter::table`]); none if it is the box of the pixel.
+    pub filter_table: Vec<Vec2>,
+    /// Samples of every pixel; under adaptive sampling the most that one gets.
+    pub pixel_samples: u32,
+    /// Whether sampling is adaptive.
+    pub adaptive: bool,
+    /// The constants.
+    pub specialization: Specialization,
+}
+
+impl Packed {
+    /// Samples of light at every hit, over all lights; a point or directional light counts 1.
+    pub fn light_samples(&self) -> u64 {
+        let s = &self.specialization;
+        u64::from(s.area_lights) * u64::from(s.light_samples) + u64::from(s.delta_lights)
+    }
+}
+
+/// Packs a scene.
+pub fn pack(scene: &Scene) -> Packed {
+    let appearances = Appearances::of(scene);
+    let mut materials = appearances.materials.clone();
+    let exponent_bits = exponent_bits(&scene.materials, &materials);
+    let mut primitives = pack_shapes(scene);
+    let mut lights = Vec::new();
+    for (number, light) in scene.lights.iter().enumerate() {
+        let number = number as u32;
+        if let scene::Light::Rectangle { rectangle, color } = light {
+            let shape = scene.shapes.len() as u32 + number;
+            primitives.push(parallelogram(RECTANGLE, rectangle, materials.len() as u32, shape));
+            materials.push(Material {
+                ambient: color.as_vec3(),
+                kind: EMITTER,
+                ..Material::zeroed()
+            });
+        }
+        lights.push(pack_light(light, number, scene.render.shadow_epsilon));
+    }
+    lights.sort_by_key(|light| light.area == 0.0);
+    let blocking = blocking::can_cast_shadow(scene, &primitives);
+    let mut order: Vec<(Primitive, bool)> = primitives.into_iter().zip(blocking).collect();
+    order.sort_by_key(|(primitive, blocking)| (primitive.kind, !blocking));
+    let count = |kind: u32, only_blocking: bool| {
+        order
+            .iter()
+            .filter(|(p, b)| p.kind == kind && (*b || !only_blocking))
+            .count() as u32
+    };
+    let area_lights = lights.iter().filter(|light| light.area > 0.0).count() as u32;
+    let (pixels, light_samples) = (scene.render.pixel_samples, scene.render.light_samples);
+    let adaptive = scene.render.adaptive;
+    let filter_table = match is_pixel(scene.render.filter) {
+        true => Vec::new(),
+        false => filter::table(scene.render.filter),
+    };
+    let specialization = Specialization {
+        rectangles: count(RECTANGLE, false),
+        blocking_rectangles: count(RECTANGLE, true),
+        triangles: count(TRIANGLE, false),
+        blocking_triangles: count(TRIANGLE, true),
+        ellipsoids: count(ELLIPSOID, false),
+        blocking_ellipsoids: count(ELLIPSOID, true),
+        planes: count(PLANE, false),
+        blocking_planes: count(PLANE, true),
+        area_lights,
+        delta_lights: lights.len() as u32 - area_lights,
+        pixel_pattern: pattern(pixels),
+        pixel_side: side(pixels),
+        pixel_samples: pixels.count,
+        light_pattern: pattern(light_samples),
+        light_side: side(light_samples),
+        light_samples: light_samples.count,
+        filter_bins: (filter_table.len() as u32).saturating_sub(1),
+        squared_error: adaptive
+            .map_or(0.0, |adaptive| (adaptive.error * adaptive.error) as f32)
+            .to_bits(),
+        exponent_bits,
+        bounces: if scene.materials.iter().any(is_specular) {
+            scene.render.max_depth
+        } else {
+            0
+        },
+        differentials: (scene.render.ray_differentials && appearances.needs_footprints()).into(),
+        lookups: appearances.lookups().0,
+        specular_lookups: appearances.lookups().1,
+        normal_maps: appearances.has_normal_maps().into(),
+        texture_kinds: appearances.kinds(),
+        texel_formats: appearances.formats(),
+    };
+    let primitives: Vec<Primitive> = order.into_iter().map(|(primitive, _)| primitive).collect();
+    Packed {
+        camera: pack_camera(&scene.camera, scene.width, scene.height, scene.render.seed),
+        environment: Environment {
+            ambient: scene.render.ambient.as_vec3(),
+            shadow_epsilon: scene.render.shadow_epsilon as f32,
+            background: scene.render.background.as_vec3(),
+            light_weight: 1.0 / light_samples.count as f32,
+        },
+        bounds: primitives.iter().map(bounds::sphere).collect(),
+        primitives,
+        materials,
+        lights,
+        textures: appearances.textures,
+        texels: appearances.texels,
+        filter_table,
+        pixel_samples: adaptive.map_or(pixels.count, |adaptive| adaptive.max_samples),
+        adaptive: adaptive.is_some(),
+        specialization,
+    }
+}
+
+/// Whether a filter is the pixel itself: the same weight for all samples inside.
+fn is_pixel(filter: PixelFilter) -> bool {
+    filter.kind == PixelFilterKind::Box && filter.radius == 0.5
+}
+
+fn pattern(samples: Samples) -> u32 {
+    match samples.pattern {
+        Pattern::Grid => GRID,
+        Pattern::Random => RANDOM,
+        Pattern::RotatedGrid => ROTATED_GRID,
+        Pattern::Jittered => JITTERED,
+        Pattern::Halton => HALTON,
+        Pattern::Sobol => SOBOL,
+    }
+}
+
+/// The side of a pattern's grid of cells, or else the number of its samples.
+fn side(samples: Samples) -> u32 {
+    if samples.pattern.needs_square() {
+        samples.count.isqrt()
+    } else {
+        samples.count
+    }
+}
+
+/// A camera for a picture of `width` x `height` pixels.
+pub fn pack_camera(camera: &scene::Camera, width: u32, height: u32, seed: u32) -> Camera {
+    let aspect = f64::from(width) / f64::from(height);
+    let (projection, half_height) = match camera.projection {
+        Projection::Perspective { fov } => (PERSPECTIVE, (fov / 2.0).tan()),
+        Projection::Orthographic { height } => (ORTHOGRAPHIC, height / 2.0),
+    };
+    Camera {
+        position: camera.position.as_vec3(),
+        projection,
+        right: (camera.right * half_height * aspect).as_vec3(),
+        width,
+        up: (camera.up * half_height).as_vec3(),
+        height,
+        forward: camera.forward.as_vec3(),
+        seed,
+    }
+}
+
+fn is_specular(material: &scene::Material) -> bool {
+    matches!(material, scene::Material::Mirror { .. } | scene::Material::Glass { .. })
+}
+
+/// Bits of the largest shininess, if all are whole numbers so small that squaring beats the general power.
+fn exponent_bits(described: &[scene::Material], packed: &[Material]) -> u32 {
+    let whole = described.iter().all(|material| {
+        if let scene::Material::Phong { shininess, .. } = material {
+            return shininess.fract() == 0.0 && *shininess <= 4096.0;
+        }
+        true
+    });
+    let largest = packed.iter().map(|material| material.exponent).max().unwrap_or(1);
+    if whole { u32::BITS - largest.leading_zeros() } else { 0 }
+}
+
+fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
+    let reach = (1.0 - shadow_epsilon) as f32;
+    let unit = Light {
+        finite: 1.0,
+        reach,
+        number,
+        ..Light::zeroed()
+    };
+    match light {
+        scene::Light::Rectangle { rectangle, color } => Light {
+            center: rectangle.center.as_vec3(),
+            u: rectangle.u.as_vec3(),
+            v: rectangle.v.as_vec3(),
+            area: (4.0 * rectangle.u.cross(rectangle.v).length()) as f32,
+            color: color.as_vec3(),
+            ..unit
+        },
+        scene::Light::Point { position, color } => Light {
+            center: position.as_vec3(),
+            color: color.as_vec3(),
+            ..unit
+        },
+        scene::Light::Directional { direction, color } => Light {
+            center: -direction.as_vec3(),
+            finite: 0.0,
+            reach: DISTANT,
+            color: color.as_vec3(),
+            ..unit
+        },
+    }
+}
+
+fn pack_shapes(scene: &Scene) -> Vec<Primitive> {
+    let mut primitives = Vec::new();
+    for (number, shape) in scene.shapes.iter().enumerate() {
+        let (material, number) = (shape.material as u32, number as u32);
+        match &shape.geometry {
+            Geometry::Rectangle(rectangle) => {
+                primitives.push(parallelogram(RECTANGLE, rectangle, material, number));
+            }
+            Geometry::Ellipsoid { center, axes } => {
+                let [a, b, c] = *axes;
+                primitives.push(primitive(
+                    ELLIPSOID,
+                    *center,
+                    DMat3::from_cols(a, b, c),
+                    material,
+                    number,
+                ));
+            }
+            Geometry::Triangles(triangles) => {
+                for &[v0, v1, v2] in triangles {
+                    let (a, b) = (v1 - v0, v2 - v0);
+                    let columns = DMat3::from_cols(a, b, a.cross(b).normalize());
+                    primitives.push(primitive(TRIANGLE, v0, columns, material, number));
+                }
+            }
+            Geometry::Plane {
+                point,
+                tangent,
+                bitangent,
+            } => {
+                let columns = DMat3::from_cols(*tangent, *bitangent, tangent.cross(*bitangent));
+                primitives.push(primitive(PLANE, *point, columns, material, number));
+            }
+        }
+    }
+    primitives
+}
+
+fn parallelogram(kind: u32, p: &Parallelogram, material: u32, shape: u32) -> Primitive {
+    primitive(
+        kind,
+        p.center,
+        DMat3::from_cols(p.u, p.v, p.u.cross(p.v).normalize()),
+        material,
+        shape,
+    )
+}
+
+/// The primitive whose local space is mapped to the world by `columns` and then `center`.
+pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
+    let rows = columns.inverse().transpose();
+    Primitive {
+        center: center.as_vec3(),
+        material,
+        x: rows.x_axis.as_vec3(),
+        shape,
+        y: rows.y_axis.as_vec3(),
+        kind,
+        z: rows.z_axis.as_vec3(),
+        determinant: rows.determinant() as f32,
+    }
+}

@@ -1,0 +1,72 @@
+//! The constants that a kernel is compiled for, those of `shaders/specialization.wgsl`.
+
+/// Declares [`Specialization`] with the names that the shaders' overrides have.
+macro_rules! specialization {
+    ($($(#[$doc:meta])* $field:ident = $name:literal),* $(,)?) => {
+        /// Everything that a kernel may take as constant; a kernel is compiled for one of these.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        pub struct Specialization { $($(#[$doc])* pub $field: u32,)* }
+
+        impl Specialization {
+            /// The values by the names of the overrides in `shaders/specialization.wgsl`.
+            pub fn constants(&self) -> Vec<(&'static str, u32)> {
+                vec![$(($name, self.$field)),*]
+            }
+        }
+    };
+}
+
+specialization! {
+    /// Rectangles, those of lights among them.
+    rectangles = "RECTANGLES",
+    /// The first of them, which can cast a shadow.
+    blocking_rectangles = "BLOCKING_RECTANGLES",
+    /// Triangles.
+    triangles = "TRIANGLES",
+    /// The first of them, which can cast a shadow.
+    blocking_triangles = "BLOCKING_TRIANGLES",
+    /// Ellipsoids.
+    ellipsoids = "ELLIPSOIDS",
+    /// The first of them, which can cast a shadow.
+    blocking_ellipsoids = "BLOCKING_ELLIPSOIDS",
+    /// Infinite planes.
+    planes = "PLANES",
+    /// The first of them, which can cast a shadow.
+    blocking_planes = "BLOCKING_PLANES",
+    /// Rectangular lights, the first of the lights.
+    area_lights = "AREA_LIGHTS",
+    /// Point and directional lights.
+    delta_lights = "DELTA_LIGHTS",
+    /// How the samples of a pixel are laid out.
+    pixel_pattern = "PIXEL_PATTERN",
+    /// Side of their grid of cells; how many there are in patterns without cells.
+    pixel_side = "PIXEL_SIDE",
+    /// How many samples a pixel has; under adaptive sampling in every round.
+    pixel_samples = "PIXEL_SAMPLES",
+    /// How the samples of an area light are laid out.
+    light_pattern = "LIGHT_PATTERN",
+    /// Side of their grid of cells; how many there are in patterns without cells.
+    light_side = "LIGHT_SIDE",
+    /// How many there are.
+    light_samples = "LIGHT_SAMPLES",
+    /// Bins of the filter's table; 0 if it is the box of the pixel.
+    filter_bins = "FILTER_BINS",
+    /// The bits, as an f32, of the square of the error that adaptive sampling aims at.
+    squared_error = "SQUARED_ERROR",
+    /// Bits of the largest shininess if all are whole numbers, else 0.
+    exponent_bits = "EXPONENT_BITS",
+    /// Most bounces of a path, 0 where nothing mirrors or refracts.
+    bounces = "BOUNCES",
+    /// 1 where rays carry differentials, else 0.
+    differentials = "DIFFERENTIALS",
+    /// Most lookups in textures of a material that neither mirrors nor refracts.
+    lookups = "LOOKUPS",
+    /// Most lookups of one that does.
+    specular_lookups = "SPECULAR_LOOKUPS",
+    /// 1 if any texture gives a normal, else 0.
+    normal_maps = "NORMAL_MAPS",
+    /// Bit i is set if a texture is of kind i.
+    texture_kinds = "TEXTURE_KINDS",
+    /// Bit i is set if texels are of format i.
+    texel_formats = "TEXEL_FORMATS",
+}

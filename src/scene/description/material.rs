@@ -1,0 +1,66 @@
+//! What a scene file says of materials.
+
+use serde::{Deserialize, Serialize};
+use toml::Table;
+
+use super::tagged::{ReadError, Tagged, tagged};
+use super::{ColorDescription, NormalMapDescription};
+
+tagged! {
+    /// `[materials.NAME]`
+    MaterialDescription {
+        /// Phong's reflection model.
+        "phong" => Phong(PhongDescription),
+        /// A mirror.
+        "mirror" => Mirror(MirrorDescription),
+        /// Clear glass.
+        "glass" => Glass(GlassDescription),
+    }
+}
+
+/// Phong's reflection model. A factor that is absent is `color`.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct PhongDescription {
+    /// Short for the three factors.
+    pub color: Option<ColorDescription>,
+    /// Factor of the ambient light.
+    pub ambient: Option<ColorDescription>,
+    /// Factor of the diffuse term.
+    pub diffuse: Option<ColorDescription>,
+    /// Factor of the specular term.
+    pub specular: Option<ColorDescription>,
+    /// Exponent of the specular term.
+    #[serde(default = "sixteen")]
+    pub shininess: f64,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
+}
+
+/// A mirror.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct MirrorDescription {
+    /// Factor of the reflected light.
+    #[serde(default)]
+    pub tint: ColorDescription,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
+}
+
+/// Clear glass.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct GlassDescription {
+    /// Index of refraction.
+    pub ior: f64,
+    /// Factor of the light that passes the surface.
+    #[serde(default)]
+    pub tint: ColorDescription,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
+}
+
+fn sixteen() -> f64 {
+    16.0
+}

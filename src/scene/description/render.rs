@@ -1,0 +1,181 @@
+//! What a scene file says of how it is rendered.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::scene::{Integrator, Shadows};
+
+/// The settings of a render.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RenderDescription {
+    /// What light is simulated.
+    pub integrator: Integrator,
+    /// The ambient light.
+    pub ambient: DVec3,
+    /// Radiance of rays that leave the scene.
+    pub background: DVec3,
+    /// Relative offset of shadow rays.
+    pub shadow_epsilon: f64,
+    /// Whether glass casts shadows.
+    pub shadows: Shadows,
+    /// Most bounces of a path by mirrors and glass.
+    pub max_depth: u32,
+    /// Whether textures are filtered over the footprint of each ray.
+    pub ray_differentials: bool,
+    /// Seed of all random patterns.
+    pub seed: u32,
+    /// Samples of every pixel.
+    pub pixel_samples: SamplesDescription,
+    /// Samples of every area light at every hit.
+    pub light_samples: SamplesDescription,
+    /// What a pixel's samples are weighted by.
+    pub filter: PixelFilterDescription,
+    /// Further samples where they are needed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adaptive: Option<AdaptiveDescription>,
+}
+
+impl Default for RenderDescription {
+    fn default() -> Self {
+        let samples = SamplesDescription {
+            pattern: Pattern::Grid,
+            count: 16,
+        };
+        Self {
+            integrator: Integrator::Phong,
+            ambient: DVec3::ZERO,
+            background: DVec3::ZERO,
+            shadow_epsilon: 1e-5,
+            shadows: Shadows::Opaque,
+            max_depth: 8,
+            ray_differentials: true,
+            seed: 0,
+            pixel_samples: samples.clone(),
+            light_samples: samples,
+            filter: PixelFilterDescription {
+                kind: PixelFilterKind::Box,
+                radius: None,
+            },
+            adaptive: None,
+        }
+    }
+}
+
+/// A pattern of samples.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct SamplesDescription {
+    /// How they are laid out.
+    #[serde(default)]
+    pub pattern: Pattern,
+    /// How many.
+    pub count: u32,
+}
+
+/// How samples are laid out on the unit square. In a file the names are in snake case: `"grid"`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Pattern {
+    /// The centres of n x n cells.
+    #[default]
+    Grid,
+    /// The grid, turned by atan(1/2).
+    RotatedGrid,
+    /// A uniform position in each of n x n cells.
+    Jittered,
+    /// Independent and uniform.
+    Random,
+    /// Halton's sequence in bases 2 and 3, randomly rotated.
+    Halton,
+    /// Sobol's sequence, Owen-scrambled.
+    Sobol,
+}
+
+impl Pattern {
+    /// All of them.
+    pub const ALL: [Pattern; 6] = [
+        Pattern::Grid,
+        Pattern::RotatedGrid,
+        Pattern::Jittered,
+        Pattern::Random,
+        Pattern::Halton,
+        Pattern::Sobol,
+    ];
+
+    /// The name in files and options.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Pattern::Grid => "grid",
+            Pattern::RotatedGrid => "rotated_grid",
+            Pattern::Jittered => "jittered",
+            Pattern::Random => "random",
+            Pattern::Halton => "halton",
+            Pattern::Sobol => "sobol",
+        }
+    }
+
+    /// Whether the pattern is made of n x n cells, so that its count must be a square number.
+    pub const fn needs_square(self) -> bool {
+        matches!(self, Pattern::Grid | Pattern::RotatedGrid | Pattern::Jittered)
+    }
+
+    /// Whether the pattern has further positions when all of a set are used, so that sampling can be adaptive.
+    pub const fn goes_on(self) -> bool {
+        !matches!(self, Pattern::Grid | Pattern::RotatedGrid)
+    }
+}
+
+/// Adaptive sampling.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct AdaptiveDescription {
+    /// The standard error of a pixel's displayed value that is aimed at.
+    pub error: f64,
+    /// The most samples of a pixel; absent, 16 times their count.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_samples: Option<u32>,
+}
+
+/// A reconstruction filter.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct PixelFilterDescription {
+    /// Its form.
+    #[serde(rename = "type")]
+    pub kind: PixelFilterKind,
+    /// How far it reaches, in pixels; absent, what is usual for its form.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius: Option<f64>,
+}
+
+/// The form of a reconstruction filter, a product of the same function of x and of y. In a file the names are in snake
+/// case: `"blackman_harris"`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum PixelFilterKind {
+    /// Constant.
+    Box,
+    /// Linear from the middle to the radius.
+    Triangle,
+    /// The bell, with a standard deviation of a third of the radius.
+    Gaussian,
+    /// The cubic of Mitchell and Netravali with B = C = 1/3, with negative lobes.
+    Mitchell,
+    /// The window of Blackman and Harris, of four terms.
+    BlackmanHarris,
+}
+
+impl PixelFilterKind {
+    /// The usual radius in pixels.
+    pub const fn radius(self) -> f64 {
+        match self {
+            PixelFilterKind::Box => 0.5,
+            PixelFilterKind::Triangle => 1.0,
+            PixelFilterKind::Gaussian | PixelFilterKind::BlackmanHarris => 1.5,
+            PixelFilterKind::Mitchell => 2.0,
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! Tables of a scene file that their key `type` tells apart.
+
+use toml::Table;
+
+/// An enum whose variants a file tells apart by the key `type`.
+pub(in crate::scene) trait Tagged: Sized {
+    /// The values that `type` may have.
+    const TYPES: &'static [&'static str];
+
+    /// Reads the table without its `type`, which is `tag`; `None` if there is no such type.
+    fn read(tag: &str, body: Table) -> Option<Result<Self, ReadError>>;
+}
+
+/// An error of serde with the path that leads to it.
+pub(in crate::scene) type ReadError = serde_path_to_error::Error<toml::de::Error>;
+
+/// Defines a [`Tagged`] enum. It is not left to serde's `tag` alone because that forgets, while reading, in
+/// which key of the table an error is.
+macro_rules! tagged {
+    ($(#[$doc:meta])* $name:ident {
+        $($(#[$variant_doc:meta])* $tag:literal => $variant:ident($body:ident),)+
+    }) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq, Serialize)]
+        #[serde(tag = "type")]
+        #[non_exhaustive]
+        pub enum $name {
+            $($(#[$variant_doc])* #[serde(rename = $tag)] $variant($body),)+
+        }
+
+        impl Tagged for $name {
+            const TYPES: &'static [&'static str] = &[$($tag),+];
+
+            fn read(tag: &str, body: Table) -> Option<Result<Self, ReadError>> {
+                match tag {
+                    $($tag => Some(serde_path_to_error::deserialize(body).map(Self::$variant)),)+
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+pub(super) use tagged;

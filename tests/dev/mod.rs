@@ -1,0 +1,8 @@
+//! The development mode without a browser: whatever happens to the files, the picture is the one that `render` makes of
+//! what they say last, or the last good one with the error beside it.
+
+mod reload;
+mod responsive;
+mod running;
+mod server;
+mod views;

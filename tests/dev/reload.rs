@@ -1,0 +1,279 @@
+//! Files that are saved, broken, renamed, linked, deleted: what is shown is what they say last.
+
+use std::fs;
+use std::time::Duration;
+
+use wgray::dev::{Command, Move};
+use wgray::gpu::compose::{BUILT_IN, Shaders};
+
+use super::running::{Files, KERNEL, RADIANCE, SCENE, SETTLED};
+
+#[test]
+fn the_first_picture_is_what_render_makes() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let frame = running.frame().unwrap();
+    assert_eq!((frame.header.samples, frame.header.total), (4, 4));
+    let colors = running.colors().colors;
+    assert!(colors.iter().any(|color| *color != colors[0]), "a picture of something");
+    let (x, y) = (20, 20);
+    let [r, g, b] = colors[y * 40 + x];
+    let told = frame.pixel(x as u32, y as u32).unwrap();
+    assert_eq!(told, [("linear RGB", format!("{r}  {g}  {b}"))]);
+    assert_eq!(frame.pixel(40, 0), None);
+}
+
+#[test]
+fn a_saved_scene_is_uploaded_and_a_changed_count_is_compiled() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let (before, compiled) = (running.colors(), running.state().compile_seconds);
+    files.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.8, 0.1");
+    running.wait_rendered(&files);
+    assert_ne!(running.colors(), before);
+    assert_eq!(running.state().compile_seconds, compiled, "nothing was compiled");
+    files.edit(
+        "scene.toml",
+        "[[shapes]]",
+        "[[shapes]]\ntype = 'sphere'\nmaterial = 'red'\ncenter = [1, 0, 1]\nradius = 0.3\n\n[[shapes]]",
+    );
+    running.wait_rendered(&files);
+    assert_ne!(running.state().compile_seconds, compiled, "another kernel was compiled");
+    files.edit("scene.toml", "width = 40", "width = 33");
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn a_comment_starts_nothing_anew() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let revision = running.revision();
+    files.edit("scene.toml", "# a small scene", "# a very small scene");
+    std::thread::sleep(SETTLED);
+    assert_eq!(running.revision(), revision);
+    files.edit("scene.toml", "fov = 40", "fov = 41"); // it was looking
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn a_broken_shader_is_told_and_the_picture_stays() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let (good, revision) = (running.colors(), running.revision());
+    files.edit(KERNEL, "= sum;", "= sun;");
+    let problem = running.wait_problem();
+    assert_eq!(problem.kind, "shader");
+    let text = files.read(KERNEL);
+    let before = &text[..text.find("sun;").unwrap()];
+    let (line, column) = (
+        before.matches('\n').count() + 1,
+        before.len() - before.rfind('\n').unwrap(),
+    );
+    let place = format!("{}:{line}:{column}", files.path(KERNEL).display());
+    assert_eq!(problem.place, Some(place));
+    assert!(problem.message.contains("sun"), "{}", problem.message);
+    let excerpt = problem.excerpt.unwrap();
+    assert!(excerpt.contains("= sun;") && excerpt.contains("^^^"), "{excerpt}");
+    std::thread::sleep(SETTLED);
+    assert_eq!((running.colors(), running.revision()), (good, revision));
+    // What does not need the broken shaders goes on.
+    running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
+    running.wait_done(revision);
+    running.session.send(Command::ResetCamera);
+    files.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.8, 0.1");
+    let scene_changed = Files::new(&files.read("scene.toml")).rendered();
+    running.wait("the changed scene by the last good shaders", |running| {
+        (running.colors() == scene_changed).then_some(())
+    });
+    // Even where it takes another kernel.
+    files.edit(
+        "scene.toml",
+        "radius = 0.5",
+        "radius = 0.5\n\n[[shapes]]\ntype = 'sphere'\nmaterial = 'red'\ncenter = [1, 0, 1]\nradius = 0.3",
+    );
+    let scene_changed = Files::new(&files.read("scene.toml")).rendered();
+    running.wait("a new kernel of the last good shaders", |running| {
+        (running.colors() == scene_changed).then_some(())
+    });
+    assert_eq!(running.wait_problem().kind, "shader");
+    files.tint(0.5);
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn a_shader_that_is_wrong_in_its_types_is_told_too() {
+    let files = Files::new(SCENE);
+    files.edit(
+        "shaders/camera.wgsl",
+        "return Ray(camera.position, ",
+        "return Ray(camera.seed, ",
+    );
+    let running = files.start();
+    let problem = running.wait_problem();
+    assert!(
+        problem.place.unwrap().contains("camera.wgsl:"),
+        "there is no picture, but the error is told"
+    );
+    assert!(running.frame().is_none());
+    files.edit(
+        "shaders/camera.wgsl",
+        "return Ray(camera.seed, ",
+        "return Ray(camera.position, ",
+    );
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn a_broken_scene_is_told_and_the_picture_stays() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let good = running.colors();
+    for (old, new, line, said) in [
+        ("radius = 0.5", "radius = -1", 33, "must be"),
+        ("radius = -1", "radius = = 1", 33, "expected"),
+        ("radius = = 1", "radius = 1\nradios = 2", 34, "radios"),
+    ] {
+        files.edit("scene.toml", old, new);
+        let place = format!("{}:{line}", files.path("scene.toml").display());
+        let problem = running.wait("the problem", |running| {
+            let problem = running.state().problems.first().cloned()?;
+            (problem.place.as_ref()?.starts_with(&place) && problem.message.contains(said)).then_some(problem)
+        });
+        assert_eq!(problem.kind, "scene");
+        assert!(problem.excerpt.unwrap().contains(new.lines().last().unwrap()));
+        assert_eq!(running.colors(), good);
+    }
+    files.edit("scene.toml", "radios = 2\n", "");
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn of_a_burst_of_saves_the_last_one_counts() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    for i in 1..=40 {
+        files.write("scene.toml", &SCENE.replace("fov = 40", &format!("fov = {}", 40 + i)));
+        if i % 4 == 0 {
+            files.tint(1.0 + i as f64 / 100.0);
+        }
+        if i % 7 == 0 {
+            files.write("shaders/phong.wgsl", "half written");
+            files.write("shaders/phong.wgsl", Shaders::built_in().text("phong.wgsl"));
+        }
+        std::thread::sleep(Duration::from_millis(i % 12));
+    }
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn saves_by_rename_and_links_are_seen() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    files.save_by_rename("scene.toml", &SCENE.replace("fov = 40", "fov = 50"));
+    running.wait_rendered(&files);
+    let kernel = files
+        .read(KERNEL)
+        .replace(RADIANCE, &format!("({RADIANCE} * vec4f(vec3f(0.25), 1.0))"));
+    files.save_by_rename(KERNEL, &kernel);
+    running.wait_rendered(&files);
+    #[cfg(unix)]
+    {
+        // The scene becomes a link to a file elsewhere, which is then edited there; likewise a shader.
+        let elsewhere = Files::new(&SCENE.replace("fov = 40", "fov = 60"));
+        for name in ["scene.toml", "shaders/phong.wgsl"] {
+            fs::remove_file(files.path(name)).unwrap();
+            std::os::unix::fs::symlink(elsewhere.path(name), files.path(name)).unwrap();
+        }
+        running.wait_rendered(&files);
+        elsewhere.save_by_rename("scene.toml", &SCENE.replace("fov = 40", "fov = 70"));
+        running.wait_rendered(&files);
+        elsewhere.edit(
+            "shaders/phong.wgsl",
+            "return lobes;",
+            "return Lobes(lobes.specular, lobes.diffuse);",
+        );
+        running.wait_rendered(&files);
+    }
+}
+
+#[test]
+fn deleted_files_are_told_and_seen_again() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let good = running.colors();
+    fs::remove_file(files.path("scene.toml")).unwrap();
+    let problem = running.wait_problem();
+    assert_eq!(problem.kind, "file");
+    assert!(
+        problem.message.contains("scene.toml: cannot be read"),
+        "{}",
+        problem.message
+    );
+    files.write("scene.toml", &SCENE.replace("fov = 40", "fov = 50"));
+    running.wait_rendered(&files);
+    assert_ne!(running.colors(), good);
+
+    fs::remove_file(files.path("shaders/phong.wgsl")).unwrap();
+    assert!(running.wait_problem().message.contains("phong.wgsl"));
+    files.write("shaders/phong.wgsl", Shaders::built_in().text("phong.wgsl"));
+    running.wait_well();
+
+    // A whole folder goes and comes back, as when another branch is checked out.
+    for name in ["shaders/kernels", "shaders"] {
+        fs::rename(files.path(name), files.path("away")).unwrap();
+        assert_eq!(running.wait_problem().kind, "file");
+        fs::rename(files.path("away"), files.path(name)).unwrap();
+        running.wait_well();
+    }
+    fs::remove_dir_all(files.path("shaders")).unwrap();
+    fs::create_dir_all(files.path("shaders/kernels")).unwrap();
+    for (name, text) in BUILT_IN {
+        files.write(&format!("shaders/{name}"), text);
+    }
+    files.tint(0.125);
+    running.wait_rendered(&files);
+    files.edit(
+        "shaders/kernels/render.wgsl",
+        "film[index] = sum;",
+        "film[index] = sum * vec4f(2.0, 1.0, 1.0, 1.0);",
+    );
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn an_edited_texture_is_seen() {
+    let textured = SCENE.replacen("color = [0.8, 0.1, 0.1]", "color = { texture = 'picture' }", 1)
+        + "\n[textures.picture]\ntype = 'image'\nfile = 'textures/picture.png'\n";
+    let files = Files::new(&textured);
+    let paint = |color: [u8; 3]| {
+        fs::create_dir_all(files.path("textures")).unwrap();
+        image::RgbImage::from_pixel(4, 4, image::Rgb(color))
+            .save(files.path("textures/picture.png"))
+            .unwrap();
+    };
+    paint([200, 30, 30]);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let red = running.colors();
+    paint([30, 30, 200]);
+    running.wait_rendered(&files);
+    assert_ne!(running.colors(), red);
+    fs::remove_dir_all(files.path("textures")).unwrap();
+    assert!(running.wait_problem().message.contains("textures/picture.png"));
+    paint([30, 200, 30]);
+    running.wait_rendered(&files);
+    fs::write(files.path("textures/picture.png"), "no picture").unwrap();
+    assert!(running.wait_problem().message.contains("textures/picture.png"));
+    paint([200, 30, 30]);
+    running.wait("the first picture again", |running| {
+        (running.colors() == red).then_some(())
+    });
+}

@@ -1,0 +1,251 @@
+//! A scene and shaders in a folder of their own, and the development mode that watches them.
+
+use std::fs;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+use wgray::dev::{Content, Diagnostic, Frame, Session, Settings, Sources, State};
+use wgray::film::Region;
+use wgray::gpu::compose::{BUILT_IN, Shaders};
+use wgray::gpu::{Choice, Gpu, Options, choose};
+use wgray::image::Pixels;
+use wgray::job::{self, Cut};
+use wgray::pack::{Packed, pack};
+use wgray::scene::{Overrides, Scene};
+
+/// However busy the machine is, what is waited for comes within this time, or never.
+pub const LONGEST: Duration = Duration::from_secs(40);
+/// Nothing happens for so long: then nothing will.
+pub const SETTLED: Duration = Duration::from_millis(400);
+
+pub const SCENE: &str = "# a small scene
+[image]
+width = 40
+height = 30
+
+[camera] # looks from the front
+position = [0, -4, 1] # a comment
+look_at = [0, 0, 0.5]
+fov = 40
+
+[render]
+ambient = [0.2, 0.2, 0.2]
+pixel_samples = { pattern = \"grid\", count = 4 }
+light_samples = { pattern = \"grid\", count = 4 }
+
+[materials.red]
+type = \"phong\"
+color = [0.8, 0.1, 0.1]
+shininess = 16
+
+[[lights]]
+type = \"rectangle\"
+center = [0, 0, 3]
+size = [1, 1]
+normal = [0, 0, -1]
+tangent = [1, 0, 0]
+color = [0.8, 0.8, 0.8]
+
+[[shapes]]
+type = \"sphere\"
+material = \"red\"
+center = [0, 0, 0.5]
+radius = 0.5
+
+[[shapes]]
+type = \"plane\"
+material = \"red\"
+point = [0, 0, 0]
+normal = [0, 0, 1]
+tangent = [1, 0, 0]
+";
+
+/// A shader whose picture depends on every line.
+pub const KERNEL: &str = "shaders/kernels/render.wgsl";
+/// What it adds up.
+pub const RADIANCE: &str = "pixel_radiance(pixel, sample)";
+
+/// A scene and shaders in a folder of their own.
+pub struct Files {
+    pub folder: TempDir,
+}
+
+impl Files {
+    pub fn new(scene: &str) -> Files {
+        let files = Files {
+            folder: tempfile::tempdir().unwrap(),
+        };
+        fs::create_dir_all(files.path("shaders/kernels")).unwrap();
+        for (name, text) in BUILT_IN {
+            files.write(&format!("shaders/{name}"), text);
+        }
+        files.write("scene.toml", scene);
+        files
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    pub fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).unwrap();
+    }
+
+    /// As most editors save: another file takes the name.
+    pub fn save_by_rename(&self, name: &str, text: &str) {
+        self.write("new~", text);
+        fs::rename(self.path("new~"), self.path(name)).unwrap();
+    }
+
+    pub fn edit(&self, name: &str, old: &str, new: &str) {
+        let text = self.read(name);
+        assert!(text.contains(old), "{name} has no '{old}'");
+        self.write(name, &text.replacen(old, new, 1));
+    }
+
+    /// Saves a kernel that multiplies the picture.
+    pub fn tint(&self, factor: f64) {
+        let kernel = Shaders::built_in().text("kernels/render.wgsl").to_string();
+        assert!(kernel.contains(RADIANCE));
+        self.write(
+            KERNEL,
+            &kernel.replace(RADIANCE, &format!("({RADIANCE} * vec4f(vec3f({factor:?}), 1.0))")),
+        );
+    }
+
+    pub fn sources(&self) -> Sources {
+        Sources {
+            scene: self.path("scene.toml"),
+            overrides: Overrides::default(),
+            shaders: Some(self.path("shaders")),
+        }
+    }
+
+    pub fn start(&self) -> Running {
+        Running::start(self.sources(), None)
+    }
+
+    pub fn packed(&self) -> Packed {
+        pack(&Scene::load(&self.path("scene.toml"), &Overrides::default()).unwrap())
+    }
+
+    /// What `render` makes of the files.
+    pub fn rendered(&self) -> Pixels {
+        let packed = self.packed();
+        let device = choose(&Choice::Auto).unwrap();
+        let shaders = Shaders::read(&self.path("shaders")).unwrap();
+        let options = Options {
+            baked: false,
+            ..Options::best(&device)
+        };
+        let mut gpu = Gpu::new(&device, &packed, &shaders, options).unwrap();
+        let (width, height) = (packed.camera.width, packed.camera.height);
+        let mut colors = Vec::new();
+        let whole = Region::whole(width, height);
+        job::render(
+            &mut gpu,
+            whole,
+            packed.pixel_samples,
+            &Cut::default(),
+            &mut |_| true,
+            &mut |film| {
+                colors.extend(film.means());
+                Ok(())
+            },
+        )
+        .unwrap();
+        Pixels { width, height, colors }
+    }
+}
+
+pub struct Running {
+    pub session: Session,
+}
+
+impl Running {
+    pub fn start(sources: Sources, out: Option<PathBuf>) -> Running {
+        let settings = Settings {
+            sources,
+            device: Choice::Auto,
+            out,
+            report: Box::new(|_| ()),
+        };
+        Running {
+            session: Session::start(settings).unwrap(),
+        }
+    }
+
+    pub fn state(&self) -> Arc<State> {
+        self.session.state.borrow().clone()
+    }
+
+    pub fn frame(&self) -> Option<Arc<Frame>> {
+        self.session.frames.borrow().clone()
+    }
+
+    #[track_caller]
+    pub fn wait<T>(&self, what: &str, ready: impl Fn(&Running) -> Option<T>) -> T {
+        let start = Instant::now();
+        while start.elapsed() < LONGEST {
+            if let Some(value) = ready(self) {
+                return value;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        panic!(
+            "{what}: not within {LONGEST:?}; state: {:?}, frame: {:?}",
+            self.state(),
+            self.frame().map(|f| f.header.clone())
+        );
+    }
+
+    /// Waits until a picture with all samples is shown that is later than a revision.
+    #[track_caller]
+    pub fn wait_done(&self, after: u64) -> Arc<Frame> {
+        self.wait("a finished picture", |running| {
+            running
+                .frame()
+                .filter(|frame| frame.header.done && frame.header.revision > after)
+        })
+    }
+
+    /// Waits until the picture is the one that `render` makes of the files.
+    #[track_caller]
+    pub fn wait_rendered(&self, files: &Files) {
+        let wanted = files.rendered();
+        self.wait("the picture that render makes", |running| {
+            let frame = running.frame()?;
+            matches!(&frame.content, Content::Color(pixels) if frame.header.done && *pixels == wanted).then_some(())
+        });
+        assert_eq!(self.state().problems, []);
+    }
+
+    #[track_caller]
+    pub fn wait_problem(&self) -> Diagnostic {
+        self.wait("a problem", |running| running.state().problems.first().cloned())
+    }
+
+    #[track_caller]
+    pub fn wait_well(&self) {
+        self.wait("no problem", |running| {
+            (running.state().problems.is_empty() && !running.state().compiling).then_some(())
+        });
+    }
+
+    pub fn revision(&self) -> u64 {
+        self.frame().map_or(0, |frame| frame.header.revision)
+    }
+
+    pub fn colors(&self) -> Pixels {
+        match &self.frame().unwrap().content {
+            Content::Color(pixels) => pixels.clone(),
+            other => panic!("{other:?}"),
+        }
+    }
+}

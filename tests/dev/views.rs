@@ -1,0 +1,152 @@
+//! The camera, the views of a picture, the comparison with the CPU, and the file that the picture goes to.
+
+use std::fs;
+
+use wgray::cpu::Cpu;
+use wgray::dev::{Command, Content, Move, View};
+use wgray::film::Region;
+use wgray::job::Backend as _;
+
+use super::running::{Files, KERNEL, RADIANCE, Running, SCENE, SETTLED};
+
+#[test]
+fn the_camera_moves_and_is_saved_without_a_flicker() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    assert!(!running.state().camera_moved);
+    for by in [Move::Orbit(0.4, 0.2), Move::Pan(0.1, -0.1), Move::Dolly(0.3)] {
+        let revision = running.revision();
+        running.session.send(Command::Move(by));
+        running.wait_done(revision);
+    }
+    // Moved and at once seen otherwise: neither is forgotten.
+    running.session.send(Command::Move(Move::Orbit(-0.1, 0.0)));
+    running.session.send(Command::View(View::Normal));
+    running.session.send(Command::View(View::Color));
+    let settled = |running: &Running| {
+        let frame = running.frame()?;
+        (frame.header.done && frame.header.view == View::Color).then_some(frame.header.revision)
+    };
+    std::thread::sleep(SETTLED);
+    running.wait("a finished picture", settled);
+    let state = running.state();
+    assert!(state.camera_moved);
+    // The text is that of a scene file: put into one it gives the picture that is shown.
+    let from_text = {
+        let (start, end) = (SCENE.find("[camera]").unwrap(), SCENE.find("[render]").unwrap());
+        Files::new(&format!("{}{}\n{}", &SCENE[..start], state.camera, &SCENE[end..]))
+    };
+    assert_eq!(running.colors(), from_text.rendered());
+    let (shown, revision) = (running.colors(), running.revision());
+    running.session.send(Command::SaveCamera);
+    running.wait("the camera to be the file's", |running| {
+        (!running.state().camera_moved).then_some(())
+    });
+    assert_eq!(files.rendered(), shown);
+    let saved = files.read("scene.toml");
+    for kept in [
+        "# a small scene\n",
+        "[camera] # looks from the front\n",
+        "] # a comment\n",
+        "fov = 40\n",
+    ] {
+        assert!(saved.contains(kept), "{saved}");
+    }
+    let notice = running.state().notice.clone().unwrap();
+    assert!(!notice.bad && notice.text.contains("scene.toml"), "{}", notice.text);
+    std::thread::sleep(SETTLED);
+    assert_eq!(running.revision(), revision, "nothing was rendered again");
+    // Whoever edits the file's camera sees that one.
+    running.session.send(Command::Move(Move::Orbit(0.4, 0.2)));
+    running.wait_done(revision);
+    files.edit("scene.toml", "fov = 40", "fov = 44");
+    running.wait_rendered(&files);
+    assert!(!running.state().camera_moved);
+}
+
+#[test]
+fn the_views_show_the_first_hits() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let packed = files.packed();
+    let wanted = Cpu::new(&packed).first_hits(Region::whole(40, 30)).unwrap();
+    for view in [View::Normal, View::Depth, View::Uv, View::Primitive] {
+        running.session.send(Command::View(view));
+        let frame = running.wait("the view", |running| {
+            running
+                .frame()
+                .filter(|frame| frame.header.view == view && frame.header.done)
+        });
+        let Content::Hits(_, hits) = &frame.content else {
+            panic!("{:?}", frame.content)
+        };
+        assert_eq!(*hits, wanted);
+        let told = frame.pixel(20, 15).unwrap();
+        assert!(
+            told.contains(&("on", "shapes[0]".to_string())) && told.contains(&("material", "red".to_string())),
+            "{told:?}"
+        );
+    }
+    running.session.send(Command::View(View::Samples));
+    let frame = running.wait("the counts", |running| {
+        running.frame().filter(|frame| frame.header.view == View::Samples)
+    });
+    assert!(matches!(&frame.content, Content::Samples(counts, 4) if counts.iter().all(|count| *count == 4)));
+    running.session.send(Command::View(View::Color));
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn the_cpu_agrees_until_a_shader_is_changed() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    running.session.send(Command::View(View::Compare));
+    let compared = |running: &Running| {
+        running
+            .frame()
+            .filter(|frame| frame.header.done)
+            .and_then(|frame| frame.header.differing)
+    };
+    assert_eq!(running.wait("a comparison", compared), (0, 0.0));
+    files.edit(KERNEL, RADIANCE, &format!("({RADIANCE} + vec4f(0.25, 0.0, 0.0, 0.0))"));
+    let (pixels, largest) = running.wait("a difference", |running| {
+        compared(running).filter(|(pixels, _)| *pixels > 0)
+    });
+    assert!(pixels > 100, "{pixels}");
+    assert!((largest - 0.25).abs() < 1e-5, "{largest}");
+    let Content::Compare(gpu, cpu) = &running.frame().unwrap().content else {
+        panic!()
+    };
+    assert_ne!(gpu, cpu);
+}
+
+#[test]
+fn the_file_of_out_is_the_finished_picture() {
+    let files = Files::new(SCENE);
+    let out = files.path("pictures.png");
+    let running = Running::start(files.sources(), Some(out.clone()));
+    for fov in [40, 50] {
+        files.write("scene.toml", &SCENE.replace("fov = 40", &format!("fov = {fov}")));
+        running.wait_rendered(&files);
+        let wanted: Vec<u8> = running
+            .colors()
+            .colors
+            .iter()
+            .flat_map(|color| color.map(wgray::image::encode))
+            .collect();
+        running.wait("the file", |_| {
+            let picture = image::open(&out).ok()?.into_rgb8();
+            (picture.dimensions() == (40, 30) && *picture.as_raw() == wanted).then_some(())
+        });
+    }
+    // A picture that is written beside the scene does not wake the session, nor is anything left behind.
+    let mut names: Vec<_> = fs::read_dir(files.folder.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["pictures.png", "scene.toml", "shaders"]);
+}
