@@ -73,8 +73,8 @@ pub struct Args {
     #[arg(long, value_name = "auto|gpu|cpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
     device: String,
 
-    /// Rounds quotients and square roots correctly in software. GPUs' own may be off in the last digit: this gives pictures
-    /// the CPU's bits on more of them, for some time. Vulkan only; without effect on the CPU
+    /// Rounds quotients and square roots correctly in software. A GPU's own may be off in the last digit; with this, more
+    /// GPUs give the CPU's bits, at up to a few times the time. Vulkan only; without effect on the CPU
     #[arg(long)]
     exact_rounding: bool,
 

@@ -1,16 +1,18 @@
-//! A small scene written into its kernel as constants: the functions of `scene.wgsl`, with a statement for each primitive instead of a loop. Software Vulkan reads a buffer lane by lane, constants for free.
+//! A small scene written into its kernel as constants: the functions of `scene.wgsl`, with a statement for each primitive
+//! instead of a loop. Software Vulkan reads a buffer lane by lane, constants for free.
 
 use std::fmt::Write;
 use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::pack::{
-    ELLIPSOID, Light, Material, PLANE, Packed, Primitive, RECTANGLE, Specialization, Sphere, TRIANGLE, Texture,
-};
+use crate::pack::{BLOCK, Light, Material, Packed, Primitive, Specialization, Sphere, Texture};
 
 /// Larger scenes are read from buffers: compiling grows with every primitive.
 pub const MOST_PRIMITIVES: usize = 64;
+
+/// What the shaders call a primitive of each kind, by [`Primitive::kind`].
+const KINDS: [&str; 4] = ["rectangle", "triangle", "ellipsoid", "plane"];
 
 /// The WGSL text of a scene's `closest_hit`, `shadow_candidates`, `load_primitive`, `load_blocker`, `load_material`,
 /// `load_light` and `load_texture`.
@@ -24,7 +26,7 @@ pub fn bake(packed: &Packed) -> String {
         "hit",
         |body| {
             for (i, (p, record)) in packed.primitives.iter().zip(&records).enumerate() {
-                let kind = kind_name(p.kind);
+                let kind = KINDS[p.kind as usize];
                 let _ = writeln!(
                     body,
                     "    hit = closer(hit, intersect_{kind}({record}, ray, hit.t), {i}u);"
@@ -35,9 +37,9 @@ pub fn bake(packed: &Packed) -> String {
     let signature = "shadow_candidates(first: u32, end: u32, cone: Cone) -> u32";
     write_function(&mut out, signature, "var bits = 0u;", "bits", |body| {
         for range in blocking(&packed.specialization) {
-            for first in range.clone().step_by(32) {
+            for first in range.clone().step_by(BLOCK as usize) {
                 let _ = writeln!(body, "    if first == {first}u {{");
-                for i in first..range.end.min(first + 32) {
+                for i in first..range.end.min(first + BLOCK as usize) {
                     let (bit, sphere) = (i - first, sphere(&packed.bounds[i]));
                     let _ = writeln!(
                         body,
@@ -101,16 +103,6 @@ fn blocking(s: &Specialization) -> [Range<usize>; 4] {
         planes..planes + s.blocking_planes,
     ]
     .map(|range| range.start as usize..range.end as usize)
-}
-
-fn kind_name(kind: u32) -> &'static str {
-    match kind {
-        RECTANGLE => "rectangle",
-        TRIANGLE => "triangle",
-        ELLIPSOID => "ellipsoid",
-        PLANE => "plane",
-        _ => unreachable!("pack makes no other kind"),
-    }
 }
 
 fn write_function(out: &mut String, signature: &str, start: &str, result: &str, body: impl FnOnce(&mut String)) {
