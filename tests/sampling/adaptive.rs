@@ -1,7 +1,7 @@
 //! Adaptive sampling: the same on both paths and under every cut; where it stops, and what its estimate is worth.
 
-use glam::UVec2;
-use wgray::cpu::adaptive::{display_variance, moments_with, variance_of_mean};
+use glam::{UVec2, Vec4};
+use wgray::cpu::adaptive::{display_slope_squared, display_variance, moments_with, variance_of_mean};
 use wgray::cpu::integrator::{pixel_corners, pixel_radiance};
 use wgray::film::mean;
 use wgray::job::Cut;
@@ -130,9 +130,33 @@ fn moments_are_the_variance_of_the_samples() {
     }
 }
 
+/// The error that is aimed at is that of the displayed value, v^(1 / 2.2).
+#[test]
+fn errors_are_scaled_by_the_slope_of_the_displayed_value() {
+    let displayed = |v: f64| v.powf(1.0 / 2.2);
+    for i in 1..=1000 {
+        let v = f64::from(i) / 1000.0;
+        let slope = |v: f64| (displayed(v * 1.0001) - displayed(v * 0.9999)) / (v * 2e-4);
+        let expected = slope(v.max(0.01)).powi(2);
+        let found = f64::from(display_slope_squared(v as f32));
+        assert!((found / expected - 1.0).abs() < 1e-5, "{v}: {found}, not {expected}");
+    }
+    // black and what is brighter than white: as at the nearest value that is told apart
+    assert_eq!(display_slope_squared(-0.5), display_slope_squared(0.01));
+    assert_eq!(display_slope_squared(7.0), display_slope_squared(1.0));
+    // the mean over the channels, each with its own slope
+    let (sum, moments) = (Vec4::new(1.0, 2.0, 4.0, 8.0), Vec4::new(0.1, 0.4, 0.2, 8.0));
+    let [x, y, z] = [(0.125, 0.1), (0.25, 0.4), (0.5, 0.2)].map(|(mean, moment): (f64, f64)| {
+        let slope = displayed(mean) / (2.2 * mean);
+        slope * slope * moment / 8.0 / 7.0
+    });
+    let (found, expected) = (f64::from(display_variance(sum, moments)), (x + y + z) / 3.0);
+    assert!((found / expected - 1.0).abs() < 1e-5, "{found}, not {expected}");
+}
+
 #[test]
 fn weighted_moments_of_a_constant_are_nothing() {
-    let (mut sum, mut moments) = (glam::Vec4::ZERO, glam::Vec4::ZERO);
+    let (mut sum, mut moments) = (Vec4::ZERO, Vec4::ZERO);
     for weight in [1.0, 0.98, -1.02, 1.0, 1.0, -1.02, 1.0] {
         let sample = (glam::Vec3::new(0.3, 0.2, 0.7) * weight).extend(weight);
         moments = moments_with(moments, sum, sample);
@@ -143,7 +167,7 @@ fn weighted_moments_of_a_constant_are_nothing() {
         "{moments}"
     );
     // negative control
-    let other = moments_with(moments, sum, glam::Vec4::new(0.3, 0.2, 0.6, 1.0));
+    let other = moments_with(moments, sum, Vec4::new(0.3, 0.2, 0.6, 1.0));
     assert!(other.z > 1e-3);
 }
 

@@ -1,8 +1,9 @@
 //! What the filters make of images.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DMat2, DVec2, DVec3, Vec2, Vec3};
 use wgray::cpu::footprint::{Footprint, footprint_ellipse};
 use wgray::cpu::texel::{near_coordinate, srgb_to_linear, wrapped_index};
 use wgray::cpu::texture::texture_color;
@@ -148,23 +149,22 @@ fn noise(folder: &Path, width: u32, height: u32) -> Vec<f64> {
 }
 
 #[test]
-fn ewa_of_a_round_footprint_is_a_gaussian_mean() {
+fn ewa_is_a_gaussian_mean_over_the_ellipse() {
     let folder = tempfile::tempdir().unwrap();
     let n = 32;
     let texels = noise(folder.path(), n, n);
     let scene = textured(folder.path(), "type = 'image'\nfile = 'noise.exr'\nfilter = 'ewa'");
-    // exp(-2 d^2 / r^2) - exp(-2) where d < r: r^2 is 1 for the footprint of one texel, and 1 for reconstruction.
-    let exact = |u: f64, v: f64, r2: f64| {
+    // exp(-2 q) - exp(-2) where q = p^T (M + I)^-1 p < 1: M of the footprint, in texels, and I of their reconstruction.
+    let exact = |uv: DVec2, dx: DVec2, dy: DVec2| {
+        let edges = DMat2::from_cols(dx, dy) * f64::from(n);
+        let inverse = (edges * edges.transpose() + DMat2::IDENTITY).inverse();
         let (mut sum, mut total) = (0.0, 0.0);
         for y in -10..n as i32 + 10 {
             for x in -10..n as i32 + 10 {
-                let (a, b) = (
-                    f64::from(x) + 0.5 - u * f64::from(n),
-                    f64::from(y) + 0.5 - v * f64::from(n),
-                );
-                let d2 = (a * a + b * b) / r2;
-                if d2 < 1.0 {
-                    let weight = (-2.0 * d2).exp() - (-2f64).exp();
+                let p = DVec2::new(f64::from(x), f64::from(y)) + 0.5 - uv * f64::from(n);
+                let q = p.dot(inverse * p);
+                if q < 1.0 {
+                    let weight = (-2.0 * q).exp() - (-2f64).exp();
                     let (x, y) = (x.rem_euclid(n as i32), y.rem_euclid(n as i32));
                     sum += weight * texels[(y * n as i32 + x) as usize];
                     total += weight;
@@ -174,22 +174,28 @@ fn ewa_of_a_round_footprint_is_a_gaussian_mean() {
         sum / total
     };
     let numbers = Random::new(9);
-    let texel = 1.0 / n as f32;
-    let mut narrower_differs = false;
-    for _ in 0..200 {
-        let uv = Vec2::new(numbers.unit() as f32, numbers.unit() as f32);
-        let angle = numbers.between(0.0, std::f64::consts::TAU) as f32;
-        let (dx, dy) = (Vec2::from_angle(angle) * texel, Vec2::from_angle(angle).perp() * texel);
-        let found = f64::from(color(&scene, uv, dx, dy).x);
-        let (u, v) = (f64::from(uv.x), f64::from(uv.y));
-        assert!(
-            (found - exact(u, v, 2.0)).abs() < 2e-5,
-            "{uv}: {found} {}",
-            exact(u, v, 2.0)
-        );
-        narrower_differs |= (found - exact(u, v, 1.5)).abs() > 0.01;
+    let texel = 1.0 / f64::from(n);
+    // None is wider than a texel: it would be looked up in coarser levels, too.
+    for (longest, narrowest) in [(1.0, 1.0), (6.0, 0.8)] {
+        let (mut narrower, mut mirrored) = (0, 0);
+        for _ in 0..200 {
+            let uv = Vec2::new(numbers.unit() as f32, numbers.unit() as f32);
+            let axis = DVec2::from_angle(numbers.between(0.0, TAU)) * texel;
+            let (dx, dy) = (
+                (axis * numbers.between(1.0, longest)).as_vec2(),
+                (axis.perp() * narrowest).as_vec2(),
+            );
+            let found = f64::from(color(&scene, uv, dx, dy).x);
+            let (uv, dx, dy) = (uv.as_dvec2(), dx.as_dvec2(), dy.as_dvec2());
+            let expected = exact(uv, dx, dy);
+            assert!((found - expected).abs() < 2e-5, "{uv} {dx} {dy}: {found} {expected}");
+            narrower += u32::from((found - exact(uv, dx * 0.7, dy * 0.7)).abs() > 0.01);
+            let mirror = DVec2::new(-1.0, 1.0);
+            mirrored += u32::from((found - exact(uv, dx * mirror, dy * mirror)).abs() > 0.01);
+        }
+        assert!(narrower > 20, "{narrower}");
+        assert_eq!(mirrored > 20, longest > 1.0, "{mirrored}"); // a circle is its mirror image
     }
-    assert!(narrower_differs);
 }
 
 #[test]
