@@ -12,11 +12,6 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
 WORK = TARGET / "mutants"
 
-# The least share of the mistakes that the tests must find.
-ENOUGH = 0.95
-# Seconds; a test that takes longer has found a mistake: a loop without end.
-PATIENCE = 200
-
 SWITCH = """
 /// Whether the mistake of this number is made.
 #[doc(hidden)]

@@ -8,8 +8,9 @@ use std::time::{Duration, Instant, SystemTime};
 use toml_edit::{DocumentMut, value};
 
 use super::camera::Move;
+use super::messages::Command;
 use super::picture::Frame;
-use super::session::{Command, Session, Settings};
+use super::session::{Session, Settings};
 use super::source::Sources;
 use crate::gpu::Choice;
 use crate::gpu::compose::{BUILT_IN, Shaders};

@@ -16,8 +16,9 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::{Semaphore, watch};
 
 use super::guard::Guard;
+use super::messages::{self, Command};
 use super::picture::Frame;
-use super::session::{self, Command, Session};
+use super::session::Session;
 
 /// So many may look at once.
 const VIEWERS: usize = 16;
@@ -82,7 +83,7 @@ impl Listener {
 #[derive(Clone)]
 struct Shared {
     guard: Guard,
-    state: watch::Receiver<Arc<session::State>>,
+    state: watch::Receiver<Arc<messages::State>>,
     frames: watch::Receiver<Option<Arc<Frame>>>,
     send: Arc<dyn Fn(Command) -> bool + Send + Sync>,
     viewers: Arc<Semaphore>,
@@ -154,7 +155,7 @@ enum Ask {
 #[derive(Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Tell<'a> {
-    State(&'a session::State),
+    State(&'a messages::State),
     Pixel {
         x: u32,
         y: u32,

@@ -5,9 +5,9 @@ use std::time::Instant;
 use super::Painter;
 use crate::dev::build::guarded;
 use crate::dev::camera::{Move, moved};
+use crate::dev::messages::{Command, Notice, Report};
 use crate::dev::picture::View;
 use crate::dev::save::save_camera;
-use crate::dev::session::{Command, Notice, Report};
 use crate::dev::source::Loaded;
 use crate::pack::{Camera, Packed, pack_camera};
 

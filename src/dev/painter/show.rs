@@ -7,9 +7,9 @@ use super::Painter;
 use crate::dev::build::guarded;
 use crate::dev::camera::text;
 use crate::dev::diagnostic::Diagnostic;
+use crate::dev::messages::Report;
 use crate::dev::picture::{Content, Frame, Header, Names, View, png_of};
 use crate::dev::save::replace;
-use crate::dev::session::Report;
 
 /// What is wrong, by where it comes from.
 #[derive(Default)]

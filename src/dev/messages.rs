@@ -1,0 +1,104 @@
+//! What reaches the thread that renders, and what it tells those who look.
+
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+
+use super::build::Built;
+use super::camera::Move;
+use super::diagnostic::Diagnostic;
+use super::picture::View;
+use super::source::Snapshot;
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Report {
+    /// Something is wrong.
+    Problem(Diagnostic),
+    /// Nothing is wrong any more.
+    Mended,
+    /// The first picture of a saved file was shown, so many seconds after the save was noticed; if a kernel was compiled,
+    /// that took so many.
+    Reloaded {
+        /// From the save to the picture.
+        seconds: f64,
+        /// To compile.
+        compiled: Option<f64>,
+    },
+    /// The picture has all its samples.
+    Finished {
+        /// Since the first picture.
+        seconds: f64,
+    },
+    /// The camera was written into the scene file, or could not be.
+    Saved(Result<(), String>),
+}
+
+/// What someone who looks asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Command {
+    /// To move the camera.
+    Move(Move),
+    /// The scene file's camera.
+    ResetCamera,
+    /// To write the camera into the scene file.
+    SaveCamera,
+    /// Another view.
+    View(View),
+    /// The factor of the difference of [`View::Compare`].
+    Gain(f32),
+}
+
+/// What is known beside the picture; it goes to the page as JSON.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct State {
+    /// The scene file.
+    pub scene: String,
+    /// The shaders' folder; the program's own if absent.
+    pub shaders: Option<String>,
+    /// The device and its driver.
+    pub device: String,
+    /// What is shown.
+    pub view: View,
+    /// The factor of the difference of [`View::Compare`].
+    pub gain: f32,
+    /// The camera, as the section of a scene file.
+    pub camera: String,
+    /// Whether it is not that of the file.
+    pub camera_moved: bool,
+    /// What is wrong now.
+    pub problems: Vec<Diagnostic>,
+    /// Whether a kernel is being compiled.
+    pub compiling: bool,
+    /// Seconds that the last one took.
+    pub compile_seconds: Option<f64>,
+    /// The last thing that was said, and how many were before it.
+    pub notice: Option<Notice>,
+}
+
+/// An answer to a command.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Notice {
+    /// Counts them.
+    pub number: u64,
+    /// What is said.
+    pub text: String,
+    /// Whether it is bad.
+    pub bad: bool,
+}
+
+/// What reaches the thread that renders.
+pub enum Event {
+    /// The files have changed; noticed at that time.
+    Files(Box<Snapshot>, Instant),
+    /// A kernel has been compiled.
+    Built(Box<Built>),
+    /// Someone asks for something.
+    Command(Command),
+    /// A driver loses its device.
+    #[cfg(test)]
+    Lose,
+    /// The session ends.
+    Stop,
+}
