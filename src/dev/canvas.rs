@@ -9,7 +9,7 @@ use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::gpu::Gpu;
 use crate::image::{Aov, Pixels};
-use crate::job::{Backend, Cut, Steps};
+use crate::job::{Backend, Cut, Order, Steps};
 use crate::pack::{Camera, FirstHit, Packed};
 
 use super::picture::{Content, View, means};
@@ -72,7 +72,7 @@ impl Canvas {
             camera,
             compare: false,
             stage,
-            steps: Steps::new(&Cut::default(), CALL),
+            steps: Steps::new(&Cut::default(), CALL, Order::Pixels),
             under: None,
             cpu: Film::new(Region::whole(0, 0)),
             hits: Vec::new(),
