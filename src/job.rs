@@ -267,3 +267,55 @@ impl Pace {
         (self.work() / (f64::from(band.width()) * f64::from(samples))).max(1.0) as u32
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Notes what it is asked for.
+    struct Notes(Vec<(Region, Range<u32>)>);
+
+    impl Backend for Notes {
+        fn begin(&mut self, _: Region) -> Result<(), RenderError> {
+            Ok(())
+        }
+
+        fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+            self.0.push((tile, samples));
+            Ok(())
+        }
+
+        fn film(&mut self) -> Result<Film, RenderError> {
+            Err(RenderError::Cancelled)
+        }
+
+        fn first_hits(&mut self, _: Region) -> Result<Vec<FirstHit>, RenderError> {
+            Ok(Vec::new())
+        }
+
+        fn largest_film(&self) -> u64 {
+            u64::MAX
+        }
+    }
+
+    #[test]
+    fn rows_get_all_samples_first_or_all_pixels_some() {
+        for (order, first) in [(Order::Rows, 0..16), (Order::Pixels, 0..4)] {
+            let (mut notes, region) = (Notes(Vec::new()), Region::whole(64, 64));
+            let mut steps = Steps::new(&Cut::default(), CALL, order);
+            steps.start(region, 16);
+            while steps.step(&mut notes).unwrap().is_some() {}
+            assert_eq!(notes.0[0].1, first, "{order:?}");
+            // every sample of every pixel once, those of a pixel in their order
+            let mut samples = [0; 64];
+            for (tile, range) in notes.0 {
+                assert_eq!((tile.x0, tile.x1), (0, 64));
+                for done in &mut samples[tile.y0 as usize..tile.y1 as usize] {
+                    assert_eq!(*done, range.start);
+                    *done = range.end;
+                }
+            }
+            assert_eq!(samples, [16; 64], "{order:?}");
+        }
+    }
+}

@@ -1,8 +1,10 @@
 //! The program, driven as a user drives it.
 
 mod bad_input;
+mod commands;
 mod files;
 mod options;
+mod output;
 
 use std::fs;
 use std::path::{Path, PathBuf};

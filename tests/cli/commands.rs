@@ -1,0 +1,89 @@
+//! The commands beside `render`, and the help.
+
+use super::{NO_DRIVER, Place, project_scene};
+
+#[test]
+fn devices_are_listed() {
+    let place = Place::new();
+    let ran = place.run(&["devices"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    for word in ["driver", "largest buffer", "cpu", "auto chooses: "] {
+        assert!(ran.stdout.contains(word), "{word} is missing in {}", ran.stdout);
+    }
+    assert!(!ran.stdout.contains("auto chooses: cpu"));
+    let none = place.run_with(&["devices"], &NO_DRIVER);
+    assert_eq!(none.code, 0);
+    assert!(none.stdout.contains("auto chooses: cpu") && none.stdout.contains("mesa-vulkan-drivers"));
+}
+
+#[test]
+fn good_scenes_pass_the_check_without_a_device() {
+    let place = Place::new();
+    let cornell = project_scene("cornell.toml");
+    let ran = place.run_with(&["check", "small.toml", &cornell], &NO_DRIVER);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let lines: Vec<&str> = ran.stdout.lines().collect();
+    assert_eq!(lines.len(), 2);
+    assert!(
+        lines[0].starts_with("small.toml: good; 10 x 6 pixels, 3 samples each, 4 of light"),
+        "{}",
+        lines[0]
+    );
+    assert!(place.files().is_empty());
+}
+
+#[test]
+fn help_and_version_are_no_errors() {
+    let place = Place::new();
+    for arguments in [
+        &["--help"][..],
+        &["render", "--help"],
+        &["check", "--help"],
+        &["--version"],
+    ] {
+        let ran = place.run(arguments);
+        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{arguments:?}");
+        assert!(ran.stdout.contains("wgray"), "{arguments:?}");
+    }
+    let help = place.run(&["render", "--help"]).stdout;
+    for option in [
+        "--output",
+        "--size",
+        "--spp",
+        "--pixel-samples",
+        "--light-samples",
+        "--seed",
+        "--crop",
+        "--device",
+        "--threads",
+        "--aov",
+        "--stats",
+        "--progress",
+        "--quiet",
+        "--verbose",
+    ] {
+        assert!(help.contains(option), "{option} is not told of");
+    }
+}
+
+#[test]
+fn the_scenes_of_the_documents_are_good() {
+    let place = Place::new();
+    for document in ["README.md", "docs/scene-format.md"] {
+        let text = std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(document)).unwrap();
+        let scenes: Vec<&str> = text
+            .split("```toml\n")
+            .skip(1)
+            .filter_map(|rest| rest.split("```").next())
+            .collect();
+        assert!(
+            scenes.iter().any(|scene| scene.contains("[camera]")),
+            "{document}: no scene was found"
+        );
+        for scene in scenes.into_iter().filter(|scene| scene.contains("[camera]")) {
+            place.write("scene.toml", scene);
+            let ran = place.run(&["check", "scene.toml"]);
+            assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{document}");
+        }
+    }
+}
