@@ -12,6 +12,7 @@ mod dev;
 mod inputs;
 mod kernel;
 mod layout;
+mod loops;
 mod nearly;
 mod oracle;
 mod patterns;

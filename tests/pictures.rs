@@ -48,7 +48,7 @@ pub fn backend<'a>(packed: &'a Packed, way: Way) -> Box<dyn Backend + 'a> {
 }
 
 /// The same with other shaders.
-fn backend_with<'a>(packed: &'a Packed, way: Way, shaders: &Shaders) -> Box<dyn Backend + 'a> {
+pub fn backend_with<'a>(packed: &'a Packed, way: Way, shaders: &Shaders) -> Box<dyn Backend + 'a> {
     if way == Way::Cpu {
         return Box::new(Cpu::new(packed));
     }

@@ -38,11 +38,16 @@ pub fn edited(text: &str, from: &str, to: &str) -> String {
 
 /// The shaders with another text of a file.
 pub fn shaders_with(file: &str, text: &str) -> Shaders {
+    with(shaders(), file, text)
+}
+
+/// Other shaders with another text of a file.
+pub fn with(shaders: &Shaders, file: &str, text: &str) -> Shaders {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, _) in wgray::gpu::compose::BUILT_IN {
         let path = folder.path().join(name);
         fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
-        let text = if *name == file { text } else { shaders().text(name) };
+        let text = if *name == file { text } else { shaders.text(name) };
         fs::write(path, text).expect("a copy of a shader");
     }
     Shaders::read(folder.path()).expect("the copies")

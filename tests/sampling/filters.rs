@@ -84,12 +84,12 @@ fn tables_have_the_moments_of_their_filters() {
     for kind in KINDS {
         for radius in [0.3, 1.0, 2.5] {
             let table = table(checked(kind, radius));
-            assert_eq!(table.len(), BINS as usize + 1);
-            assert_eq!((table[0].x, table[BINS as usize].x), (0.0, radius as f32));
-            assert!(table.windows(2).all(|bin| bin[0].x < bin[1].x), "{kind:?}");
-            let weights = &table[..BINS as usize];
-            assert!(weights.iter().all(|bin| (0.9..1.1).contains(&bin.y.abs())), "{kind:?}");
-            let negative = weights.iter().filter(|bin| bin.y < 0.0).count();
+            assert_eq!(table.len(), BINS as usize);
+            assert_eq!((table[0].x, table[BINS as usize - 1].y), (0.0, radius as f32));
+            assert!(table.iter().all(|bin| bin.x < bin.y), "{kind:?}");
+            assert!(table.windows(2).all(|bin| bin[0].y == bin[1].x), "{kind:?}");
+            assert!(table.iter().all(|bin| (0.9..1.1).contains(&bin.z.abs())), "{kind:?}");
+            let negative = table.iter().filter(|bin| bin.z < 0.0).count();
             assert_eq!(negative > 0, kind == PixelFilterKind::Mitchell);
             for power in [1, 2, 4] {
                 let expected = moment(kind, power) / moment(kind, 0) * radius.powi(power);

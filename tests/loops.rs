@@ -1,0 +1,206 @@
+//! No picture is cut short. Mesa 22.3's software Vulkan ends all loops of an invocation once they have gone round 65,535
+//! times together, without a word; `shaders/receipt.wgsl` tells. Each test holds on drivers without such a limit too.
+
+use wgray::error::RenderError;
+use wgray::film::Film;
+use wgray::gpu::compose::Shaders;
+use wgray::job::{self, Cut};
+use wgray::pack::Packed;
+use wgray::scene::{AdaptiveDescription, Description, Pattern, ShapeDescription, SphereDescription};
+
+use crate::pictures::{Way, backend_with, differing, exact_ways, reference, render, whole};
+use crate::sources::{self, edited, edited_shaders, with};
+use crate::{adapter, patterns, scenes};
+
+/// A scene as small as this, with these samples of a pixel and of an area light.
+fn small(name: &str, size: (u32, u32), pixel_samples: u32, light_samples: u32) -> Description {
+    let mut d = scenes::scene(name);
+    (d.image.width, d.image.height) = size;
+    d.render.pixel_samples = patterns::samples(Pattern::Grid, pixel_samples);
+    d.render.light_samples = patterns::samples(Pattern::Grid, light_samples);
+    d
+}
+
+/// A scene with so many spheres, which all reach into the picture.
+fn spheres(count: u32) -> Description {
+    let mut d = small("cornell.toml", (4, 3), 1, 1);
+    let Some(material) = d.materials.keys().next().cloned() else {
+        panic!("a scene without materials")
+    };
+    d.shapes.extend((0..count).map(|i| {
+        let at = |k: u32| f64::from(i.wrapping_mul(k) % 1009) / 1009.0;
+        ShapeDescription::Sphere(SphereDescription {
+            material: material.clone(),
+            center: [1.8 * at(7) - 0.9, 1.8 * at(31) - 0.9, 1.8 * at(131) + 0.1].into(),
+            radius: 0.003,
+        })
+    }));
+    d
+}
+
+/// The whole picture by other shaders, or why there is none.
+fn attempt(packed: &Packed, way: Way, shaders: &Shaders) -> Result<Film, RenderError> {
+    let mut backend = backend_with(packed, way, shaders);
+    let mut film = Film::new(whole(packed));
+    let mut take = |rendered| {
+        film = rendered;
+        Ok(())
+    };
+    job::render(
+        &mut *backend,
+        whole(packed),
+        packed.pixel_samples,
+        &Cut::default(),
+        &mut |_| true,
+        &mut take,
+    )?;
+    Ok(film)
+}
+
+/// Shaders that go round a loop so many times, in a call of the first sample, and add how often they did to what is red.
+fn looping(rounds: u32) -> Shaders {
+    assert_eq!(rounds % 4, 0);
+    let (file, store) = ("kernels/render.wgsl", "    film[index] = sum;");
+    let looping = format!(
+        "    var rounds = 0u;
+    for (var i = 0u; i < work.proof.y * work.samples.y * {}u; i++) {{
+        rounds++;
+    }}
+    sum.r += f32(rounds);
+{store}",
+        rounds / 4
+    );
+    edited_shaders(file, store, &looping)
+}
+
+/// Whether a film of one sample is what the shaders of [`looping`] should make of a scene.
+fn has_rounds(film: &Film, plain: &Film, rounds: u32) -> bool {
+    let right = |(a, b): (&glam::Vec4, &glam::Vec4)| a.x == b.x + rounds as f32 && a.y == b.y;
+    film.sums.iter().zip(&plain.sums).all(right)
+}
+
+/// Whether the driver under test ends loops early: whether it does so where nothing watches.
+fn driver_cuts_loops() -> bool {
+    const ROUNDS: u32 = 1_000_000;
+    let packed = scenes::packed(&small("cornell.toml", (2, 2), 1, 1));
+    let unwatched = without_check(&looping(ROUNDS));
+    let film = attempt(&packed, Way::Buffers, &unwatched).expect("nothing that watches");
+    !has_rounds(&film, &reference(&packed), ROUNDS)
+}
+
+/// Shaders that sign whatever happened.
+fn without_check(shaders: &Shaders) -> Shaders {
+    let text = edited(shaders.text("receipt.wgsl"), "atomicStore(&receipt.cut, 1u);", "");
+    with(shaders, "receipt.wgsl", &text)
+}
+
+#[test]
+fn long_pictures_are_whole() {
+    let mut adaptive = small("cornell.toml", (5, 4), 64, 64);
+    adaptive.render.pixel_samples.pattern = Pattern::Sobol;
+    adaptive.render.adaptive = Some(AdaptiveDescription {
+        error: 0.0,
+        max_samples: Some(512),
+    });
+    for (name, description) in [
+        ("many samples", small("cornell.toml", (8, 4), 1024, 256)),
+        ("many light samples", small("cornell.toml", (6, 5), 2, 4096)),
+        ("three lights", small("lights.toml", (8, 5), 144, 64)),
+        ("mirrors and glass", small("mirror-glass.toml", (8, 6), 100, 64)),
+        ("textures", small("textures.toml", (8, 6), 100, 64)),
+        ("many spheres", {
+            let mut d = spheres(100);
+            d.render.pixel_samples = patterns::samples(Pattern::Grid, 256);
+            d.render.light_samples = patterns::samples(Pattern::Grid, 64);
+            d
+        }),
+        ("adaptive", adaptive),
+    ] {
+        let packed = scenes::packed(&description);
+        let cpu = reference(&packed);
+        for way in exact_ways().into_iter().skip(1) {
+            assert_eq!(differing(&render(&packed, way), &cpu), 0, "{name}, {way:?}");
+        }
+    }
+    // Quotients and square roots by software have loops, or may have: the same promise.
+    if adapter::device().is_some_and(adapter::bit_exact) {
+        let packed = scenes::packed(&small("cornell.toml", (2, 2), 256, 64));
+        assert_eq!(differing(&render(&packed, Way::Rounded), &reference(&packed)), 0);
+    }
+}
+
+#[test]
+fn a_sample_that_is_too_long_is_an_error_or_right() {
+    if adapter::device().is_none() {
+        return;
+    }
+    let cuts = driver_cuts_loops();
+    for (name, description, way) in [
+        ("light samples", small("cornell.toml", (2, 2), 1, 65_536), Way::Baked),
+        ("light samples", small("cornell.toml", (2, 2), 1, 65_536), Way::Buffers),
+        ("spheres", spheres(70_000), Way::Buffers),
+    ] {
+        let packed = scenes::packed(&description);
+        match attempt(&packed, way, sources::shaders()) {
+            Ok(film) => {
+                assert!(!cuts, "{name}, {way:?}: it is too long for this driver");
+                assert_eq!(differing(&film, &reference(&packed)), 0, "{name}, {way:?}");
+            }
+            Err(RenderError::CutShort { .. }) => assert!(cuts, "{name}, {way:?}: nothing cuts it short"),
+            Err(error) => panic!("{name}, {way:?}: {error}"),
+        }
+    }
+    let packed = scenes::packed(&spheres(70_000));
+    let mut backend = backend_with(&packed, Way::Buffers, sources::shaders());
+    match job::first_hits(&mut *backend, whole(&packed)) {
+        Ok(hits) => {
+            assert!(!cuts, "first hits of so many spheres are too long for this driver");
+            let cpu = crate::pictures::first_hits(&packed, Way::Cpu);
+            assert_eq!(
+                bytemuck::cast_slice::<_, u8>(&hits),
+                bytemuck::cast_slice::<_, u8>(&cpu)
+            );
+        }
+        Err(error) => assert!(cuts && matches!(error, RenderError::CutShort { .. }), "{error}"),
+    }
+}
+
+#[test]
+fn a_long_loop_of_an_edited_shader_is_an_error_or_right() {
+    if adapter::device().is_none() {
+        return;
+    }
+    let packed = scenes::packed(&small("cornell.toml", (3, 2), 1, 1));
+    let plain = reference(&packed);
+    let cuts = driver_cuts_loops();
+    for (rounds, too_long) in [(4, false), (60_000, false), (66_000, true), (1_000_000, true)] {
+        match attempt(&packed, Way::Buffers, &looping(rounds)) {
+            Ok(film) => {
+                assert!(!(cuts && too_long), "{rounds} rounds were not noticed");
+                assert!(has_rounds(&film, &plain, rounds), "{rounds} rounds: a wrong picture");
+            }
+            Err(RenderError::CutShort { .. }) => assert!(cuts && too_long, "{rounds} rounds are not too many"),
+            Err(error) => panic!("{rounds} rounds: {error}"),
+        }
+    }
+    // A kernel that does not sign is not believed, whatever the driver.
+    let unsigned = edited_shaders("receipt.wgsl", "atomicAdd(&receipt.ended, 1u);", "");
+    let device = adapter::device().expect("a device");
+    let options = wgray::gpu::Options {
+        exact: None,
+        baked: false,
+    };
+    let refused = wgray::gpu::Gpu::new(device, &packed, &unsigned, options).err();
+    assert!(matches!(refused, Some(RenderError::CutShort { .. })), "{refused:?}");
+}
+
+/// Negative control: where the driver cuts loops and nothing watches, a picture is wrong.
+#[test]
+fn without_the_check_wrong_pictures_would_be_made() {
+    if adapter::device().is_none() || !driver_cuts_loops() {
+        return;
+    }
+    let packed = scenes::packed(&small("cornell.toml", (2, 2), 1, 65_536));
+    let film = attempt(&packed, Way::Baked, &without_check(sources::shaders())).expect("nothing that watches");
+    assert!(differing(&film, &reference(&packed)) > 0);
+}
