@@ -10,6 +10,14 @@ use crate::pack::{BLOCK, Light, Material, Packed, Primitive, Specialization, Sph
 
 /// Larger scenes are read from buffers: compiling grows with every primitive.
 pub const MOST_PRIMITIVES: usize = 64;
+/// Likewise with every material, light and texture, and faster than in proportion.
+pub const MOST_RECORDS: usize = 512;
+
+/// [`bake`], if the scene is small enough.
+pub fn bake_if_small(packed: &Packed) -> Option<String> {
+    let records = packed.materials.len() + packed.lights.len() + packed.textures.len();
+    (packed.primitives.len() <= MOST_PRIMITIVES && records <= MOST_RECORDS).then(|| bake(packed))
+}
 
 /// What the shaders call a primitive of each kind, by [`Primitive::kind`].
 const KINDS: [&str; 4] = ["rectangle", "triangle", "ellipsoid", "plane"];

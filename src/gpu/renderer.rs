@@ -6,7 +6,7 @@ use bytemuck::{Pod, bytes_of};
 use glam::{UVec2, Vec4};
 use wgpu::BufferUsages;
 
-use super::bake::{MOST_PRIMITIVES, bake};
+use super::bake::bake_if_small;
 use super::compose::{Kernel, Shaders};
 use super::device::Device;
 use super::pipeline::{WORKGROUP, bind_group_layout, pipeline};
@@ -110,7 +110,7 @@ impl Gpu {
     pub fn new(device: &Device, packed: &Packed, shaders: &Shaders, options: Options) -> Result<Gpu, RenderError> {
         let kernels = Kernels {
             shaders: shaders.clone(),
-            baked: (options.baked && packed.primitives.len() <= MOST_PRIMITIVES).then(|| bake(packed)),
+            baked: options.baked.then(|| bake_if_small(packed)).flatten(),
             constants: packed.specialization,
             layout: bind_group_layout(device),
             exact: options.exact,

@@ -1,6 +1,6 @@
 //! All kernels of a scene, checked without a device.
 
-use super::bake::{MOST_PRIMITIVES, bake};
+use super::bake::bake_if_small;
 use super::compile::check;
 use super::compose::{Kernel, Shaders};
 use super::rounding::Rounding;
@@ -10,7 +10,7 @@ use crate::pack::Packed;
 /// Compiles every kernel for a scene, to SPIR-V, as far as that goes without a driver: with the scene in buffers and, if
 /// it is small enough, as constants.
 pub fn check_kernels(packed: &Packed, shaders: &Shaders) -> Result<(), ShaderError> {
-    let baked = (packed.primitives.len() <= MOST_PRIMITIVES).then(|| bake(packed));
+    let baked = bake_if_small(packed);
     for kernel in [Kernel::Render, Kernel::Aov] {
         for scene in [None, baked.as_deref()]
             .into_iter()

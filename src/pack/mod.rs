@@ -4,6 +4,7 @@ mod appearance;
 mod blocking;
 mod bounds;
 mod constants;
+mod extent_tree;
 pub mod filter;
 mod layout;
 mod pyramid;

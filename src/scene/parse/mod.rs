@@ -1,6 +1,8 @@
 //! From the text of a scene file to its [`Description`], and from a key path to its line.
 
-use std::collections::BTreeMap;
+mod parts;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use serde::Deserialize;
@@ -8,8 +10,9 @@ use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
-use super::description::Description;
+use self::parts::{Broken, Kind, LARGEST, Parts};
 use super::description::tagged::{ReadError, Tagged};
+use super::description::{Description, LightDescription, MaterialDescription, ShapeDescription, TextureDescription};
 use super::error::{At, KeyPath, Problem, SceneError, Segment};
 
 impl Description {
@@ -19,11 +22,17 @@ impl Description {
     ///
     /// Text that is no TOML, unknown and missing keys, unknown types, and values of the wrong type.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SceneError> {
-        let table = toml::from_str(text).map_err(|error: toml::de::Error| {
-            let start = error.span().map_or(0, |span| span.start);
-            syntax_error(text, origin, start, error.message())
-        })?;
-        read_file(table).map_err(|problem| invalid(text, origin, problem))
+        let broken = |broken: Broken| syntax_error(text, origin, broken.at, &broken.message);
+        let parts = Parts::of(text);
+        if let Some(large) = parts.too_large() {
+            return Err(broken(large));
+        }
+        let read = match read_parts(&parts).map_err(broken)? {
+            Some(read) => read,
+            None if text.len() > LARGEST => return Err(broken(Broken::whole(text))),
+            None => read_file(toml::from_str(text).map_err(|error| broken(Broken::of(0, &error)))?),
+        };
+        read.map_err(|problem| invalid(text, origin, problem))
     }
 }
 
@@ -50,8 +59,19 @@ pub(super) fn invalid(text: &str, origin: &str, problem: Problem) -> SceneError 
 
 /// The line, from 1, of the key at the end of a path; of its innermost table that is there if it is not.
 fn locate(text: &str, path: &KeyPath) -> usize {
+    let parts = Parts::of(text);
+    let at = match parts.find(path) {
+        Some((part, path)) => part.place.start + place_in(parts.text(part), &path),
+        None if text.len() > LARGEST => place_in(&parts.rest(), path),
+        None => place_in(text, path),
+    };
+    line_number(text, at)
+}
+
+/// The byte where the key at the end of a path begins.
+fn place_in(text: &str, path: &KeyPath) -> usize {
     let Ok(document) = DeTable::parse(text) else {
-        return 1;
+        return 0;
     };
     let mut at = 0;
     let mut value = &DeValue::Table(document.into_inner());
@@ -68,7 +88,7 @@ fn locate(text: &str, path: &KeyPath) -> usize {
         at = span.start;
         value = inner.get_ref();
     }
-    line_number(text, at)
+    at
 }
 
 fn line_number(text: &str, at: usize) -> usize {
@@ -105,6 +125,81 @@ fn read_file(file: Table) -> Result<Description, Problem> {
         lights: read_list(sections.lights).at("lights")?,
         shapes: read_list(sections.shapes).at("shapes")?,
     })
+}
+
+/// What was read of the parts of one kind, or the first problem among them.
+type Read<T> = Result<T, Problem>;
+
+/// A file's description from its parts, one after the other; `None` if they depend on each other, and the file must be
+/// read as a whole.
+fn read_parts(parts: &Parts) -> Result<Option<Read<Description>>, Broken> {
+    let rest = parts.read_rest();
+    let mut names = BTreeSet::new();
+    let mut textures: Read<BTreeMap<String, TextureDescription>> = Ok(BTreeMap::new());
+    let mut materials: Read<BTreeMap<String, MaterialDescription>> = Ok(BTreeMap::new());
+    let mut lights: Read<Vec<LightDescription>> = Ok(Vec::new());
+    let mut shapes: Read<Vec<ShapeDescription>> = Ok(Vec::new());
+    for part in &parts.parts {
+        match &rest {
+            // What comes first in the text is told first.
+            Err(broken) if broken.at < part.place.start => break,
+            Ok(rest) if rest.contains_key(part.kind.name()) => return Ok(None),
+            _ => {}
+        }
+        let Some((name, table)) = parts.read(part)? else {
+            return Ok(None);
+        };
+        if let Some(name) = &name
+            && !names.insert((part.kind.name(), name.clone()))
+        {
+            return parts.twice(name, part).map_or(Ok(None), Err);
+        }
+        match (part.kind, name) {
+            (Kind::Textures, Some(name)) => add_named(&mut textures, name, table),
+            (Kind::Materials, Some(name)) => add_named(&mut materials, name, table),
+            (Kind::Lights, None) => add(&mut lights, table),
+            (Kind::Shapes, None) => add(&mut shapes, table),
+            _ => return Ok(None),
+        }
+    }
+    let others = read_file(rest?);
+    let has = |kind: Kind| parts.parts.iter().any(|part| part.kind == kind);
+    let together = |mut all: Description| {
+        // A kind is in parts or in what is outside of them, not in both.
+        if has(Kind::Textures) {
+            all.textures = textures.at("textures")?;
+        }
+        if has(Kind::Materials) {
+            all.materials = materials.at("materials")?;
+        }
+        if has(Kind::Lights) {
+            all.lights = lights.at("lights")?;
+        }
+        if has(Kind::Shapes) {
+            all.shapes = shapes.at("shapes")?;
+        }
+        Ok(all)
+    };
+    Ok(Some(others.and_then(together)))
+}
+
+/// After a problem no more is read.
+fn add_named<T: Tagged>(read: &mut Read<BTreeMap<String, T>>, name: String, table: Table) {
+    let Ok(map) = read else { return };
+    match read_tagged(table, None).at(name.as_str()) {
+        Ok(value) => {
+            map.insert(name, value);
+        }
+        Err(problem) => *read = Err(problem),
+    }
+}
+
+fn add<T: Tagged>(read: &mut Read<Vec<T>>, table: Table) {
+    let Ok(list) = read else { return };
+    match read_tagged(table, None).at(list.len()) {
+        Ok(value) => list.push(value),
+        Err(problem) => *read = Err(problem),
+    }
 }
 
 fn read_map<T: Tagged>(tables: BTreeMap<String, Table>) -> Result<BTreeMap<String, T>, Problem> {

@@ -131,11 +131,8 @@ impl Textures<'_> {
                 false => format!("{name:?} is no texture; there are {}", list(&self.names)),
             })
         };
-        self.names
-            .iter()
-            .position(|known| *known == name)
-            .ok_or_else(unknown)
-            .at("texture")
+        // The names are sorted, as those of a map.
+        self.names.binary_search(&name).map_err(|_| unknown()).at("texture")
     }
 
     fn color(&self, description: &ColorDescription) -> Checked<Color> {
