@@ -1,6 +1,7 @@
 //! Materials and their textures as records, and images as pyramids of texels.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use glam::{DVec3, UVec4, Vec3};
 
@@ -10,7 +11,7 @@ use super::{
     MIRRORED, Material, NEAREST, PHONG, REPEAT, SRGB8, TRILINEAR, Texture,
 };
 use crate::pack::BILINEAR;
-use crate::scene::{self, Color, Encoding, Filter, Scene, Texels, TexturePattern, Wrap};
+use crate::scene::{self, Color, Encoding, Filter, Image, Scene, Texels, TexturePattern, Wrap};
 
 /// The records of a scene's materials and of the textures that they use.
 #[derive(Default)]
@@ -18,8 +19,10 @@ pub struct Appearances {
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
     pub texels: Vec<u32>,
-    /// Where the pyramids of the scene's textures are.
+    /// Where the pyramids of the scene's images are, by the images' addresses.
     places: BTreeMap<usize, u32>,
+    /// How many levels their textures need.
+    levels: BTreeMap<usize, u32>,
     /// The records of the scene's textures, apart for each strength as a normal map.
     records: BTreeMap<(usize, Option<u64>), u32>,
 }
@@ -27,6 +30,12 @@ pub struct Appearances {
 impl Appearances {
     pub fn of(scene: &Scene) -> Appearances {
         let mut appearances = Appearances::default();
+        for texture in &scene.textures {
+            if let TexturePattern::Image { image, filter, .. } = &texture.pattern {
+                let levels = appearances.levels.entry(address(image)).or_default();
+                *levels = levels_of(image, *filter).max(*levels);
+            }
+        }
         for material in &scene.materials {
             let material = appearances.material(scene, material);
             appearances.materials.push(material);
@@ -168,7 +177,9 @@ impl Appearances {
                     Some(s) => between(DVec3::new(-s, -s, -1.0), DVec3::new(s, s, 1.0)),
                     None => between(DVec3::ZERO, DVec3::ONE),
                 };
-                let levels = if filter.needs_levels() { image.levels() } else { 1 };
+                let levels = levels_of(image, *filter);
+                let address = address(image);
+                let most_levels = self.levels.get(&address).map_or(levels, |most| levels.max(*most));
                 let texels = &mut self.texels;
                 Texture {
                     first,
@@ -190,7 +201,7 @@ impl Appearances {
                         Wrap::Clamp => CLAMP,
                         Wrap::Mirror => MIRRORED,
                     },
-                    texels: *self.places.entry(i).or_insert_with(|| pyramid(image, levels, texels)),
+                    texels: *(self.places.entry(address)).or_insert_with(|| pyramid(image, most_levels, texels)),
                     width: image.width,
                     height: image.height,
                     levels,
@@ -203,6 +214,15 @@ impl Appearances {
         self.records.insert(key, number);
         number
     }
+}
+
+/// What tells a scene's images apart while it stands.
+fn address(image: &Arc<Image>) -> usize {
+    Arc::as_ptr(image).addr()
+}
+
+fn levels_of(image: &Image, filter: Filter) -> u32 {
+    if filter.needs_levels() { image.levels() } else { 1 }
 }
 
 /// The lookups of a material: each texture once, with all its purposes.

@@ -10,22 +10,31 @@ use crate::scene::{Encoding, Image, Texels};
 pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
     let table = texels.len();
     texels.resize(table + levels as usize, 0);
-    let mut level = finest(image);
+    let (width, height) = (image.width as usize, image.height as usize);
+    let finest = finest(image);
+    // The finest level is not kept in linear light: it would take six times the memory of its texels.
+    let mut level = None;
     for i in 0..levels as usize {
         texels[table + i] = texels.len() as u32;
-        match &image.texels {
-            Texels::Bytes(encoding, _) => texels.extend(level.texels.iter().map(|c| packed(*c, *encoding))),
-            Texels::Floats(_) => texels.extend(
-                level
-                    .texels
-                    .iter()
-                    .flat_map(|c| c.as_vec3().to_array())
-                    .map(f32::to_bits),
-            ),
+        match &level {
+            None => write_level(image, (0..width * height).map(&finest), texels),
+            Some(Level { texels: colors, .. }) => write_level(image, colors.iter().copied(), texels),
         }
-        level = level.half();
+        if i + 1 < levels as usize {
+            level = Some(match &level {
+                None => half(width, height, &finest),
+                Some(level) => half(level.width, level.height, |i| level.texels[i]),
+            });
+        }
     }
     table as u32
+}
+
+fn write_level(image: &Image, colors: impl Iterator<Item = DVec3>, texels: &mut Vec<u32>) {
+    match &image.texels {
+        Texels::Bytes(encoding, _) => texels.extend(colors.map(|c| packed(c, *encoding))),
+        Texels::Floats(_) => texels.extend(colors.flat_map(|c| c.as_vec3().to_array()).map(f32::to_bits)),
+    }
 }
 
 /// A level in linear light.
@@ -35,7 +44,8 @@ struct Level {
     texels: Vec<DVec3>,
 }
 
-fn finest(image: &Image) -> Level {
+/// The texels of the finest level, row by row from the bottom.
+fn finest(image: &Image) -> impl Fn(usize) -> DVec3 {
     let (width, height) = (image.width as usize, image.height as usize);
     let texel: Box<dyn Fn(usize) -> DVec3> = match &image.texels {
         Texels::Bytes(encoding, bytes) => {
@@ -48,29 +58,28 @@ fn finest(image: &Image) -> Level {
         }
         Texels::Floats(floats) => Box::new(|i| DVec3::from_array(floats[i].map(f64::from))),
     };
-    let rows = (0..height).rev();
-    let texels = rows.flat_map(|y| (y * width..(y + 1) * width).map(&texel)).collect();
-    Level { width, height, texels }
+    move |i| texel((height - 1 - i / width) * width + i % width)
 }
 
-impl Level {
-    /// The next level: each texel the mean over the part of this level that it covers.
-    fn half(&self) -> Level {
-        let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
-        let (columns, rows) = (covers(self.width, width), covers(self.height, height));
-        let mut texels = Vec::with_capacity(width * height);
-        for row in &rows {
-            for column in &columns {
-                let mut sum = DVec3::ZERO;
-                for (y, v) in row {
-                    for (x, u) in column {
-                        sum += self.texels[y * self.width + x] * (u * v);
-                    }
+/// The level after one: each texel the mean over the part of that level that it covers.
+fn half(width: usize, height: usize, texel: impl Fn(usize) -> DVec3) -> Level {
+    let (columns, rows) = (covers(width, (width / 2).max(1)), covers(height, (height / 2).max(1)));
+    let mut texels = Vec::with_capacity(columns.len() * rows.len());
+    for row in &rows {
+        for column in &columns {
+            let mut sum = DVec3::ZERO;
+            for (y, v) in row {
+                for (x, u) in column {
+                    sum += texel(y * width + x) * (u * v);
                 }
-                texels.push(sum);
             }
+            texels.push(sum);
         }
-        Level { width, height, texels }
+    }
+    Level {
+        width: columns.len(),
+        height: rows.len(),
+        texels,
     }
 }
 

@@ -1,18 +1,17 @@
 //! Image files that textures name: found, decoded within limits, and checked.
 
-use std::fs::File;
-use std::io::{Cursor, Read as _};
+use std::fs;
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageFormat};
 
+use super::decode::{Header, LONGEST_SIDE, Refused, decode};
 use super::texture::{Encoding, Image, Texels};
 
-/// Most texels along a side.
-const LONGEST_SIDE: u32 = 16_384;
-/// The largest file, and the largest memory that decoding may take, in bytes.
+/// The largest file, in bytes.
 const LARGEST_FILE: u64 = 256 << 20;
-const LARGEST_IMAGE: u64 = 512 << 20;
 /// The largest texel, as of any colour.
 const BRIGHTEST: f32 = 1e6;
 
@@ -38,20 +37,21 @@ impl Assets {
         }
     }
 
-    /// Reads an image. `encoding` is what its values mean, if that is said. The error is the value with the rule.
-    pub(super) fn image(&self, file: &str, encoding: Option<Encoding>) -> Result<Image, String> {
-        let bytes = self.read(file)?;
+    /// Reads an image. `encoding` is what its values mean, if that is said; `fits` is asked before anything is decoded. The
+    /// error is the value with the rule.
+    pub(super) fn image(
+        &self,
+        file: &str,
+        path: &Path,
+        encoding: Option<Encoding>,
+        fits: impl Fn(Header) -> Result<(), String>,
+    ) -> Result<File, String> {
+        let bytes = read(file, path)?;
         let format = image::guess_format(&bytes)
             .ok()
             .filter(|format| NAMES.iter().any(|(known, _)| known == format));
         let format = format.ok_or_else(|| format!("{file:?} must be a PNG, JPEG, EXR or HDR file"))?;
-        let named = ImageFormat::from_path(file).ok();
-        if named.is_some_and(|named| named != format) {
-            return Err(format!(
-                "{file:?} must be what its name says; it is a file of type {}",
-                name(format)
-            ));
-        }
+        check_name(file, format)?;
         let is_float = matches!(format, ImageFormat::OpenExr | ImageFormat::Hdr);
         if is_float && encoding == Some(Encoding::Srgb) {
             return Err(format!(
@@ -59,23 +59,22 @@ impl Assets {
                 name(format)
             ));
         }
-        let mut reader = ImageReader::with_format(Cursor::new(&bytes), format);
-        let mut limits = Limits::default();
-        limits.max_image_width = Some(LONGEST_SIDE);
-        limits.max_image_height = Some(LONGEST_SIDE);
-        limits.max_alloc = Some(LARGEST_IMAGE);
-        reader.limits(limits);
-        let decoded = reader.decode().map_err(|error| {
-            let sides = format!("sound, and have at most {LONGEST_SIDE} texels along a side");
-            format!("{file:?} must be {sides}: {error}")
+        let decoded = decode(&bytes, format, fits).map_err(|refused| match refused {
+            Refused::Rule(rule) => rule,
+            Refused::Image(error) => {
+                let sides = format!("sound, and have at most {LONGEST_SIDE} texels along a side");
+                format!("{file:?} must be {sides}: {error}")
+            }
         })?;
+        drop(bytes);
         let (width, height) = (decoded.width(), decoded.height());
         if width == 0 || height == 0 {
             return Err(format!(
                 "{file:?} must have a texel at least; its size is {width} x {height}"
             ));
         }
-        let texels = texels(decoded, is_float, encoding.unwrap_or(Encoding::Srgb));
+        let default = if is_float { Encoding::Linear } else { Encoding::Srgb };
+        let texels = texels(decoded, is_float, encoding.unwrap_or(default));
         if let Texels::Floats(values) = &texels {
             let bad = |value: &f32| !(0.0..=BRIGHTEST).contains(value);
             if let Some(i) = values.iter().position(|texel| texel.iter().any(bad)) {
@@ -85,12 +84,18 @@ impl Assets {
                 return Err(format!("{file:?} has the texel [{r}, {g}, {b}] at ({x}, {y}); {rule}"));
             }
         }
-        Ok(Image { width, height, texels })
+        Ok(File {
+            image: Arc::new(Image { width, height, texels }),
+            format,
+            default,
+            encoding: encoding.unwrap_or(default),
+        })
     }
 
-    fn read(&self, file: &str) -> Result<Vec<u8>, String> {
-        let unreadable = |error: std::io::Error| format!("{file:?} cannot be read: {error}");
-        let path = self.folder.join(file).canonicalize().map_err(unreadable)?;
+    /// Where a file is.
+    pub(super) fn find(&self, file: &str) -> Result<PathBuf, String> {
+        let path = self.folder.join(file).canonicalize();
+        let path = path.map_err(|error| unreadable(file, &error))?;
         let root = self.root.canonicalize().map_err(|error| {
             let root = self.root.display();
             format!("{file:?} must lie in {root}, which cannot be found: {error}")
@@ -102,17 +107,54 @@ impl Assets {
         if !path.is_file() {
             return Err(format!("{file:?} must be a file"));
         }
-        let mut bytes = Vec::new();
-        let file_handle = File::open(&path).map_err(unreadable)?;
-        file_handle
-            .take(LARGEST_FILE + 1)
-            .read_to_end(&mut bytes)
-            .map_err(unreadable)?;
-        if bytes.len() as u64 > LARGEST_FILE {
-            return Err(format!("{file:?} must not be larger than {} MiB", LARGEST_FILE >> 20));
-        }
-        Ok(bytes)
+        Ok(path)
     }
+}
+
+/// A file that was read.
+#[derive(Clone)]
+pub(super) struct File {
+    pub image: Arc<Image>,
+    format: ImageFormat,
+    default: Encoding,
+    encoding: Encoding,
+}
+
+impl File {
+    /// Whether it is what another texture names, by another name perhaps, with this encoding.
+    pub fn is(&self, encoding: Option<Encoding>) -> bool {
+        encoding.unwrap_or(self.default) == self.encoding
+    }
+
+    /// Refuses a name that says another format.
+    pub fn check_name(&self, file: &str) -> Result<(), String> {
+        check_name(file, self.format)
+    }
+}
+
+fn check_name(file: &str, format: ImageFormat) -> Result<(), String> {
+    match ImageFormat::from_path(file) {
+        Ok(named) if named != format => Err(format!(
+            "{file:?} must be what its name says; it is a file of type {}",
+            name(format)
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn read(file: &str, path: &Path) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    fs::File::open(path)
+        .and_then(|opened| opened.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
+        .map_err(|error| unreadable(file, &error))?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(format!("{file:?} must not be larger than {} MiB", LARGEST_FILE >> 20));
+    }
+    Ok(bytes)
+}
+
+fn unreadable(file: &str, error: &io::Error) -> String {
+    format!("{file:?} cannot be read: {error}")
 }
 
 const NAMES: [(ImageFormat, &str); 4] = [
@@ -144,7 +186,13 @@ fn texels(image: DynamicImage, is_float: bool, encoding: Encoding) -> Texels {
         };
         return Texels::Floats(image.into_rgb16().pixels().map(|texel| texel.0.map(decode)).collect());
     }
-    Texels::Bytes(encoding, image.into_rgb8().pixels().map(|texel| texel.0).collect())
+    let bytes = match image {
+        DynamicImage::ImageLuma8(gray) => gray.pixels().map(|texel| [texel.0[0]; 3]).collect(),
+        DynamicImage::ImageLumaA8(gray) => gray.pixels().map(|texel| [texel.0[0]; 3]).collect(),
+        DynamicImage::ImageRgba8(colors) => colors.pixels().map(|texel| [texel.0[0], texel.0[1], texel.0[2]]).collect(),
+        colors => colors.into_rgb8().pixels().map(|texel| texel.0).collect(),
+    };
+    Texels::Bytes(encoding, bytes)
 }
 
 /// The linear value of one by the sRGB curve: IEC 61966-2-1.

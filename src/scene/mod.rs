@@ -3,6 +3,7 @@
 //! The way from the file: text → [`Description`] (what it says, field for field) → [`Scene`] (by
 //! [`Description::validate`] alone). Nothing behind a `Scene` checks again.
 
+mod decode;
 mod description;
 mod error;
 pub(crate) mod image_file;

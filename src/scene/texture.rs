@@ -134,16 +134,19 @@ pub enum Texels {
 impl Image {
     /// Levels of its pyramid: each half the size of the one before, down to one texel.
     pub fn levels(&self) -> u32 {
-        self.width.max(self.height).ilog2() + 1
+        levels(self.width, self.height)
     }
+}
 
-    /// 32-bit words that so many levels take, with the table of their places.
-    pub fn words(&self, levels: u32) -> u64 {
-        let texel = match self.texels {
-            Texels::Bytes(..) => 1,
-            Texels::Floats(_) => 3,
-        };
-        let sizes = (0..levels).map(|i| u64::from((self.width >> i).max(1)) * u64::from((self.height >> i).max(1)));
-        u64::from(levels) + texel * sizes.sum::<u64>()
-    }
+/// Levels of an image of this size.
+pub(super) fn levels(width: u32, height: u32) -> u32 {
+    width.max(height).max(1).ilog2() + 1
+}
+
+/// 32-bit words that so many levels of an image take, with the table of their places: a texel takes one, or three if its
+/// values are floats.
+pub(super) fn words(width: u32, height: u32, levels: u32, is_float: bool) -> u64 {
+    let texel = if is_float { 3 } else { 1 };
+    let sizes = (0..levels).map(|i| u64::from((width >> i).max(1)) * u64::from((height >> i).max(1)));
+    u64::from(levels) + texel * sizes.sum::<u64>()
 }

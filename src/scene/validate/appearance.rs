@@ -1,17 +1,21 @@
 //! The rules of materials and textures.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::super::decode::Header;
+use super::super::image_file::File;
+use super::super::texture::{levels, words};
 use super::super::{
-    Assets, ColorDescription, Encoding, Material, MaterialDescription, NormalMap, NormalMapDescription,
+    Assets, ColorDescription, Encoding, Image, ImageTextureDescription, Material, MaterialDescription, NormalMap, NormalMapDescription,
     PhongDescription, Texels, Texture, TextureDescription, TexturePattern,
 };
 use super::{At, BTreeMap, Checked, Color, Problem, between, check, color, list, number, show_pair};
 
-/// What all texels together may take, in bytes: what devices let a shader see of one buffer.
-const TEXEL_MEMORY: u64 = 128 << 20;
+/// What all texels together may take, in bytes, as they are rendered from.
+const TEXEL_MEMORY: u64 = 1 << 30;
 /// Largest index of refraction.
 const DENSEST: f64 = 100.0;
 /// Largest ratio of a footprint's axes.
@@ -20,15 +24,67 @@ const LONGEST_FOOTPRINT: f64 = 64.0;
 const FARTHEST_COORDINATE: f64 = 1e6;
 
 pub(super) fn textures(descriptions: &BTreeMap<String, TextureDescription>, assets: &Assets) -> Checked<Vec<Texture>> {
-    let mut taken = 0;
+    let mut images = Images {
+        assets,
+        files: BTreeMap::new(),
+        taken: 0,
+    };
     let textures = descriptions
         .iter()
-        .map(|(name, description)| texture(description, assets, &mut taken).at(name.as_str()));
+        .map(|(name, description)| texture(description, &mut images).at(name.as_str()));
     textures.collect()
 }
 
-/// `taken` is the memory of the textures so far, in bytes.
-fn texture(description: &TextureDescription, assets: &Assets, taken: &mut u64) -> Checked<Texture> {
+/// The images so far: each file is read and kept once, whatever its names and however many textures have it.
+struct Images<'a> {
+    assets: &'a Assets,
+    /// By their place, with the words that each takes.
+    files: BTreeMap<PathBuf, Vec<(File, u64)>>,
+    /// The memory of all of them, in bytes.
+    taken: u64,
+}
+
+impl Images<'_> {
+    fn image(&mut self, texture: &ImageTextureDescription) -> Result<Arc<Image>, String> {
+        let file = &texture.file;
+        let path = self.assets.find(file)?;
+        let known = self.files.entry(path.clone()).or_default();
+        let taken = self.taken;
+        // With what it takes already.
+        let fits = |header: Header, before: u64| {
+            let Header { width, height, is_deep } = header;
+            let levels = if texture.filter.needs_levels() { levels(width, height) } else { 1 };
+            let words = words(width, height, levels, is_deep).max(before);
+            let (bytes, others) = (4 * words, taken - 4 * before);
+            match bytes + others <= TEXEL_MEMORY {
+                true => Ok(words),
+                false => {
+                    let mib = |bytes: u64| format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20));
+                    let (bytes, others, limit) = (mib(bytes), mib(others), mib(TEXEL_MEMORY));
+                    Err(format!(
+                        "{file:?}, {width} x {height} texels, takes {bytes}, the textures before it {others}; \
+                         together they must fit {limit}"
+                    ))
+                }
+            }
+        };
+        if let Some((known, before)) = known.iter_mut().find(|(known, _)| known.is(texture.encoding)) {
+            known.check_name(file)?;
+            let words = fits(Header::of(&known.image), *before)?;
+            self.taken += 4 * (words - *before);
+            *before = words;
+            return Ok(Arc::clone(&known.image));
+        }
+        let read = self.assets.image(file, &path, texture.encoding, |header| fits(header, 0).map(|_| ()))?;
+        let words = fits(Header::of(&read.image), 0)?;
+        self.taken += 4 * words;
+        let image = Arc::clone(&read.image);
+        known.push((read, words));
+        Ok(image)
+    }
+}
+
+fn texture(description: &TextureDescription, images: &mut Images) -> Checked<Texture> {
     Ok(match description {
         TextureDescription::Constant(constant) => Texture {
             pattern: TexturePattern::Constant(color(constant.color).at("color")?),
@@ -59,27 +115,10 @@ fn texture(description: &TextureDescription, assets: &Assets, taken: &mut u64) -
         TextureDescription::Image(texture) => {
             let max_anisotropy = between(texture.max_anisotropy, 1.0, LONGEST_FOOTPRINT).at("max_anisotropy")?;
             let transform = transform(texture.scale, texture.rotate, texture.offset)?;
-            let image = assets
-                .image(&texture.file, texture.encoding)
-                .map_err(Problem::new)
-                .at("file")?;
-            let levels = if texture.filter.needs_levels() {
-                image.levels()
-            } else {
-                1
-            };
-            let bytes = 4 * image.words(levels);
-            check(*taken + bytes <= TEXEL_MEMORY, || {
-                let mib = |bytes: u64| format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20));
-                let (file, bytes, taken) = (&texture.file, mib(bytes), mib(*taken));
-                let limit = mib(TEXEL_MEMORY);
-                format!("{file:?} takes {bytes}, the textures before it {taken}; together they must fit {limit}")
-            })
-            .at("file")?;
-            *taken += bytes;
+            let image = images.image(texture).map_err(Problem::new).at("file")?;
             Texture {
                 pattern: TexturePattern::Image {
-                    image: Arc::new(image),
+                    image,
                     wrap: texture.wrap,
                     filter: texture.filter,
                     max_anisotropy,

@@ -1,0 +1,138 @@
+//! Image files to texels, within limits that are known from a file's header before anything is decoded.
+
+use std::io::Cursor;
+
+use image::error::{DecodingError, LimitError, LimitErrorKind};
+use image::{DynamicImage, ImageBuffer, ImageDecoder as _, ImageError, ImageFormat, ImageReader, Limits};
+
+use super::texture::{Image, Texels};
+
+/// Most texels along a side.
+pub(super) const LONGEST_SIDE: u32 = 16_384;
+/// What a decoder may take beside the image, in bytes: rows, tables, the parts of a compressed file.
+const BESIDE: usize = 64 << 20;
+
+/// What a header says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Header {
+    pub width: u32,
+    pub height: u32,
+    /// Whether its values have more than 8 bits.
+    pub is_deep: bool,
+}
+
+impl Header {
+    /// That of an image that was read.
+    pub fn of(image: &Image) -> Header {
+        Header {
+            width: image.width,
+            height: image.height,
+            is_deep: matches!(image.texels, Texels::Floats(_)),
+        }
+    }
+}
+
+/// Why an image is refused.
+pub(super) enum Refused {
+    /// By its decoder.
+    Image(ImageError),
+    /// By a rule, which is told.
+    Rule(String),
+}
+
+impl From<ImageError> for Refused {
+    fn from(error: ImageError) -> Self {
+        Refused::Image(error)
+    }
+}
+
+impl From<png::DecodingError> for Refused {
+    fn from(error: png::DecodingError) -> Self {
+        Refused::Image(match error {
+            png::DecodingError::LimitsExceeded => LimitErrorKind::InsufficientMemory.into_error(),
+            other => ImageError::Decoding(DecodingError::new(ImageFormat::Png.into(), other)),
+        })
+    }
+}
+
+trait IntoError {
+    fn into_error(self) -> ImageError;
+}
+
+impl IntoError for LimitErrorKind {
+    fn into_error(self) -> ImageError {
+        ImageError::Limits(LimitError::from_kind(self))
+    }
+}
+
+/// Decodes an image, once `fits` has nothing against its header. The result has the file's own type of values.
+pub(super) fn decode(
+    bytes: &[u8],
+    format: ImageFormat,
+    fits: impl Fn(Header) -> Result<(), String>,
+) -> Result<DynamicImage, Refused> {
+    if format == ImageFormat::Png {
+        return decode_png(bytes, fits);
+    }
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    let mut limits = Limits::no_limits();
+    limits.max_image_width = Some(LONGEST_SIDE);
+    limits.max_image_height = Some(LONGEST_SIDE);
+    reader.limits(limits);
+    let decoder = reader.into_decoder()?;
+    let (width, height) = decoder.dimensions();
+    let color = decoder.color_type();
+    let is_deep = color.bytes_per_pixel() > color.channel_count();
+    check(Header { width, height, is_deep }, &fits)?;
+    Ok(DynamicImage::from_decoder(decoder)?)
+}
+
+fn check(header: Header, fits: impl Fn(Header) -> Result<(), String>) -> Result<(), Refused> {
+    if header.width > LONGEST_SIDE || header.height > LONGEST_SIDE {
+        return Err(LimitErrorKind::DimensionError.into_error().into());
+    }
+    fits(header).map_err(Refused::Rule)
+}
+
+/// By the PNG library itself: it can pass over colour profiles and texts, whose decompressed size no header tells.
+fn decode_png(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, Refused> {
+    let mut options = png::DecodeOptions::default();
+    options.set_ignore_text_chunk(true);
+    options.set_ignore_iccp_chunk(true);
+    let mut decoder = png::Decoder::new_with_options(Cursor::new(bytes), options);
+    decoder.set_limits(png::Limits { bytes: BESIDE });
+    decoder.set_transformations(png::Transformations::EXPAND); // palettes to colours, fewer bits to 8
+    let info = decoder.read_header_info()?;
+    let (width, height) = (info.width, info.height);
+    let is_deep = info.bit_depth == png::BitDepth::Sixteen;
+    check(Header { width, height, is_deep }, fits)?;
+    let mut reader = decoder.read_info()?;
+    let size = reader.output_buffer_size();
+    let mut values = vec![0; size.ok_or_else(|| LimitErrorKind::InsufficientMemory.into_error())?];
+    reader.next_frame(&mut values)?;
+    let color = reader.output_color_type().0;
+    let image = match is_deep {
+        true => {
+            let deep = values.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]]));
+            let deep: Vec<u16> = deep.collect();
+            drop(values);
+            match color {
+                png::ColorType::Grayscale => ImageBuffer::from_raw(width, height, deep).map(DynamicImage::ImageLuma16),
+                png::ColorType::GrayscaleAlpha => {
+                    ImageBuffer::from_raw(width, height, deep).map(DynamicImage::ImageLumaA16)
+                }
+                png::ColorType::Rgba => ImageBuffer::from_raw(width, height, deep).map(DynamicImage::ImageRgba16),
+                _ => ImageBuffer::from_raw(width, height, deep).map(DynamicImage::ImageRgb16),
+            }
+        }
+        false => match color {
+            png::ColorType::Grayscale => ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageLuma8),
+            png::ColorType::GrayscaleAlpha => {
+                ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageLumaA8)
+            }
+            png::ColorType::Rgba => ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageRgba8),
+            _ => ImageBuffer::from_raw(width, height, values).map(DynamicImage::ImageRgb8),
+        },
+    };
+    image.ok_or_else(|| LimitErrorKind::InsufficientMemory.into_error().into())
+}
