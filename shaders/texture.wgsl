@@ -34,7 +34,7 @@ struct Level {
 }
 
 fn level_of(t: Texture, i: u32) -> Level {
-    return Level(texels[t.texels + i], level_size(t.width, i), level_size(t.height, i));
+    return Level(texel_word(t.texels + i), level_size(t.width, i), level_size(t.height, i));
 }
 
 fn load_texel(t: Texture, level: Level, x: i32, y: i32) -> vec3f {
@@ -43,12 +43,12 @@ fn load_texel(t: Texture, level: Level, x: i32, y: i32) -> vec3f {
     if (TEXEL_FORMATS & 4u) != 0u {
         if t.format == FLOAT {
             let at = level.start + 3u * i;
-            color = vec3f(bitcast<f32>(texels[at]), bitcast<f32>(texels[at + 1u]), bitcast<f32>(texels[at + 2u]));
+            color = vec3f(bitcast<f32>(texel_word(at)), bitcast<f32>(texel_word(at + 1u)), bitcast<f32>(texel_word(at + 2u)));
         }
     }
     if (TEXEL_FORMATS & 3u) != 0u {
         if t.format != FLOAT {
-            color = unpacked_color(texels[level.start + i], t.format);
+            color = unpacked_color(texel_word(level.start + i), t.format);
         }
     }
     return color;

@@ -109,6 +109,14 @@ pub enum RenderError {
         /// The adapter's name.
         device: String,
     },
+    /// The device cannot see all of the scene.
+    #[error("{device}: {message}; --device cpu has no such limit")]
+    TooLarge {
+        /// The adapter's name.
+        device: String,
+        /// What is too large, and what would fit.
+        message: String,
+    },
     /// The work was cancelled.
     #[error("cancelled")]
     Cancelled,

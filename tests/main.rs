@@ -6,6 +6,7 @@ mod against_oracle;
 mod analytic;
 mod bounds;
 mod cli;
+mod cost;
 mod culling;
 #[cfg(feature = "dev")]
 mod dev;

@@ -16,6 +16,7 @@ pub fn run() -> anyhow::Result<ExitCode> {
             kind,
             exact,
             largest_binding,
+            storage_buffers,
             largest_buffer,
         } = info;
         writeln!(out, "{name}")?;
@@ -31,6 +32,7 @@ pub fn run() -> anyhow::Result<ExitCode> {
             }
         )?;
         writeln!(out, "    largest binding {}", mebibytes(*largest_binding))?;
+        writeln!(out, "    buffers         {storage_buffers} in a shader")?;
         writeln!(out, "    largest buffer  {}", mebibytes(*largest_buffer))?;
     }
     writeln!(out, "cpu")?;

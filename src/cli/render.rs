@@ -261,8 +261,15 @@ impl Plan {
             }
             options.exact = Some(gpu::Rounding::Software);
         }
-        let gpu = Gpu::new(&device, &self.scene, &Shaders::built_in(), options)?;
-        Ok((Box::new(gpu), described))
+        match Gpu::new(&device, &self.scene, &Shaders::built_in(), options) {
+            Err(why @ RenderError::TooLarge { .. }) if *choice == gpu::Choice::Auto => {
+                if !self.quiet {
+                    eprintln!("warning: rendering on the CPU: {why}");
+                }
+                Ok(self.cpu())
+            }
+            gpu => Ok((Box::new(gpu?), described)),
+        }
     }
 
     fn cpu(&self) -> (Box<dyn Backend + '_>, Described) {

@@ -43,6 +43,7 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "surface.wgsl",
     "tangent.wgsl",
     "texel.wgsl",
+    "texels.wgsl",
     "texture.wgsl",
     "traverse.wgsl",
     "triangle.wgsl",
@@ -91,6 +92,8 @@ const KERNEL: &[&str] = &[
 ];
 /// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.
 const FROM_BUFFERS: &str = "scene.wgsl";
+/// The texels in one buffer.
+const TEXELS: &str = "texels.wgsl";
 
 /// A compute shader's entry point and the file that it is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -155,6 +158,11 @@ impl Shaders {
     /// A kernel that reads the scene from buffers, or, if `baked` is the text of the functions that know the scene, has
     /// it as constants.
     pub fn compose(&self, kernel: Kernel, baked: Option<&str>) -> Source {
+        self.compose_with_texels(kernel, baked, None)
+    }
+
+    /// The same where `texels` is the text of the function that reads texels from several buffers.
+    pub fn compose_with_texels(&self, kernel: Kernel, baked: Option<&str>, texels: Option<&str>) -> Source {
         let mut source = Source::default();
         for name in [&ROUNDING]
             .into_iter()
@@ -167,6 +175,10 @@ impl Shaders {
         match baked {
             Some(text) => source.append("(the scene as constants)", text),
             None => source.append(FROM_BUFFERS, self.text(FROM_BUFFERS)),
+        }
+        match texels {
+            Some(text) => source.append("(the texels' buffers)", text),
+            None => source.append(TEXELS, self.text(TEXELS)),
         }
         source
     }

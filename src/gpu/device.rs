@@ -38,6 +38,8 @@ pub struct Info {
     pub largest_binding: u64,
     /// The largest buffer, in bytes.
     pub largest_buffer: u64,
+    /// How many storage buffers a shader can see.
+    pub storage_buffers: u32,
 }
 
 /// A device that is ready for work; a clone is another handle to it.
@@ -117,6 +119,7 @@ fn info(adapter: &wgpu::Adapter) -> Info {
             && info.backend == wgpu::Backend::Vulkan,
         largest_binding: limits.max_storage_buffer_binding_size,
         largest_buffer: limits.max_buffer_size,
+        storage_buffers: limits.max_storage_buffers_per_shader_stage,
         name: info.name,
     }
 }

@@ -10,6 +10,7 @@ mod renderer;
 mod rounding;
 mod rounds;
 pub mod spirv;
+mod texels;
 mod validate;
 
 pub use bake::bake;

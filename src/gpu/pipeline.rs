@@ -14,15 +14,32 @@ use crate::pack::Specialization;
 /// Side of a workgroup, as the kernels declare it.
 pub const WORKGROUP: u32 = 8;
 
+const UNIFORM: BufferBindingType = BufferBindingType::Uniform;
+const READ: BufferBindingType = BufferBindingType::Storage { read_only: true };
+const WRITE: BufferBindingType = BufferBindingType::Storage { read_only: false };
+
 /// How the buffers of `shaders/bindings.wgsl` are bound: what the kernel writes, and its receipt, are the last.
-pub fn bind_group_layout(device: &Device) -> wgpu::BindGroupLayout {
-    let uniform = BufferBindingType::Uniform;
-    let read = BufferBindingType::Storage { read_only: true };
-    let write = BufferBindingType::Storage { read_only: false };
+pub const BINDINGS: [BufferBindingType; 12] = [
+    UNIFORM, UNIFORM, UNIFORM, READ, READ, READ, READ, READ, READ, UNIFORM, WRITE, WRITE,
+];
+
+/// How many of them are storage buffers.
+pub const STORAGE_BUFFERS: usize = {
+    let (mut count, mut i) = (0, 0);
+    while i < BINDINGS.len() {
+        if !matches!(BINDINGS[i], BufferBindingType::Uniform) {
+            count += 1;
+        }
+        i += 1;
+    }
+    count
+};
+
+/// The bindings of every kernel, and behind them those of so many further buffers of texels.
+pub fn bind_group_layout(device: &Device, more_texels: usize) -> wgpu::BindGroupLayout {
+    let more = std::iter::repeat_n(READ, more_texels);
     let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
-        .zip([
-            uniform, uniform, uniform, read, read, read, read, read, read, uniform, write, write,
-        ])
+        .zip(BINDINGS.into_iter().chain(more))
         .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: wgpu::ShaderStages::COMPUTE,

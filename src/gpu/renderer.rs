@@ -12,6 +12,7 @@ use super::device::Device;
 use super::pipeline::{WORKGROUP, bind_group_layout, pipeline};
 use super::rounding::Rounding;
 use super::rounds::samples_per_call;
+use super::texels::TexelParts;
 use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::job::Backend;
@@ -44,6 +45,8 @@ pub struct Gpu {
     /// The kernel of first hits, once it was asked for.
     aov: Option<wgpu::ComputePipeline>,
     scene: [wgpu::Buffer; 9],
+    /// The texels that the scene's first buffer of them has no room for.
+    more_texels: Vec<wgpu::Buffer>,
     work: wgpu::Buffer,
     /// The kernel's receipt of a call: as the kernel writes it, and as the host reads it.
     receipt: [wgpu::Buffer; 2],
@@ -62,6 +65,7 @@ struct Kernels {
     constants: Specialization,
     layout: wgpu::BindGroupLayout,
     exact: Option<Rounding>,
+    texels: TexelParts,
 }
 
 /// A buffer with a record for each pixel of a region, bound for the kernel that writes it.
@@ -108,18 +112,20 @@ impl Gpu {
     /// Compiles the kernel for a scene and uploads it. The device has run the kernel once, on nothing, when this
     /// returns: drivers compile at the first dispatch.
     pub fn new(device: &Device, packed: &Packed, shaders: &Shaders, options: Options) -> Result<Gpu, RenderError> {
+        let texels = TexelParts::of(&device.info, packed)?;
         let kernels = Kernels {
             shaders: shaders.clone(),
             baked: options.baked.then(|| bake_if_small(packed)).flatten(),
             constants: packed.specialization,
-            layout: bind_group_layout(device),
+            layout: bind_group_layout(device, texels.count - 1),
             exact: options.exact,
+            texels,
         };
         let render = match packed.adaptive {
             true => kernels.compile(device, Kernel::Adaptive)?,
             false => kernels.compile(device, Kernel::Render)?,
         };
-        let scene = upload(device, packed)?;
+        let (scene, more_texels) = upload(device, packed, texels)?;
         let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         let written = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let receipt = [written, BufferUsages::COPY_DST | BufferUsages::MAP_READ]
@@ -131,6 +137,7 @@ impl Gpu {
             render,
             aov: None,
             scene,
+            more_texels,
             work,
             receipt,
             before: None,
@@ -156,11 +163,13 @@ impl Gpu {
     /// Uploads a changed scene that needs no other kernel. Returns whether it does not; if it does, nothing is done.
     /// The film is lost.
     pub fn update(&mut self, packed: &Packed) -> Result<bool, RenderError> {
+        let texels = TexelParts::of(&self.device.info, packed)?;
         let same_kernel = self.kernels.baked.is_none()
-            && (self.kernels.constants, self.adaptive) == (packed.specialization, packed.adaptive);
+            && (self.kernels.constants, self.adaptive) == (packed.specialization, packed.adaptive)
+            && self.kernels.texels == texels;
         if same_kernel {
             self.film = None;
-            self.scene = upload(&self.device, packed)?;
+            (self.scene, self.more_texels) = upload(&self.device, packed, texels)?;
         }
         Ok(same_kernel)
     }
@@ -202,7 +211,7 @@ impl Gpu {
                 &self.receipt[0],
             ];
             let entries: Vec<wgpu::BindGroupEntry> = (0..)
-                .zip(buffers)
+                .zip(buffers.into_iter().chain(&self.more_texels))
                 .map(|(binding, buffer)| wgpu::BindGroupEntry {
                     binding,
                     resource: buffer.as_entire_binding(),
@@ -360,11 +369,19 @@ impl Backend for Gpu {
     }
 }
 
-/// The buffers of a scene, in the order of their bindings.
-fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 9], RenderError> {
+/// The buffers of a scene, in the order of their bindings, and the further ones of its texels.
+fn upload(
+    device: &Device,
+    packed: &Packed,
+    texels: TexelParts,
+) -> Result<([wgpu::Buffer; 9], Vec<wgpu::Buffer>), RenderError> {
+    let mut texels = texels.split(&packed.texels);
+    let first_texels = texels.next().unwrap_or_default();
+    let more = texels.map(|part| device.checked(|| device.upload(BufferUsages::STORAGE, part)));
+    let more: Vec<wgpu::Buffer> = more.collect::<Result<_, _>>()?;
     let mut filter_table = packed.filter_table.clone();
     filter_table.resize(BINS as usize, Vec4::ZERO);
-    device.checked(|| {
+    let buffers = device.checked(|| {
         [
             device.upload(BufferUsages::UNIFORM | BufferUsages::COPY_DST, &[packed.camera]),
             device.upload(BufferUsages::UNIFORM, &[packed.environment]),
@@ -373,15 +390,17 @@ fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 9], RenderE
             device.upload(BufferUsages::STORAGE, &packed.materials),
             device.upload(BufferUsages::STORAGE, &packed.lights),
             device.upload(BufferUsages::STORAGE, &packed.textures),
-            device.upload(BufferUsages::STORAGE, &packed.texels),
+            device.upload(BufferUsages::STORAGE, first_texels),
             device.upload(BufferUsages::UNIFORM, &filter_table),
         ]
-    })
+    })?;
+    Ok((buffers, more))
 }
 
 impl Kernels {
     fn compile(&self, device: &Device, kernel: Kernel) -> Result<wgpu::ComputePipeline, RenderError> {
-        let source = self.shaders.compose(kernel, self.baked.as_deref());
+        let texels = self.texels.wgsl();
+        let source = (self.shaders).compose_with_texels(kernel, self.baked.as_deref(), texels.as_deref());
         pipeline(device, &self.layout, kernel, &source, &self.constants, self.exact)
     }
 }

@@ -371,6 +371,22 @@ materials.m = { type = 'phong', color = [1, 1, 1] }
     }
 
     #[test]
+    fn few_nodes_are_looked_at_in_scenes_of_thousands_of_primitives() {
+        for (name, scene) in scenes(6000) {
+            let things = Things::of(&scene);
+            let primitives = pack_shapes(&scene);
+            let dear = |p: &&Primitive| things.blocks(p, 300) != things.blocks(p, u32::MAX);
+            // One in a hundred may need more: at edges, where a node holds parts of two walls.
+            let count = primitives.iter().filter(dear).count();
+            assert!(
+                100 * count <= primitives.len(),
+                "{name}: {count} of {}",
+                primitives.len()
+            );
+        }
+    }
+
+    #[test]
     fn without_a_budget_everything_may_cast_a_shadow() {
         for (_, scene) in scenes(20) {
             let things = Things::of(&scene);

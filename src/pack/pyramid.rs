@@ -3,12 +3,19 @@
 use glam::DVec3;
 
 use crate::scene::image_file::{linear_to_srgb, srgb_to_linear};
+use crate::scene::texture::words;
 use crate::scene::{Encoding, Image, Texels};
 
 /// Adds an image's levels to the texels, from the finest on, each row by row from the bottom; a table of the levels'
 /// places comes before them. Returns the table's place.
 pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
     let table = texels.len();
+    let is_float = matches!(image.texels, Texels::Floats(_));
+    let more = words(image.width, image.height, levels, is_float) as usize;
+    match more > 1 << 20 {
+        true => texels.reserve_exact(more), // nothing spare: there are few of that size
+        false => texels.reserve(more),
+    }
     texels.resize(table + levels as usize, 0);
     let (width, height) = (image.width as usize, image.height as usize);
     let finest = finest(image);

@@ -113,7 +113,9 @@ fn decode_png(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Resu
     let color = reader.output_color_type().0;
     let image = match is_deep {
         true => {
-            let deep = values.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]]));
+            let deep = values
+                .chunks_exact(2)
+                .map(|pair| u16::from_be_bytes([pair[0], pair[1]]));
             let deep: Vec<u16> = deep.collect();
             drop(values);
             match color {

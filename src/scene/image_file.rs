@@ -189,7 +189,10 @@ fn texels(image: DynamicImage, is_float: bool, encoding: Encoding) -> Texels {
     let bytes = match image {
         DynamicImage::ImageLuma8(gray) => gray.pixels().map(|texel| [texel.0[0]; 3]).collect(),
         DynamicImage::ImageLumaA8(gray) => gray.pixels().map(|texel| [texel.0[0]; 3]).collect(),
-        DynamicImage::ImageRgba8(colors) => colors.pixels().map(|texel| [texel.0[0], texel.0[1], texel.0[2]]).collect(),
+        DynamicImage::ImageRgba8(colors) => colors
+            .pixels()
+            .map(|texel| [texel.0[0], texel.0[1], texel.0[2]])
+            .collect(),
         colors => colors.into_rgb8().pixels().map(|texel| texel.0).collect(),
     };
     Texels::Bytes(encoding, bytes)

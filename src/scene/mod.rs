@@ -9,7 +9,7 @@ mod error;
 pub(crate) mod image_file;
 mod load;
 mod parse;
-mod texture;
+pub(crate) mod texture;
 mod validate;
 
 use glam::DVec3;

@@ -145,7 +145,7 @@ pub(super) fn levels(width: u32, height: u32) -> u32 {
 
 /// 32-bit words that so many levels of an image take, with the table of their places: a texel takes one, or three if its
 /// values are floats.
-pub(super) fn words(width: u32, height: u32, levels: u32, is_float: bool) -> u64 {
+pub(crate) fn words(width: u32, height: u32, levels: u32, is_float: bool) -> u64 {
     let texel = if is_float { 3 } else { 1 };
     let sizes = (0..levels).map(|i| u64::from((width >> i).max(1)) * u64::from((height >> i).max(1)));
     u64::from(levels) + texel * sizes.sum::<u64>()

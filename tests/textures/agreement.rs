@@ -3,13 +3,14 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use wgray::gpu::{Device, Gpu, Options, Rounding};
 use wgray::job::Cut;
 use wgray::pack::Packed;
 
 use super::{cpu_picture, scene, write_exr, write_png};
-use crate::adapter;
 use crate::pictures::{Way, backend, film, reference, whole};
 use crate::render::compare;
+use crate::{adapter, sources};
 
 /// All scenes that this is about, small.
 fn scenes(folder: &Path) -> Vec<(String, Packed)> {
@@ -149,4 +150,32 @@ fn a_wrong_footprint_is_noticed() {
     scene.specialization.differentials = 0;
     let wrong = cpu_picture(&scene);
     assert!(right.iter().zip(&wrong).filter(|(a, b)| a != b).count() > 100);
+}
+
+#[test]
+fn texels_in_several_buffers_give_the_same_picture() {
+    let Some(device) = adapter::device() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let scenes = scenes(folder.path());
+    let (_, scene) = scenes.iter().find(|(name, _)| name == "ewa repeat").unwrap();
+    let mut small = device.clone();
+    small.info.largest_binding = 4096;
+    assert!(scene.texels.len() > 3 * 1024, "they fit fewer buffers");
+    let new = |small: &Device, baked: bool| {
+        let exact = device.info.exact.then_some(Rounding::Device);
+        Gpu::new(small, scene, sources::shaders(), Options { exact, baked })
+    };
+    let expected = reference(scene);
+    for (way, baked) in [(Way::Baked, true), (Way::Buffers, false)] {
+        let found = film(&mut new(&small, baked).unwrap(), scene, whole(scene), &Cut::default());
+        let problem = compare(way, scene, &found, &expected);
+        assert!(problem.is_ok(), "{way:?}: {}", problem.unwrap_err());
+    }
+    small.info.storage_buffers = 9;
+    let error = new(&small, false).err().unwrap().to_string();
+    assert!(
+        error.contains("the scene's images take 0.0 MiB, a shader sees 2 x 0.0 MiB"),
+        "{error}"
+    );
+    assert!(error.ends_with("--device cpu has no such limit"), "{error}");
 }

@@ -53,7 +53,7 @@ fn files(folder: &Path) {
     zero[29..33].copy_from_slice(&crc.to_be_bytes());
     std::fs::write(path("zero.png"), &zero).unwrap();
     std::fs::write(path("zero.hdr"), b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 0 +X 0\n").unwrap();
-    image::RgbImage::new(6000, 5000).save(path("large.png")).unwrap();
+    forge_size(&path("good.png"), &path("large.png"), 16_384, 16_384);
     std::fs::create_dir(path("folder.png")).unwrap();
     std::fs::create_dir(path("inner")).unwrap();
     std::fs::copy(path("good.png"), path("inner/good.png")).unwrap();
@@ -113,13 +113,14 @@ fn bad_images_are_told() {
         ),
         (
             "large.png",
-            "takes 152.6 MiB, the textures before it 0.0 MiB; together they must fit 128.0 MiB",
+            "16384 x 16384 texels, takes 1365.3 MiB, the textures before it 0.0 MiB; together they must fit 1024.0 MiB",
         ),
         ("/etc/hostname", "must not leave "),
         ("../", "must not leave "),
     ] {
         let message = load(folder.path(), &format!("[textures.t]\ntype = 'image'\nfile = '{file}'")).unwrap_err();
-        let start = format!("5: textures.t.file: {file:?} {told}");
+        let comma = if file == "large.png" { "," } else { "" };
+        let start = format!("5: textures.t.file: {file:?}{comma} {told}");
         assert!(message.starts_with(&start), "{message}\n{start}");
     }
 }
@@ -140,25 +141,122 @@ fn links_that_leave_the_folder_are_refused() {
     Scene::load(&folder.path().join("s.toml"), &overrides).unwrap();
 }
 
+/// A copy of a PNG whose header claims another size, with its checksum: what the header rules out is not decoded.
+fn forge_size(from: &Path, to: &Path, width: u32, height: u32) {
+    let mut png = std::fs::read(from).unwrap();
+    png[16..20].copy_from_slice(&width.to_be_bytes());
+    png[20..24].copy_from_slice(&height.to_be_bytes());
+    let crc = crc32(&png[12..29]);
+    png[29..33].copy_from_slice(&crc.to_be_bytes());
+    std::fs::write(to, &png).unwrap();
+}
+
 #[test]
 fn all_images_together_must_fit() {
     let folder = tempfile::tempdir().unwrap();
-    image::RgbImage::new(4000, 4000)
+    image::RgbImage::new(512, 512)
         .save(folder.path().join("a.png"))
         .unwrap();
-    let texture =
-        |name: &str, filter: &str| format!("[textures.{name}]\ntype = 'image'\nfilter = '{filter}'\nfile = 'a.png'\n");
-    // Without smaller levels, two of them take 122 MiB.
-    let two = texture("a", "nearest") + &texture("b", "bilinear");
-    load(folder.path(), &two).unwrap();
-    let message = load(folder.path(), &(two + &texture("c", "nearest"))).unwrap_err();
-    let told =
-        "14: textures.c.file: \"a.png\" takes 61.0 MiB, the textures before it 122.1 MiB; together they must fit";
-    assert!(message.starts_with(told), "{message}");
-    let message = load(folder.path(), &(texture("a", "ewa") + &texture("b", "ewa"))).unwrap_err();
+    forge_size(
+        &folder.path().join("a.png"),
+        &folder.path().join("huge.png"),
+        16_384,
+        16_384,
+    );
+    forge_size(
+        &folder.path().join("a.png"),
+        &folder.path().join("fits.png"),
+        16_384,
+        12_000,
+    );
+    let texture = |name: &str, file: &str, filter: &str| {
+        format!("[textures.{name}]\ntype = 'image'\nfilter = '{filter}'\nfile = '{file}'\n")
+    };
+    let told = |text: &str| load(folder.path(), text).unwrap_err();
+    let small = texture("a", "a.png", "nearest");
+    assert_eq!(
+        told(&(small.clone() + &texture("b", "huge.png", "nearest"))),
+        "10: textures.b.file: \"huge.png\", 16384 x 16384 texels, takes 1024.0 MiB, the textures before it 1.0 MiB; \
+         together they must fit 1024.0 MiB"
+    );
+    // What fits is decoded, and then is too short for its header.
+    assert!(told(&texture("b", "fits.png", "ewa")).contains("must be sound"));
+}
+
+#[test]
+fn a_file_is_kept_once_however_it_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("inner")).unwrap();
+    write_png(&folder.path().join("a.png"), 64, 32, |x, y| [x as u8, y as u8, 7]);
+    let image = |name: &str, file: &str, rest: &str| {
+        format!(
+            "[textures.{name}]\ntype = 'image'\nfile = '{file}'\n{rest}\n[materials.{name}]\ntype = 'phong'\n\
+             color = {{ texture = '{name}' }}\n"
+        )
+    };
+    let packed = |text: &str| wgray::pack::pack(&load(folder.path(), text).unwrap());
+    let alone = packed(&image("a", "a.png", ""));
+    let three = packed(&format!(
+        "{}{}{}",
+        image("a", "a.png", "filter = 'nearest'"),
+        image("b", "inner/../a.png", "wrap = 'clamp'"),
+        image("c", "./a.png", "filter = 'trilinear'\nencoding = 'srgb'"),
+    ));
+    assert_eq!(three.texels, alone.texels);
+    let levels: Vec<u32> = three.textures.iter().map(|texture| texture.levels).collect();
+    assert_eq!((three.textures.len(), levels), (3, vec![1, 7, 7]));
+    // Another encoding has other levels.
+    let two = packed(&(image("a", "a.png", "") + &image("b", "a.png", "encoding = 'linear'")));
+    assert_eq!(two.texels.len(), 2 * alone.texels.len());
+}
+
+#[test]
+fn gray_palettes_and_opacity_are_read_as_their_colours() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    write_png(&path("rgb.png"), 4, 4, |x, y| [(60 * x + y) as u8; 3]);
+    image::GrayImage::from_fn(4, 4, |x, y| image::Luma([(60 * x + y) as u8]))
+        .save(path("gray.png"))
+        .unwrap();
+    image::GrayAlphaImage::from_fn(4, 4, |x, y| image::LumaA([(60 * x + y) as u8, x as u8]))
+        .save(path("gray_alpha.png"))
+        .unwrap();
+    image::RgbaImage::from_fn(4, 4, |x, y| {
+        let value = (60 * x + y) as u8;
+        image::Rgba([value, value, value, y as u8])
+    })
+    .save(path("rgba.png"))
+    .unwrap();
+    let mut palette = png::Encoder::new(std::fs::File::create(path("palette.png")).unwrap(), 4, 4);
+    palette.set_color(png::ColorType::Indexed);
+    palette.set_depth(png::BitDepth::Four);
+    palette.set_palette(
+        (0..16)
+            .flat_map(|i| [(60 * (i / 4) + i % 4) as u8; 3])
+            .collect::<Vec<u8>>(),
+    );
+    let rows: Vec<u8> = (0..4)
+        .flat_map(|y| [y << 4 | (4 + y), (8 + y) << 4 | (12 + y)])
+        .collect();
+    palette.write_header().unwrap().write_image_data(&rows).unwrap();
+    let texels = |name: &str| {
+        let material = "[materials.m]\ntype = 'phong'\ncolor = { texture = 't' }\n";
+        let text = format!("[textures.t]\ntype = 'image'\nfile = '{name}.png'\n{material}");
+        wgray::pack::pack(&load(folder.path(), &text).unwrap()).texels
+    };
+    for name in ["gray", "gray_alpha", "rgba", "palette"] {
+        assert_eq!(texels(name), texels("rgb"), "{name}");
+    }
+    // 16 bits a channel are floats: as the same values of 8 bits.
+    let deep = |x: u32| image::Luma([257 * (60 * x) as u16]);
+    image::ImageBuffer::from_fn(4, 4, |x, _| deep(x))
+        .save(path("deep.png"))
+        .unwrap();
+    let red = f32::from_bits(texels("deep")[3 + 3]); // the table of three levels comes first
+    let value: f64 = 60.0 / 255.0;
     assert!(
-        message.contains("takes 81.4 MiB, the textures before it 81.4 MiB"),
-        "{message}"
+        (f64::from(red) - ((value + 0.055) / 1.055).powf(2.4)).abs() < 1e-6,
+        "{red}"
     );
 }
 

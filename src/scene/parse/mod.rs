@@ -62,7 +62,10 @@ fn locate(text: &str, path: &KeyPath) -> usize {
     let parts = Parts::of(text);
     let at = match parts.find(path) {
         Some((part, path)) => part.place.start + place_in(parts.text(part), &path),
-        None if text.len() > LARGEST => place_in(&parts.rest(), path),
+        None if text.len() > LARGEST => {
+            let rest = parts.rest();
+            rest.place(place_in(&rest.text, path))
+        }
         None => place_in(text, path),
     };
     line_number(text, at)

@@ -9,8 +9,8 @@ use super::super::decode::Header;
 use super::super::image_file::File;
 use super::super::texture::{levels, words};
 use super::super::{
-    Assets, ColorDescription, Encoding, Image, ImageTextureDescription, Material, MaterialDescription, NormalMap, NormalMapDescription,
-    PhongDescription, Texels, Texture, TextureDescription, TexturePattern,
+    Assets, ColorDescription, Encoding, Image, ImageTextureDescription, Material, MaterialDescription, NormalMap,
+    NormalMapDescription, PhongDescription, Texels, Texture, TextureDescription, TexturePattern,
 };
 use super::{At, BTreeMap, Checked, Color, Problem, between, check, color, list, number, show_pair};
 
@@ -53,7 +53,11 @@ impl Images<'_> {
         // With what it takes already.
         let fits = |header: Header, before: u64| {
             let Header { width, height, is_deep } = header;
-            let levels = if texture.filter.needs_levels() { levels(width, height) } else { 1 };
+            let levels = if texture.filter.needs_levels() {
+                levels(width, height)
+            } else {
+                1
+            };
             let words = words(width, height, levels, is_deep).max(before);
             let (bytes, others) = (4 * words, taken - 4 * before);
             match bytes + others <= TEXEL_MEMORY {
@@ -75,7 +79,9 @@ impl Images<'_> {
             *before = words;
             return Ok(Arc::clone(&known.image));
         }
-        let read = self.assets.image(file, &path, texture.encoding, |header| fits(header, 0).map(|_| ()))?;
+        let read = self
+            .assets
+            .image(file, &path, texture.encoding, |header| fits(header, 0).map(|_| ()))?;
         let words = fits(Header::of(&read.image), 0)?;
         self.taken += 4 * words;
         let image = Arc::clone(&read.image);

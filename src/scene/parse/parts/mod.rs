@@ -86,6 +86,23 @@ impl Broken {
     }
 }
 
+/// What is outside of the parts, as a document by itself.
+#[derive(Default)]
+pub struct Rest {
+    pub text: String,
+    /// Where each piece of it begins, here and in the whole text.
+    pieces: Vec<(usize, usize)>,
+}
+
+impl Rest {
+    /// Where a byte of it is in the whole text.
+    pub fn place(&self, at: usize) -> usize {
+        let next = self.pieces.partition_point(|(here, _)| *here <= at);
+        let (here, there) = next.checked_sub(1).map_or((0, 0), |last| self.pieces[last]);
+        there + (at - here)
+    }
+}
+
 /// A name that a part's table has, if it has one, and the table.
 pub type Named = (Option<String>, Table);
 
@@ -117,14 +134,19 @@ impl<'a> Parts<'a> {
         Parts { text, parts }
     }
 
-    /// What is outside of the parts, with spaces in their place.
-    pub fn rest(&self) -> String {
-        let mut rest = self.text.as_bytes().to_vec();
-        for part in &self.parts {
-            rest[part.place.clone()].fill(b' ');
+    /// What is outside of the parts.
+    pub fn rest(&self) -> Rest {
+        let mut rest = Rest::default();
+        let mut end = 0;
+        let places = self.parts.iter().map(|part| part.place.clone());
+        for place in places.chain([self.text.len()..self.text.len()]) {
+            if end < place.start {
+                rest.pieces.push((rest.text.len(), end));
+                rest.text.push_str(&self.text[end..place.start]);
+            }
+            end = place.end;
         }
-        // Parts begin and end between characters.
-        String::from_utf8(rest).unwrap_or_default()
+        rest
     }
 
     /// What is larger than [`LARGEST`], if anything is.
@@ -141,7 +163,11 @@ impl<'a> Parts<'a> {
 
     /// The tables outside of the parts.
     pub fn read_rest(&self) -> Result<Table, Broken> {
-        toml::from_str(&self.rest()).map_err(|error| Broken::of(0, &error))
+        let rest = self.rest();
+        toml::from_str(&rest.text).map_err(|error| {
+            let broken = Broken::of(0, &error);
+            Broken::new(rest.place(broken.at), broken.message)
+        })
     }
 
     /// The table of a part; `None` if it is none of its kind, and the file must be read as a whole.

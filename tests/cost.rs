@@ -1,0 +1,221 @@
+//! What grows with a scene grows no faster than the scene: time, and memory. Nothing here takes a time as such, but the
+//! ratio of two, of the processor and not of the clock.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::Command;
+
+use wgray::gpu::check_kernels;
+use wgray::pack::{Packed, pack};
+use wgray::scene::{Overrides, Scene};
+
+use crate::sources;
+
+const START: &str = "\
+image = { width = 8, height = 8 }
+camera = { position = [0, -5, 2], look_at = [0, 0, 0.5], fov = 40 }
+[materials.first]
+type = 'phong'
+color = [0.5, 0.4, 0.3]
+[[lights]]
+type = 'point'
+position = [0, 0, 9]
+color = [1, 1, 1]
+[[shapes]]
+type = 'plane'
+material = 'first'
+point = [0, 0, 0]
+normal = [0, 0, 1]
+tangent = [1, 0, 0]
+";
+
+/// A scene with n of something: `{i}` is its number, `{x}`, `{y}` and `{z}` its place.
+fn scene(n: usize, one: &str) -> String {
+    let mut text = START.to_owned();
+    for i in 0..n {
+        let [x, y, z] = [7919, 104_729, 1_299_709].map(|step| format!("{:.3}", (i * step % 1000) as f64 / 250.0 - 2.0));
+        let one = one.replace("{i}", &i.to_string());
+        let _ = writeln!(text, "{}", one.replace("{x}", &x).replace("{y}", &y).replace("{z}", &z));
+    }
+    text
+}
+
+const SPHERE: &str = "[[shapes]]\ntype = 'sphere'\nmaterial = 'first'\ncenter = [{x}, {y}, {z}]\nradius = 0.05";
+
+/// One of everything that a scene may have many of.
+const KINDS: [(&str, &str); 13] = [
+    ("spheres", SPHERE),
+    (
+        "ellipsoids",
+        "[[shapes]]\ntype = 'ellipsoid'\nmaterial = 'first'\ncenter = [{x}, {y}, {z}]\na = [1, 0, 0]\nb = [0, 1, 0]\nc = [0, 0, 2]",
+    ),
+    (
+        "rectangles",
+        "[[shapes]]\ntype = 'rectangle'\nmaterial = 'first'\ncenter = [{x}, {y}, {z}]\nsize = [1, 1]\nnormal = [{x}, {y}, 9]\n\
+         tangent = [1, 0, 0]",
+    ),
+    (
+        "triangles",
+        "[[shapes]]\ntype = 'triangle'\nmaterial = 'first'\nvertices = [[{x}, {y}, {z}], [9, {y}, {z}], [{x}, 9, {y}]]",
+    ),
+    // A turned floor of triangles: all is on one side of each.
+    (
+        "triangles on a slope",
+        "[[shapes]]\ntype = 'triangle'\nmaterial = 'first'\nvertices = [[{x}, {y}, {x}], [9, {y}, 9], [9, 9, 9]]",
+    ),
+    (
+        "tetrahedra",
+        "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'first'\n\
+         vertices = [[{x}, {y}, {z}], [9, {y}, {z}], [{x}, 9, {y}], [{x}, {y}, 9]]",
+    ),
+    (
+        "planes",
+        "[[shapes]]\ntype = 'plane'\nmaterial = 'first'\npoint = [{x}, {y}, {z}]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
+    ),
+    (
+        "points",
+        "[[lights]]\ntype = 'point'\nposition = [{x}, {y}, {z}]\ncolor = [1, 1, 1]",
+    ),
+    (
+        "directions",
+        "[[lights]]\ntype = 'directional'\ndirection = [{x}, {y}, 9]\ncolor = [1, 1, 1]",
+    ),
+    (
+        "area lights",
+        "[[lights]]\ntype = 'rectangle'\ncenter = [{x}, {y}, {z}]\nsize = [1, 1]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n\
+         color = [1, 1, 1]",
+    ),
+    ("materials", "[materials.m{i}]\ntype = 'phong'\ncolor = [0.1, 0.2, 0.3]"),
+    (
+        "textures",
+        "[textures.t{i}]\ntype = 'checker'\neven = [0, 0, 0]\nodd = [1, 1, 1]\n[materials.m{i}]\ntype = 'phong'\n\
+         color = { texture = 't{i}' }",
+    ),
+    // Read as a whole, as the table of all is there too.
+    (
+        "materials in one table",
+        "[materials.m{i}.color]\ntexture = 't'\n[materials.m{i}]\ntype = 'mirror'",
+    ),
+];
+
+fn packed(text: &str) -> Option<Packed> {
+    let scene = Scene::parse(text, "s.toml", &Overrides::default());
+    scene.ok().map(|scene| pack(&scene))
+}
+
+/// The time that the processor gave to this thread, in seconds.
+fn processor_time(work: impl Fn()) -> f64 {
+    let now = || -> Option<f64> {
+        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+        text.split_whitespace().next()?.parse().ok()
+    };
+    let clock = std::time::Instant::now();
+    let start = now();
+    work();
+    match (start, now()) {
+        (Some(start), Some(end)) => (end - start) * 1e-9,
+        _ => clock.elapsed().as_secs_f64(),
+    }
+}
+
+fn least_of_three(work: impl Fn()) -> f64 {
+    (0..3).map(|_| processor_time(&work)).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn reading_and_packing_take_time_in_proportion() {
+    for (name, one) in KINDS {
+        let (small, large) = (scene(1500, one), scene(12_000, one));
+        let time = |text: &str| {
+            least_of_three(|| {
+                packed(text);
+            })
+        };
+        let ratio = time(&large) / time(&small);
+        println!("{name}: {ratio:.1}");
+        // 8 times as many: n log n takes 10 times as long, n^2 64 times.
+        assert!(ratio < 24.0, "{name}: 8 times as many take {ratio} times as long");
+    }
+}
+
+#[test]
+fn kernels_do_not_grow_with_materials_lights_and_textures() {
+    for (name, one) in KINDS {
+        if packed(&scene(2, one)).is_none() {
+            continue; // an error, told in time
+        }
+        let [small, large] = [600, 6000].map(|n| packed(&scene(n, one)).expect("a scene"));
+        let time =
+            |packed: &Packed| least_of_three(|| check_kernels(packed, sources::shaders()).expect("good kernels"));
+        let ratio = time(&large) / time(&small);
+        println!("{name}: {ratio:.2}");
+        assert!(ratio < 3.0, "{name}: {ratio}");
+    }
+}
+
+/// `wgray check` with so much memory, in KiB; whether it succeeded, and what it said.
+#[cfg(target_os = "linux")]
+fn check_within(kibibytes: u32, scene: &Path) -> (Option<i32>, String) {
+    let script = format!("ulimit -v {kibibytes}; exec \"$0\" check \"$1\"");
+    let mut command = Command::new("sh");
+    command.args(["-c", &script, env!("CARGO_BIN_EXE_wgray")]).arg(scene);
+    let out = command.output().expect("a shell");
+    (
+        out.status.code(),
+        String::from_utf8_lossy(&[out.stdout, out.stderr].concat()).into_owned(),
+    )
+}
+
+/// Address space that the program takes for a scene of nothing, in KiB.
+#[cfg(target_os = "linux")]
+const PROGRAM: u32 = 60_000;
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_scene_file_takes_a_few_times_its_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.toml");
+    let text = scene(100_000, SPHERE);
+    std::fs::write(&path, &text).unwrap();
+    // docs/performance.md says 500 bytes for each sphere and its text.
+    let (code, told) = check_within(PROGRAM + 50_000, &path);
+    assert_eq!(code, Some(0), "{told}");
+    assert!(told.contains("shapes: 100001 of"), "{told}");
+    // The control: less is not enough.
+    assert_ne!(check_within(PROGRAM + 10_000, &path).0, Some(0));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn images_are_refused_by_their_headers() {
+    let folder = tempfile::tempdir().unwrap();
+    let (width, bytes) = (16_384, 2048);
+    let file = std::fs::File::create(folder.path().join("bits.png")).unwrap();
+    let mut bits = png::Encoder::new(file, width, width);
+    bits.set_depth(png::BitDepth::One);
+    bits.set_color(png::ColorType::Grayscale);
+    let mut writer = bits.write_header().unwrap();
+    writer.write_image_data(&vec![0; bytes * width as usize]).unwrap();
+    drop(writer);
+    // A colour profile that grows a thousandfold.
+    let file = std::fs::File::create(folder.path().join("profile.png")).unwrap();
+    let mut info = png::Info::with_size(4, 4);
+    info.color_type = png::ColorType::Rgb;
+    info.icc_profile = Some(vec![0; 300 << 20].into());
+    let mut writer = png::Encoder::with_info(file, info).unwrap().write_header().unwrap();
+    writer.write_image_data(&[200; 48]).unwrap();
+    drop(writer);
+    let check = |name: &str| {
+        let path = folder.path().join("s.toml");
+        std::fs::write(&path, format!("{START}[textures.t]\ntype = 'image'\nfile = '{name}'\n")).unwrap();
+        check_within(PROGRAM + 20_000, &path)
+    };
+    let (code, told) = check("bits.png");
+    assert_eq!(code, Some(3), "{told}");
+    assert!(
+        told.contains("\"bits.png\", 16384 x 16384 texels, takes 1365.3 MiB"),
+        "{told}"
+    );
+    let (code, told) = check("profile.png");
+    assert_eq!(code, Some(0), "{told}");
+}
