@@ -166,9 +166,9 @@ fn check_within(kibibytes: u32, scene: &Path) -> (Option<i32>, String) {
     )
 }
 
-/// Address space that the program takes for a scene of nothing, in KiB.
+/// Address space that the program takes for a small scene, in KiB.
 #[cfg(target_os = "linux")]
-const PROGRAM: u32 = 60_000;
+const PROGRAM: u32 = 20_000;
 
 #[cfg(target_os = "linux")]
 #[test]
@@ -177,12 +177,12 @@ fn a_scene_file_takes_a_few_times_its_size() {
     let path = folder.path().join("s.toml");
     let text = scene(100_000, SPHERE);
     std::fs::write(&path, &text).unwrap();
-    // docs/performance.md says 500 bytes for each sphere and its text.
-    let (code, told) = check_within(PROGRAM + 50_000, &path);
+    // docs/performance.md says 400 bytes for a sphere and its text; memory is taken in larger pieces.
+    let (code, told) = check_within(PROGRAM + 80_000, &path);
     assert_eq!(code, Some(0), "{told}");
     assert!(told.contains("shapes: 100001 of"), "{told}");
     // The control: less is not enough.
-    assert_ne!(check_within(PROGRAM + 10_000, &path).0, Some(0));
+    assert_ne!(check_within(PROGRAM + 60_000, &path).0, Some(0));
 }
 
 #[cfg(target_os = "linux")]

@@ -59,16 +59,22 @@ pub(super) fn invalid(text: &str, origin: &str, problem: Problem) -> SceneError 
 
 /// The line, from 1, of the key at the end of a path; of its innermost table that is there if it is not.
 fn locate(text: &str, path: &KeyPath) -> usize {
-    let parts = Parts::of(text);
-    let at = match parts.find(path) {
+    let at = match text.len() > LARGEST {
+        true => place_in_parts(&Parts::of(text), path),
+        false => place_in(text, path),
+    };
+    line_number(text, at)
+}
+
+/// The byte where the key at the end of a path begins, in a text that is too large to be read as a whole.
+fn place_in_parts(parts: &Parts, path: &KeyPath) -> usize {
+    match parts.find(path) {
         Some((part, path)) => part.place.start + place_in(parts.text(part), &path),
-        None if text.len() > LARGEST => {
+        None => {
             let rest = parts.rest();
             rest.place(place_in(&rest.text, path))
         }
-        None => place_in(text, path),
-    };
-    line_number(text, at)
+    }
 }
 
 /// The byte where the key at the end of a path begins.

@@ -127,6 +127,18 @@ fn parts_and_what_must_be_read_as_a_whole_have_a_largest_size() {
         "{}",
         told(&bad)
     );
+    let bad = format!(
+        "{START}{RED}{spheres}{}{BLUE}",
+        BLUE.replace("b c", "d").replace("color", "colour")
+    );
+    let line = bad.matches('\n').count() - 3;
+    assert!(
+        told(&bad).starts_with(&format!("s:{line}: materials.d.colour: ")),
+        "{}",
+        told(&bad)
+    );
+    let twice = told(&format!("{START}{RED}{spheres}{RED}"));
+    assert!(twice.contains("duplicate key") && !twice.starts_with("s:3:"), "{twice}");
     let bad = format!("{START}{spheres}{}", SPHERE.replace("radius", "size"));
     let line = bad.matches('\n').count();
     assert!(told(&bad).starts_with(&format!("s:{line}: shapes[")), "{}", told(&bad));
