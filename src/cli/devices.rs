@@ -5,10 +5,13 @@ use std::process::ExitCode;
 
 use wgray::gpu::{self, Info};
 
-pub fn run() -> anyhow::Result<ExitCode> {
-    let adapters = gpu::adapters();
+pub fn run() -> ExitCode {
+    super::ended(list(&gpu::adapters()), ExitCode::SUCCESS)
+}
+
+fn list(adapters: &[Info]) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    for info in &adapters {
+    for info in adapters {
         let Info {
             name,
             driver,
@@ -41,7 +44,7 @@ pub fn run() -> anyhow::Result<ExitCode> {
     if adapters.is_empty() {
         writeln!(out, "{}", gpu::HOW_TO_GET_VULKAN)?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 fn mebibytes(bytes: u64) -> String {

@@ -11,6 +11,8 @@ mod parse;
 mod texture;
 mod validate;
 
+use std::path::PathBuf;
+
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -40,6 +42,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// The shapes, in file order.
     pub shapes: Vec<Shape>,
+    /// The files that the scene names, its textures' images.
+    pub files: Vec<PathBuf>,
 }
 
 /// A camera: a position, an orthonormal basis and a projection.

@@ -72,6 +72,7 @@ impl Description {
             textures,
             materials,
             shapes,
+            files: self.files(&assets.folder).collect(),
         })
     }
 }
