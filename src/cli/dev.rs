@@ -33,7 +33,7 @@ pub struct Args {
     shaders: Option<PathBuf>,
 
     /// What renders. auto or gpu: a real GPU, else software Vulkan; NAME: the adapter with this as a part of its name,
-    /// driver or type
+    /// driver or type, or with this number in the list of wgray devices
     #[arg(long, value_name = "auto|gpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
     device: String,
 
@@ -269,11 +269,7 @@ fn measured(sources: &Sources, device: Choice) -> anyhow::Result<ExitCode> {
 
 fn print(scene: &Path, all: Vec<Measured>) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    writeln!(
-        out,
-        "{}: milliseconds, median and worst",
-        scene.display()
-    )?;
+    writeln!(out, "{}: milliseconds, median and worst", scene.display())?;
     writeln!(
         out,
         "{:<14}{:>16}{:>18}{:>22}",

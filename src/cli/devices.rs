@@ -11,7 +11,7 @@ pub fn run() -> ExitCode {
 
 fn list(adapters: &[Info]) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    for info in adapters {
+    for (number, info) in (1..).zip(adapters) {
         let Info {
             name,
             driver,
@@ -21,7 +21,7 @@ fn list(adapters: &[Info]) -> io::Result<()> {
             largest_binding,
             largest_buffer,
         } = info;
-        writeln!(out, "{name}")?;
+        writeln!(out, "{number}: {name}")?;
         writeln!(out, "    type            {kind}, by {backend}")?;
         writeln!(out, "    driver          {driver}")?;
         writeln!(

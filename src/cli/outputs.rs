@@ -63,8 +63,8 @@ impl Outputs {
     /// Refuses what would replace an input or another output.
     pub fn check(&self, inputs: &[PathBuf]) -> Result<(), Usage> {
         let stats = self.stats.iter().map(|stats| ("--stats", stats, "choose another name"));
-        let pictures = (self.pictures.iter())
-            .map(|(option, output)| (option.as_str(), output, "choose another name by --output"));
+        let pictures =
+            (self.pictures.iter()).map(|(option, output)| (option.as_str(), output, "choose another name by --output"));
         let mut before: Vec<(&str, &Output)> = Vec::new();
         for (option, output, way) in pictures.chain(stats) {
             keep_inputs(option, output, inputs, way)?;
@@ -79,7 +79,11 @@ impl Outputs {
 
     /// Opens all. A pipe waits for its reader, so that is done while signals still end the program at once.
     pub fn begin(mut self) -> io::Result<Begun> {
-        let all = self.pictures.iter_mut().map(|(_, output)| output).chain(&mut self.stats);
+        let all = self
+            .pictures
+            .iter_mut()
+            .map(|(_, output)| output)
+            .chain(&mut self.stats);
         for output in all {
             output.connect()?;
         }
@@ -96,11 +100,12 @@ pub fn keep_inputs(option: &str, output: &Output, inputs: &[PathBuf], way: &str)
     let Some(input) = inputs.iter().find(|input| output.is_input(input)) else {
         return Ok(());
     };
-    let (name, input) = (output.name(), input.display());
-    Err(Usage(if name == input.to_string() {
-        format!("{option}: {name}: is read here, and must stay; {way}")
+    let plain = |path: &str| path.strip_prefix("./").unwrap_or(path).to_owned();
+    let (name, input) = (output.name(), input.display().to_string());
+    Err(Usage(if plain(name) == plain(&input) {
+        format!("{option}: {name}: is a file that the scene is made of, and must stay; {way}")
     } else {
-        format!("{option}: {name}: is the file {input}, which is read here and must stay; {way}")
+        format!("{option}: {name}: is the file {input}, which the scene is made of and must stay; {way}")
     }))
 }
 

@@ -73,7 +73,8 @@ pub struct Args {
     crop: Option<Region>,
 
     /// What renders. auto: a real GPU, else software Vulkan, else the CPU; gpu: any adapter; cpu: the CPU without any
-    /// driver; NAME: the adapter with this as a part of its name, driver or type ("lavapipe" for Mesa's software Vulkan)
+    /// driver; NAME: the adapter with this as a part of its name, driver or type ("lavapipe" for Mesa's software Vulkan),
+    /// or with this number in the list of wgray devices
     #[arg(long, value_name = "auto|gpu|cpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
     device: String,
 
@@ -393,7 +394,9 @@ fn write_picture(
     })?;
     drop(progress);
     if strange > 0 && !plan.quiet {
-        say(&format!("warning: {strange} pixels of the picture are not finite numbers"));
+        say(&format!(
+            "warning: {strange} pixels of the picture are not finite numbers"
+        ));
     }
     Ok((time, camera_rays))
 }

@@ -62,8 +62,9 @@ impl Pending {
         output.connect()?;
         let name = output.name().to_owned();
         let spool = match output.place {
-            Place::File { path, there } => beside(&path)
-                .map(|file| Spool::Beside(file, path, there.map(|(_, permissions)| permissions))),
+            Place::File { path, there } => {
+                beside(&path).map(|file| Spool::Beside(file, path, there.map(|(_, permissions)| permissions)))
+            }
             Place::Through { file: Some(file), .. } => nameless(file),
             Place::Through { path, file: None, .. } => File::options().write(true).open(path).and_then(nameless),
             Place::Standard(stream) => stream.file().and_then(nameless),

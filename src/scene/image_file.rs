@@ -4,15 +4,17 @@ use std::fs::File;
 use std::io::{Cursor, Read as _};
 use std::path::{Path, PathBuf};
 
-use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use image::error::LimitErrorKind;
+use image::{DynamicImage, ImageError, ImageFormat, ImageReader, Limits};
 
+use super::gray_exr::gray_exr;
 use super::texture::{Encoding, Image, Texels};
 
 /// Most texels along a side.
-const LONGEST_SIDE: u32 = 16_384;
+pub(super) const LONGEST_SIDE: u32 = 16_384;
 /// The largest file, and the largest memory that decoding may take, in bytes.
 const LARGEST_FILE: u64 = 256 << 20;
-const LARGEST_IMAGE: u64 = 512 << 20;
+pub(super) const LARGEST_IMAGE: u64 = 512 << 20;
 /// The largest texel, as of any colour.
 const BRIGHTEST: f32 = 1e6;
 
@@ -65,10 +67,16 @@ impl Assets {
         limits.max_image_height = Some(LONGEST_SIDE);
         limits.max_alloc = Some(LARGEST_IMAGE);
         reader.limits(limits);
-        let decoded = reader.decode().map_err(|error| {
-            let sides = format!("sound, and have at most {LONGEST_SIDE} texels along a side");
-            format!("{file:?} must be {sides}: {error}")
-        })?;
+        let gray = match format {
+            ImageFormat::OpenExr => gray_exr(&bytes).map_err(|why| format!("{file:?} {why}"))?,
+            _ => None,
+        };
+        let decoded = match gray {
+            Some(gray) => gray,
+            None => reader
+                .decode()
+                .map_err(|error| format!("{file:?} {}", refused(&error)))?,
+        };
         let (width, height) = (decoded.width(), decoded.height());
         if width == 0 || height == 0 {
             return Err(format!(
@@ -97,7 +105,13 @@ impl Assets {
         })?;
         if !path.starts_with(&root) {
             let root = self.root.display();
-            return Err(format!("{file:?} must not leave {root}, unless --asset-root allows it"));
+            return Err(match self.root == self.folder {
+                true => format!("{file:?} must not leave {root}, unless --asset-root names a folder that it lies in"),
+                false => format!(
+                    "{file:?} is {}, which must lie in {root}, the folder of --asset-root",
+                    path.display()
+                ),
+            });
         }
         if !path.is_file() {
             return Err(format!("{file:?} must be a file"));
@@ -112,6 +126,18 @@ impl Assets {
             return Err(format!("{file:?} must not be larger than {} MiB", LARGEST_FILE >> 20));
         }
         Ok(bytes)
+    }
+}
+
+/// What is told of an image that is not decoded, behind its name.
+fn refused(error: &ImageError) -> String {
+    match error {
+        ImageError::Limits(limit) if matches!(limit.kind(), LimitErrorKind::DimensionError) => {
+            format!("must have at most {LONGEST_SIDE} texels along a side")
+        }
+        ImageError::Limits(_) => format!("must take at most {} MiB when it is read", LARGEST_IMAGE >> 20),
+        ImageError::Unsupported(_) => format!("must be of a kind that can be read: {error}"),
+        _ => format!("is damaged or cut short: {error}"),
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod description;
 mod error;
+mod gray_exr;
 pub(crate) mod image_file;
 mod load;
 mod parse;
