@@ -25,6 +25,7 @@ use super::{Usage, say, signal};
 
 /// The arguments as they are written.
 #[derive(Debug, clap::Args)]
+#[command(after_help = super::EXIT_CODES)]
 #[command(allow_negative_numbers = true)] // so that a number out of range is told as such
 pub struct Args {
     /// Scene file; docs/scene-format.md says what is in it
@@ -88,7 +89,7 @@ pub struct Args {
     pub threads: Option<u16>,
 
     /// What else to write, of the first hit through each pixel's centre. In an EXR these are further layers: normal.X,
-    /// .Y, .Z; depth.Z; uv.U, .V; primitive.ID. Beside a PNG they are further files, NAME.normal.png and so on: normals
+    /// .Y, .Z, outwards; depth.Z, along the ray, 0 where nothing is; uv.U, .V; primitive.ID. Beside a PNG they are further files, NAME.normal.png and so on: normals
     /// moved to 0..1, depth bright where near (half bright at the picture's middle), fractions of texture coordinates in
     /// red and green, shapes in colours. Under adaptive sampling also what it is like: sample_count.N; variance.R, .G, .B
     /// of the pixel's value. Beside a PNG counts are shown on a logarithmic scale, variances by their square root

@@ -187,6 +187,9 @@ impl Stream {
 }
 
 fn place(path: &Path) -> io::Result<Place> {
+    if path.as_os_str().as_encoded_bytes().ends_with(b"/") {
+        return Err(folder());
+    }
     let mut path = path.to_owned();
     for _ in 0..=LINKS {
         let Some(file_name) = path.file_name() else {

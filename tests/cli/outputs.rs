@@ -62,12 +62,6 @@ fn no_input_is_replaced() {
         2,
         &aov,
     );
-    refused(
-        &place,
-        &["tiles.toml", "-o", "../tiles.toml/../tiles.png"],
-        1,
-        "cannot be written",
-    );
     fs::copy(place.path("small.toml"), place.path("scene.png")).unwrap();
     refused(&place, &["scene.png"], 2, &format!("--output: scene.png: {keeps}"));
     // An EXR has its AOVs inside, so that it replaces nothing.
@@ -132,6 +126,36 @@ fn no_output_is_written_twice() {
         ),
     ] {
         refused(&place, &[&["small.toml"], arguments].concat(), 2, told);
+    }
+}
+
+#[test]
+fn the_picture_of_the_development_mode_is_no_input() {
+    let place = Place::new();
+    textured(&place);
+    std::fs::create_dir(place.path("folder.png")).unwrap();
+    for (out, code, told) in [
+        (
+            "tiles.png",
+            2,
+            "--out: tiles.png: is a file that the scene is made of, and must stay; choose another name",
+        ),
+        (
+            "./spare.png",
+            2,
+            "--out: ./spare.png: is a file that the scene is made of",
+        ),
+        ("tiles.toml", 2, "--out: tiles.toml: must end in .png"),
+        ("folder.png", 1, "folder.png: cannot be written: it is a folder"),
+        (
+            "nowhere/a.png",
+            1,
+            "nowhere/a.png: cannot be written: the folder nowhere is not there",
+        ),
+    ] {
+        let ran = place.run(&["dev", "tiles.toml", "--no-page", "--out", out]);
+        assert_eq!(ran.code, code, "{}", ran.stderr);
+        assert!(ran.stderr.contains(told), "{}", ran.stderr);
     }
 }
 

@@ -1,5 +1,7 @@
 //! What is told of text that is no TOML: which key it stands at, what stands there, and what would be right.
 
+use std::collections::BTreeMap;
+
 use crate::scene::error::{KeyPath, SceneError, Segment, cut};
 
 /// The message of bytes that are no text.
@@ -52,19 +54,35 @@ fn explain(text: &str, at: std::ops::Range<usize>, message: &str) -> String {
     } else if message.contains("number overflowed") || message.contains("as i128") {
         format!("{shown} must be a number that 64 bits can hold")
     } else if message.contains("key with no value") {
-        "must be followed by = and a value".to_owned()
+        return match line(text, at.start).trim() {
+            comment if comment.starts_with("//") => {
+                format!("{} must be KEY = VALUE; a comment begins with #", cut(comment))
+            }
+            line => format!("{} must be KEY = VALUE", cut(line)),
+        };
     } else if message.contains("values must be quoted") && token.is_empty() {
         "has no value after its =".to_owned()
     } else if message.contains("values must be quoted") {
+        let rest = line(text, at.start);
+        let rest = rest.find(token).map_or(token, |start| {
+            rest[start..].split('#').next().unwrap_or_default().trim()
+        });
+        let shown = match is_in_list(text, at.start) {
+            true => shown,
+            false => cut(rest),
+        };
         format!("{shown} must be a number, true or false, a list in [ ], a table in {{ }}, or text in \" \"")
     } else if message.contains("escaped value") {
         "text in \" \" must have no single \\; / is right in paths, \\\\ is a \\, and text in ' ' is taken as it is"
             .to_owned()
     } else if message.contains("unexpected key or value") && text[at.start..].starts_with(',') {
         format!("{shown} must be one number, with a point and no comma")
+    } else if message.contains("basic string") || message.contains("literal string") {
+        "text must end with the quotes that it begins with".to_owned()
     } else {
         let message = message.replace(", expected nothing", "").replace('`', "'");
         match token {
+            _ if message.starts_with("unclosed") => message,
             "" => message,
             _ => format!("{shown}: {message}"),
         }
@@ -84,12 +102,22 @@ fn token(text: &str, at: usize) -> &str {
     // A comma parts the values of a list, but may be meant as a point.
     let end = text[at..].find(ends).map_or(text.len(), |end| at + end);
     let all = &text[start..end];
-    let in_list = text[..start].trim_end().ends_with(['[', ',']);
     match all.split_once(',') {
-        Some((first, _)) if in_list => first,
+        Some((first, _)) if is_in_list(text, start) => first,
         Some((first, "")) => first,
         _ => all,
     }
+}
+
+/// Whether what begins here, or around here, is an element of a list.
+fn is_in_list(text: &str, at: usize) -> bool {
+    text[..at].trim_end().ends_with(['[', ','])
+}
+
+/// The line of a byte.
+fn line(text: &str, at: usize) -> &str {
+    let start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
+    text[start..].lines().next().unwrap_or_default()
 }
 
 /// Where in the file's tables a line is, as far as plain lines tell.
@@ -102,7 +130,7 @@ struct Place<'a> {
     key: Option<&'a str>,
 }
 
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy)]
 struct Header<'a> {
     name: &'a str,
     is_list: bool,
@@ -138,22 +166,26 @@ impl<'a> Place<'a> {
             line: 0,
             key: None,
         };
-        let mut headers: Vec<Header> = Vec::new();
+        let mut before: BTreeMap<&str, usize> = BTreeMap::new();
+        // Brackets that are open since the key: its value goes on in the next line.
+        let mut open = 0;
         for (i, line) in text.lines().take(number + 1).enumerate() {
-            if let Some(header) = Header::of(line) {
-                let before = headers
-                    .iter()
-                    .filter(|other| header.is_list && **other == header)
-                    .count();
-                headers.push(header);
+            if let Some(header) = Header::of(line).filter(|_| open <= 0) {
+                let count = before.entry(header.name).or_default();
                 place = Place {
-                    header: Some((header, before)),
+                    header: Some((header, *count)),
                     line: i + 1,
                     key: None,
                 };
-            } else if line.contains('=') || i == number {
-                place.key = key(line).or(place.key.filter(|_| i == number));
+                *count += 1;
+                continue;
             }
+            if open <= 0 {
+                place.key = key(line).filter(|_| line.contains('=') || i == number);
+                open = 0;
+            }
+            let count = |marks: [char; 2]| line.matches(marks).count() as isize;
+            open += count(['[', '{']) - count([']', '}']);
         }
         place
     }
@@ -260,10 +292,7 @@ fov = 45
                 "9:21: render.ray_differentials: True must be true or false, in small",
             ),
             ("focal_length = ", "8:16: camera.focal_length: has no value after its ="),
-            (
-                "focal_length",
-                "8:13: camera.focal_length: must be followed by = and a value",
-            ),
+            ("focal_length", "8:13: focal_length must be KEY = VALUE"),
             (
                 "type = perspective",
                 "8:8: camera.type: perspective must be a number, true or false, a list in [ ], a table in",
@@ -289,7 +318,21 @@ fov = 45
                 "[render]\nfilter = { type = 'box', type = 'box' }",
                 "9:26: render.filter.type: is there twice",
             ),
-            ("up = [0, 0, 1", "8:14: camera.up: 1: unclosed array, expected ']'"),
+            ("up = [0, 0, 1", "8:14: camera.up: unclosed array, expected ']'"),
+            (
+                "// a comment",
+                "8:4: // a comment must be KEY = VALUE; a comment begins with #",
+            ),
+            ("= 3", "8:1: camera: unquoted keys cannot be empty"),
+            (
+                "focal_length = 1 2 # a",
+                "8:16: camera.focal_length: 1 2 must be a number, true or false",
+            ),
+            ("up = [1 2, 3]", "8:7: camera.up: 1 must be a number, true or false"),
+            (
+                "type = \"a",
+                "8:10: camera.type: text must end with the quotes that it begins with",
+            ),
             ("é = 3", "8:1: "),
         ] {
             let error = Scene::parse(&format!("{START}{added}"), "s.toml", &Overrides::default()).unwrap_err();
