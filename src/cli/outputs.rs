@@ -1,6 +1,6 @@
 //! Where a render writes to, settled before it begins: nothing that it reads, and nothing twice.
 
-use std::io;
+use std::io::{self, IsTerminal as _};
 use std::path::{Path, PathBuf};
 
 use wgray::image::{self, Aov, Format, Output, Pending};
@@ -25,6 +25,10 @@ impl Outputs {
     /// Looks at all places. `-` is standard output.
     pub fn find(path: &Path, format: Option<Format>, aovs: &[Aov], stats: Option<&Path>) -> anyhow::Result<Outputs> {
         let picture = output(path)?;
+        if path.as_os_str() == "-" && io::stdout().is_terminal() {
+            let message = "--output: -: must not be a terminal; > FILE or | COMMAND takes the picture";
+            return Err(Usage(message.to_owned()).into());
+        }
         let format = self::format(path, &picture, format)?;
         forbid_ending("--output", path, &picture, "toml", "is a scene's name")?;
         let beside = match format {

@@ -94,8 +94,10 @@ fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, String> {
         false => whole,
     };
     let listed = |found: &[usize]| {
-        let lines = found.iter().map(|i| format!("{}: {}", i + 1, infos[*i].name));
-        lines.collect::<Vec<_>>().join(", ")
+        let lines = found
+            .iter()
+            .map(|i| format!("{}: {}, {}", i + 1, infos[*i].name, infos[*i].driver));
+        lines.collect::<Vec<_>>().join("; ")
     };
     let everything: Vec<usize> = (0..infos.len()).collect();
     match found.as_slice() {
@@ -108,7 +110,7 @@ fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, String> {
         [first, rest @ ..] if rest.iter().any(|i| infos[*i].name != infos[*first].name) => {
             let there = listed(&found);
             Err(format!(
-                "'{name}' means several adapters: {there}; more of the name, or the number, says which"
+                "'{name}' means several adapters; more of a name or driver, or a number, says which: {there}"
             ))
         }
         _ => Ok(found),
@@ -318,8 +320,8 @@ mod tests {
         let several = found("discrete").unwrap_err();
         assert_eq!(
             several,
-            "'discrete' means several adapters: 1: Radeon RX 7900, 2: Radeon RX 7900 XT; more of the name, or the \
-             number, says which"
+            "'discrete' means several adapters; more of a name or driver, or a number, says which: 1: Radeon RX 7900, radv \
+             Mesa 25; 2: Radeon RX 7900 XT, radv Mesa 25"
         );
         let none = found("geforce").unwrap_err();
         assert!(

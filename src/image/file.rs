@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, NamedTempFile};
 
-use super::output::{Output, Place, named};
+use super::output::{Output, Place, named, open};
 
 /// A file in the making. It is removed when dropped; its errors name the file.
 #[derive(Debug)]
@@ -58,15 +58,14 @@ impl Pending {
     /// # Errors
     ///
     /// Folders that may not be written, and what cannot be opened.
-    pub fn start(mut output: Output) -> io::Result<Pending> {
-        output.connect()?;
+    pub fn start(output: Output) -> io::Result<Pending> {
         let name = output.name().to_owned();
         let spool = match output.place {
             Place::File { path, there } => {
                 beside(&path).map(|file| Spool::Beside(file, path, there.map(|(_, permissions)| permissions)))
             }
             Place::Through { file: Some(file), .. } => nameless(file),
-            Place::Through { path, file: None, .. } => File::options().write(true).open(path).and_then(nameless),
+            Place::Through { path, file: None, .. } => open(&path).and_then(nameless),
             Place::Standard(stream) => stream.file().and_then(nameless),
         };
         Ok(Pending {
@@ -140,7 +139,15 @@ impl Seek for Pending {
 }
 
 fn nameless(to: File) -> io::Result<Spool> {
-    Ok(Spool::Nameless(tempfile::tempfile()?, to))
+    let folder = std::env::temp_dir();
+    let spool = tempfile::tempfile_in(&folder).map_err(|error| {
+        let folder = folder.display();
+        io::Error::new(
+            error.kind(),
+            format!("it must first be whole in {folder} (TMPDIR): {error}"),
+        )
+    });
+    Ok(Spool::Nameless(spool?, to))
 }
 
 /// The longest part of a file's name that a temporary name repeats, in bytes.

@@ -97,15 +97,14 @@ impl Output {
         }
     }
 
-    /// Opens what is written through; a pipe waits for its reader.
+    /// Opens what is written through, before [`Pending::start`](super::Pending::start) would; a pipe waits for its reader.
     ///
     /// # Errors
     ///
     /// What cannot be opened.
     pub fn connect(&mut self) -> io::Result<()> {
         if let Place::Through { path, file, .. } = &mut self.place {
-            let opened = OpenOptions::new().write(true).open(path);
-            *file = Some(opened.map_err(|error| named(&self.name, &error))?);
+            *file = Some(open(path).map_err(|error| named(&self.name, &error))?);
         }
         Ok(())
     }
@@ -186,6 +185,11 @@ impl Stream {
     }
 }
 
+/// Opens what is there for writing; it is neither made nor cut short.
+pub(super) fn open(path: &Path) -> io::Result<File> {
+    OpenOptions::new().write(true).open(path)
+}
+
 fn place(path: &Path) -> io::Result<Place> {
     if path.as_os_str().as_encoded_bytes().ends_with(b"/") {
         return Err(folder());
@@ -225,7 +229,7 @@ fn place(path: &Path) -> io::Result<Place> {
                 let message = "it is read-only; make it writable, or choose another name";
                 return Err(io::Error::new(io::ErrorKind::PermissionDenied, message));
             }
-            OpenOptions::new().write(true).open(&path)?; // neither made nor cut short
+            open(&path)?;
             let there = Some((Identity::of(&data), data.permissions()));
             Ok(Place::File { path, there })
         }

@@ -303,7 +303,7 @@ fn an_image_outside_the_asset_root_is_told_with_both() {
     let ran = place.run(&["check", "sub/tile.toml"]);
     assert!(
         ran.stderr
-            .contains("must not leave sub, unless --asset-root names a folder that it lies in"),
+            .contains("must not leave the scene's folder, sub, unless --asset-root names a folder that it lies in"),
         "{}",
         ran.stderr
     );

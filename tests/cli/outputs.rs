@@ -329,6 +329,28 @@ mod unix {
     }
 
     #[test]
+    fn a_folder_for_temporary_files_that_is_not_there_is_told() {
+        let place = Place::new();
+        let ran = place.run_with(
+            &["render", "small.toml", "-o", "-", "--device", "cpu"],
+            &[("TMPDIR", "/nonexistent")],
+        );
+        assert_eq!((ran.code, ran.stdout.as_str()), (1, ""));
+        assert!(
+            ran.stderr
+                .contains("standard output: cannot be written: it must first be whole in /nonexistent"),
+            "{}",
+            ran.stderr
+        );
+        refused(
+            &place,
+            &["small.toml", "-o", "out.png/"],
+            1,
+            "out.png/: cannot be written: it is a folder",
+        );
+    }
+
+    #[test]
     fn a_link_stays_and_its_target_is_replaced() {
         let place = Place::new();
         fs::create_dir(place.path("inner")).unwrap();

@@ -303,7 +303,7 @@ fov = 45
             ),
             (
                 "[textures.t]\nfile = \"a\\quarry.png\"",
-                "9:10: textures.t.file: text in \" \" must have no single \\; / is",
+                "9:11: textures.t.file: text in \" \" must have no single \\; / is",
             ),
             (
                 "fov = 46",
