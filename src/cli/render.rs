@@ -89,8 +89,8 @@ pub struct Args {
     pub threads: Option<u16>,
 
     /// What else to write, of the first hit through each pixel's centre. In an EXR these are further layers: normal.X,
-    /// .Y, .Z, outwards; depth.Z, along the ray, 0 where nothing is; uv.U, .V; primitive.ID. Beside a PNG they are further files, NAME.normal.png and so on: normals
-    /// moved to 0..1, depth bright where near (half bright at the picture's middle), fractions of texture coordinates in
+    /// .Y, .Z, outwards; depth.Z, along the ray, 0 where nothing is; uv.U, .V; primitive.ID. Beside a PNG they are
+    /// further files, NAME.normal.png and so on: normals moved to 0..1, depth bright where near (half bright at the picture's middle), fractions of texture coordinates in
     /// red and green, shapes in colours. Under adaptive sampling also what it is like: sample_count.N; variance.R, .G, .B
     /// of the pixel's value. Beside a PNG counts are shown on a logarithmic scale, variances by their square root
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = aov_parser())]
@@ -352,6 +352,7 @@ fn write_picture(
         middle_depth: middle_depth(plan, backend)?,
         most_samples: plan.scene.pixel_samples,
     };
+    let name = files.first().map(|file| file.name().to_owned()).unwrap_or_default();
     let mut progress = Progress::new(plan.progress);
     let mut time = Duration::ZERO;
     let mut strange = 0;
@@ -395,9 +396,7 @@ fn write_picture(
     })?;
     drop(progress);
     if strange > 0 && !plan.quiet {
-        say(&format!(
-            "warning: {strange} pixels of the picture are not finite numbers"
-        ));
+        say(&format!("warning: {name}: {strange} pixels are not finite numbers"));
     }
     Ok((time, camera_rays))
 }

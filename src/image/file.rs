@@ -75,6 +75,11 @@ impl Pending {
         })
     }
 
+    /// What messages call it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
     /// Brings every byte to the disk, so that only the file's name is missing.
     pub fn complete(&mut self) -> io::Result<()> {
         self.flush()?;
