@@ -49,6 +49,9 @@ const JITTERED: u32 = 3u;
 const HALTON: u32 = 4u;
 const SOBOL: u32 = 5u;
 
+// Bins of a reconstruction filter's table.
+const BINS: u32 = 128u;
+
 // No distance of a hit is larger.
 const FAR: f32 = 3.4028234663852886e38;
 // The number of a primitive that is none.

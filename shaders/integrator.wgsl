@@ -142,9 +142,9 @@ fn filtered(u: vec2f) -> vec3f {
     }
     let i = filter_bin(u.x, FILTER_BINS);
     let j = filter_bin(u.y, FILTER_BINS);
-    let x = filter_offset(u.x, i, FILTER_BINS, filter_table[i].x, filter_table[i + 1u].x);
-    let y = filter_offset(u.y, j, FILTER_BINS, filter_table[j].x, filter_table[j + 1u].x);
-    return vec3f(0.5 + x, 0.5 + y, filter_table[i].y * filter_table[j].y);
+    let x = filter_offset(u.x, i, FILTER_BINS, filter_table[i].x, filter_table[i].y);
+    let y = filter_offset(u.y, j, FILTER_BINS, filter_table[j].x, filter_table[j].y);
+    return vec3f(0.5 + x, 0.5 + y, filter_table[i].z * filter_table[j].z);
 }
 
 // The moments of a pixel before its first sample: the spread of the radiances at its four corners. An edge that cuts off

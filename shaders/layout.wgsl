@@ -95,4 +95,5 @@ struct Work {
     film_origin: vec2u,    // the film's first pixel, in the picture
     film_size: vec2u,      // in pixels
     samples: vec2u,        // first, and one past the last
+    proof: vec2u,          // the range of the loop that proves a pixel whole
 }

@@ -100,6 +100,15 @@ pub enum RenderError {
         /// What it says.
         message: String,
     },
+    /// The driver ends loops before their time, and did so in a kernel that renders a single sample of a pixel.
+    #[error(
+        "{device}: this driver ends long loops early, and a single sample of a pixel has longer ones: the scene has too \
+         many shapes, lights or light samples for it, or a shader was edited"
+    )]
+    CutShort {
+        /// The adapter's name.
+        device: String,
+    },
     /// The work was cancelled.
     #[error("cancelled")]
     Cancelled,

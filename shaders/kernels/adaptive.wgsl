@@ -5,7 +5,7 @@
 @group(0) @binding(10) var<storage, read_write> film: array<vec4f>;
 
 @compute @workgroup_size(8, 8)
-fn adaptive(@builtin(global_invocation_id) id: vec3u) {
+fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {
     if id.x >= work.size.x || id.y >= work.size.y {
         return;
     }
@@ -28,4 +28,5 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u) {
     }
     film[index] = sum;
     film[pixels + index] = moments;
+    sign(local);
 }

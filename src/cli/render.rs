@@ -305,10 +305,16 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
     info!(seconds = start.elapsed().as_secs_f64(), "scene read");
     let outputs = outputs.begin().map_err(RenderError::Output)?;
     let stopped = signal::stop().context("signal handler")?;
-    let (mut backend, described) = plan.backend()?;
+    let (backend, described) = plan.backend()?;
     let setup = start.elapsed();
     info!(seconds = setup.as_secs_f64(), "ready");
-    let (render, camera_rays) = write_picture(&plan, outputs.pictures, backend.as_mut(), &stopped)?;
+    let mut renderer = Renderer {
+        plan: &plan,
+        backend,
+        described,
+    };
+    let (render, camera_rays) = write_picture(&mut renderer, outputs.pictures, &stopped)?;
+    let described = renderer.described;
     let total = start.elapsed();
     info!(
         render = render.as_secs_f64(),
@@ -338,18 +344,41 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// What renders a plan.
+struct Renderer<'a> {
+    plan: &'a Plan,
+    backend: Box<dyn Backend + 'a>,
+    described: Described,
+}
+
+impl Renderer<'_> {
+    /// Does work on the device. If the driver cuts it short, the CPU does it, and all that follows: it has no such limit.
+    fn work<T>(&mut self, mut work: impl FnMut(&mut dyn Backend) -> Result<T, RenderError>) -> Result<T, RenderError> {
+        match work(self.backend.as_mut()) {
+            Err(why @ RenderError::CutShort { .. }) => {
+                if !self.plan.quiet {
+                    say(&format!("warning: rendering on the CPU: {why}"));
+                }
+                (self.backend, self.described) = self.plan.cpu();
+                work(self.backend.as_mut())
+            }
+            other => other,
+        }
+    }
+}
+
 /// Renders band by band into the picture's files; returns the time it took without writing, and the camera's rays.
 fn write_picture(
-    plan: &Plan,
+    renderer: &mut Renderer,
     files: Vec<Pending>,
-    backend: &mut dyn Backend,
     stopped: &AtomicBool,
 ) -> anyhow::Result<(Duration, u64)> {
+    let plan = renderer.plan;
     let layout = Layout {
         picture: (plan.scene.camera.width, plan.scene.camera.height),
         region: plan.region,
         aovs: plan.aovs.clone(),
-        middle_depth: middle_depth(plan, backend)?,
+        middle_depth: renderer.work(|backend| middle_depth(plan, backend))?,
         most_samples: plan.scene.pixel_samples,
     };
     let name = files.first().map(|file| file.name().to_owned()).unwrap_or_default();
@@ -360,7 +389,7 @@ fn write_picture(
     image::save(files, plan.format, &layout, &mut |sink| {
         let cut = Cut::default();
         let mut done = 0;
-        for band in job::bands(plan.region, &cut, backend.largest_film()) {
+        for band in job::bands(plan.region, &cut, renderer.backend.largest_film()) {
             let start = Instant::now();
             let mut update = |share: f64| {
                 progress.update((done as f64 + share * band.pixels() as f64) / plan.region.pixels() as f64);
@@ -371,14 +400,15 @@ fn write_picture(
                 film = rendered;
                 Ok(())
             };
-            job::render(backend, band, plan.scene.pixel_samples, &cut, &mut update, &mut take)?;
+            renderer
+                .work(|backend| job::render(backend, band, plan.scene.pixel_samples, &cut, &mut update, &mut take))?;
             time += start.elapsed();
             camera_rays += match plan.scene.adaptive {
                 true => film.sample_counts().map(|count| u64::from(count + CORNERS)).sum(),
                 false => band.pixels() * u64::from(plan.scene.pixel_samples),
             };
             let hits = match plan.aovs.iter().any(|aov| !aov.is_of_film()) {
-                true => job::first_hits(backend, band)?,
+                true => renderer.work(|backend| job::first_hits(backend, band))?,
                 false => Vec::new(),
             };
             strange += film

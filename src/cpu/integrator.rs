@@ -201,11 +201,10 @@ pub fn filtered(scene: &Packed, u: Vec2) -> Vec3 {
         return u.extend(1.0);
     }
     let (i, j) = (filter_bin(u.x, bins), filter_bin(u.y, bins));
-    let edges = |bin: u32| (table[bin as usize], table[bin as usize + 1]);
-    let ((x0, x1), (y0, y1)) = (edges(i), edges(j));
-    let x = filter_offset(u.x, i, bins, x0.x, x1.x);
-    let y = filter_offset(u.y, j, bins, y0.x, y1.x);
-    Vec3::new(0.5 + x, 0.5 + y, x0.y * y0.y)
+    let (of_x, of_y) = (table[i as usize], table[j as usize]);
+    let x = filter_offset(u.x, i, bins, of_x.x, of_x.y);
+    let y = filter_offset(u.y, j, bins, of_y.x, of_y.y);
+    Vec3::new(0.5 + x, 0.5 + y, of_x.z * of_y.z)
 }
 
 pub fn pixel_corners(scene: &Packed, pixel: UVec2) -> Vec4 {

@@ -30,6 +30,7 @@ pub const BUILT_IN: &[(&str, &str)] = files![
     "phong.wgsl",
     "plane.wgsl",
     "ray.wgsl",
+    "receipt.wgsl",
     "rectangle.wgsl",
     "rng.wgsl",
     "rounding.wgsl",
@@ -83,6 +84,7 @@ pub const ROUNDING: &str = "rounding.wgsl";
 const KERNEL: &[&str] = &[
     "specialization.wgsl",
     "bindings.wgsl",
+    "receipt.wgsl",
     "traverse.wgsl",
     "texture.wgsl",
     "integrator.wgsl",

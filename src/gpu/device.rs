@@ -263,6 +263,11 @@ impl Device {
             self.queue.submit([encoder.finish()]);
             staging
         })?;
+        self.read(&staging)
+    }
+
+    /// What a buffer that can be mapped holds, once all submitted work has ended.
+    pub(super) fn read<T: Pod>(&self, staging: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
         let (sender, receiver) = std::sync::mpsc::channel();
         staging.map_async(wgpu::MapMode::Read, .., move |result| {
             let _ = sender.send(result); // nobody waits any more if the wait has failed
@@ -273,7 +278,10 @@ impl Device {
             .map_err(|error| self.error(error))?
             .map_err(|error| self.error(error))?;
         let view = staging.get_mapped_range(..).map_err(|error| self.error(error))?;
-        Ok(bytemuck::pod_collect_to_vec(&view))
+        let records = bytemuck::pod_collect_to_vec(&view);
+        drop(view);
+        staging.unmap();
+        Ok(records)
     }
 }
 

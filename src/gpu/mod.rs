@@ -8,6 +8,7 @@ mod pipeline;
 mod prune;
 mod renderer;
 mod rounding;
+mod rounds;
 pub mod spirv;
 mod validate;
 

@@ -14,14 +14,14 @@ use crate::pack::Specialization;
 /// Side of a workgroup, as the kernels declare it.
 pub const WORKGROUP: u32 = 8;
 
-/// How the buffers of `shaders/bindings.wgsl` are bound, the last being what the kernel writes.
+/// How the buffers of `shaders/bindings.wgsl` are bound: what the kernel writes, and its receipt, are the last.
 pub fn bind_group_layout(device: &Device) -> wgpu::BindGroupLayout {
     let uniform = BufferBindingType::Uniform;
     let read = BufferBindingType::Storage { read_only: true };
     let write = BufferBindingType::Storage { read_only: false };
     let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
         .zip([
-            uniform, uniform, uniform, read, read, read, read, read, read, read, write,
+            uniform, uniform, uniform, read, read, read, read, read, read, uniform, write, write,
         ])
         .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
             binding,

@@ -11,10 +11,11 @@ use super::compose::{Kernel, Shaders};
 use super::device::Device;
 use super::pipeline::{WORKGROUP, bind_group_layout, pipeline};
 use super::rounding::Rounding;
+use super::rounds::samples_per_call;
 use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::job::Backend;
-use crate::pack::{Camera, FirstHit, Packed, Specialization, Work};
+use crate::pack::{BINS, Camera, FirstHit, Packed, Specialization, Work};
 
 /// How a scene is put on a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,8 +45,14 @@ pub struct Gpu {
     aov: Option<wgpu::ComputePipeline>,
     scene: [wgpu::Buffer; 9],
     work: wgpu::Buffer,
+    /// The kernel's receipt of a call: as the kernel writes it, and as the host reads it.
+    receipt: [wgpu::Buffer; 2],
+    /// What the last call of [`Backend::render`] has changed, as it was before.
+    before: Option<wgpu::Buffer>,
     film: Option<Target>,
     adaptive: bool,
+    /// The most samples of a call that the driver is thought to run whole.
+    samples_per_call: u32,
 }
 
 /// What it takes to compile another kernel for the same scene.
@@ -64,6 +71,39 @@ struct Target {
     group: wgpu::BindGroup,
 }
 
+/// The rows of a film that a tile lies in: a piece of each of the film's lists of pixels, in bytes.
+struct Rows {
+    lists: u64,
+    list: u64,
+    start: u64,
+    size: u64,
+}
+
+impl Rows {
+    fn of(film: &Target, tile: Region) -> Rows {
+        let row = u64::from(film.region.width()) * size_of::<Vec4>() as u64;
+        let list = u64::from(film.region.height()) * row;
+        Rows {
+            lists: film.buffer.size() / list,
+            list,
+            start: u64::from(tile.y0 - film.region.y0) * row,
+            size: u64::from(tile.height()) * row,
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        self.lists * self.size
+    }
+
+    /// Where each piece starts in the film, and in a copy of all of them.
+    fn pieces(&self) -> impl Iterator<Item = (u64, u64)> {
+        (0..self.lists).map(|i| (i * self.list + self.start, i * self.size))
+    }
+}
+
+/// Rounds of the loop that proves a pixel whole: more than the single one of a loop that is cut short.
+const PROOF: UVec2 = UVec2::new(0, 4);
+
 impl Gpu {
     /// Compiles the kernel for a scene and uploads it. The device has run the kernel once, on nothing, when this
     /// returns: drivers compile at the first dispatch.
@@ -81,13 +121,19 @@ impl Gpu {
         };
         let scene = upload(device, packed)?;
         let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+        let written = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
+        let receipt = [written, BufferUsages::COPY_DST | BufferUsages::MAP_READ]
+            .map(|usage| device.buffer(size_of::<[u32; 2]>() as u64, usage));
         let mut gpu = Gpu {
+            samples_per_call: samples_per_call(&kernels.constants, kernels.baked.is_some()),
             device: device.clone(),
             kernels,
             render,
             aov: None,
             scene,
             work,
+            receipt,
+            before: None,
             film: None,
             adaptive: packed.adaptive,
         };
@@ -128,7 +174,8 @@ impl Gpu {
     fn target<T: Pod>(&self, region: Region) -> Result<Target, RenderError> {
         let size = region.pixels() * size_of::<T>() as u64;
         self.device.checked(|| {
-            let buffer = self.device.buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+            let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
+            let buffer = self.device.buffer(size, usage);
             let [
                 camera,
                 environment,
@@ -152,6 +199,7 @@ impl Gpu {
                 texels,
                 filter_table,
                 &buffer,
+                &self.receipt[0],
             ];
             let entries: Vec<wgpu::BindGroupEntry> = (0..)
                 .zip(buffers)
@@ -169,33 +217,90 @@ impl Gpu {
         })
     }
 
-    /// Runs a kernel over a tile of a target, and waits for its end.
+    /// Runs a kernel over a tile of a target, after these copies, waits for its end, and returns whether it ran whole for
+    /// every pixel: the driver has cut none of its loops short.
     fn dispatch(
         &self,
         pipeline: &wgpu::ComputePipeline,
         target: &Target,
         tile: Region,
         samples: Range<u32>,
-    ) -> Result<(), RenderError> {
+        copies: impl FnOnce(&mut wgpu::CommandEncoder),
+    ) -> Result<bool, RenderError> {
         let work = Work {
             origin: UVec2::new(tile.x0, tile.y0),
             size: UVec2::new(tile.width(), tile.height()),
             film_origin: UVec2::new(target.region.x0, target.region.y0),
             film_size: UVec2::new(target.region.width(), target.region.height()),
             samples: UVec2::new(samples.start, samples.end),
+            proof: PROOF,
         };
         let Device { device, queue, .. } = &self.device;
+        let [written, read] = &self.receipt;
+        let groups = [tile.width(), tile.height()].map(|pixels| pixels.div_ceil(WORKGROUP));
         self.device.checked(|| {
             queue.write_buffer(&self.work, 0, bytes_of(&work));
             let mut encoder = device.create_command_encoder(&Default::default());
+            copies(&mut encoder);
+            encoder.clear_buffer(written, 0, None);
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &target.group, &[]);
-            pass.dispatch_workgroups(tile.width().div_ceil(WORKGROUP), tile.height().div_ceil(WORKGROUP), 1);
+            pass.dispatch_workgroups(groups[0], groups[1], 1);
             drop(pass);
+            encoder.copy_buffer_to_buffer(written, 0, read, 0, read.size());
             queue.submit([encoder.finish()]);
         })?;
-        self.device.wait()
+        let receipt: Vec<u32> = self.device.read(read)?;
+        Ok(receipt == [groups[0] * groups[1], 0])
+    }
+
+    /// Adds samples to a tile of a film in as many calls as it takes, and learns how long one may be. A call that was cut
+    /// short is undone.
+    fn render_whole(&mut self, film: &Target, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+        let rows = Rows::of(film, tile);
+        let before = match self.before.take().filter(|before| before.size() >= rows.bytes()) {
+            Some(before) => before,
+            None => self.device.checked(|| {
+                self.device
+                    .buffer(rows.bytes(), BufferUsages::COPY_SRC | BufferUsages::COPY_DST)
+            })?,
+        };
+        let mut first = samples.start;
+        loop {
+            let count = self.samples_per_call.min(samples.end - first);
+            let save = |encoder: &mut wgpu::CommandEncoder| {
+                for (start, copy) in rows.pieces() {
+                    encoder.copy_buffer_to_buffer(&film.buffer, start, &before, copy, rows.size);
+                }
+            };
+            if self.dispatch(&self.render, film, tile, first..first + count, save)? {
+                first += count;
+                if first == samples.end {
+                    self.before = Some(before);
+                    return Ok(());
+                }
+                continue;
+            }
+            self.device.checked(|| {
+                let mut encoder = self.device.device.create_command_encoder(&Default::default());
+                for (start, copy) in rows.pieces() {
+                    encoder.copy_buffer_to_buffer(&before, copy, &film.buffer, start, rows.size);
+                }
+                self.device.queue.submit([encoder.finish()]);
+            })?;
+            if count <= 1 {
+                return Err(self.cut_short());
+            }
+            self.samples_per_call = count / 2;
+        }
+    }
+
+    /// A single sample is too long for the driver.
+    fn cut_short(&self) -> RenderError {
+        RenderError::CutShort {
+            device: self.device.info.name.clone(),
+        }
     }
 }
 
@@ -210,10 +315,12 @@ impl Backend for Gpu {
     }
 
     fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
-        let Some(film) = &self.film else {
+        let Some(film) = self.film.take() else {
             return Ok(());
         };
-        self.dispatch(&self.render, film, tile, samples)
+        let result = self.render_whole(&film, tile, samples);
+        self.film = Some(film);
+        result
     }
 
     fn film(&mut self) -> Result<Film, RenderError> {
@@ -235,9 +342,12 @@ impl Backend for Gpu {
             None => self.kernels.compile(&self.device, Kernel::Aov)?,
         };
         let target = self.target::<FirstHit>(region)?;
-        self.dispatch(&pipeline, &target, region, 0..0)?;
+        let whole = self.dispatch(&pipeline, &target, region, 0..0, |_| ())?;
         self.aov = Some(pipeline);
-        self.device.download(&target.buffer)
+        match whole {
+            true => self.device.download(&target.buffer),
+            false => Err(self.cut_short()),
+        }
     }
 
     fn samples_of_all(&self) -> u32 {
@@ -252,6 +362,8 @@ impl Backend for Gpu {
 
 /// The buffers of a scene, in the order of their bindings.
 fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 9], RenderError> {
+    let mut filter_table = packed.filter_table.clone();
+    filter_table.resize(BINS as usize, Vec4::ZERO);
     device.checked(|| {
         [
             device.upload(BufferUsages::UNIFORM | BufferUsages::COPY_DST, &[packed.camera]),
@@ -262,7 +374,7 @@ fn upload(device: &Device, packed: &Packed) -> Result<[wgpu::Buffer; 9], RenderE
             device.upload(BufferUsages::STORAGE, &packed.lights),
             device.upload(BufferUsages::STORAGE, &packed.textures),
             device.upload(BufferUsages::STORAGE, &packed.texels),
-            device.upload(BufferUsages::STORAGE, &packed.filter_table),
+            device.upload(BufferUsages::UNIFORM, &filter_table),
         ]
     })
 }

@@ -84,6 +84,9 @@ pub const HALTON: u32 = 4;
 /// [`Pattern::Sobol`].
 pub const SOBOL: u32 = 5;
 
+/// Bins between the centre and the radius of a reconstruction filter.
+pub const BINS: u32 = 128;
+
 /// No distance of a hit is larger.
 pub const FAR: f32 = f32::MAX;
 /// The number of a primitive that is none.

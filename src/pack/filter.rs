@@ -2,12 +2,11 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec2, Vec2};
+use glam::{DVec4, Vec4};
 
+use super::BINS;
 use crate::scene::{PixelFilter, PixelFilterKind};
 
-/// Bins between the centre and the radius of a filter.
-pub const BINS: u32 = 128;
 /// Steps of the numerical integrals, between two sign changes of a filter.
 const STEPS: usize = 1 << 14;
 
@@ -42,10 +41,9 @@ fn mitchell(x: f64) -> f64 {
     six_times / 6.0
 }
 
-/// The edges and weights of a filter's bins: [`BINS`] + 1 pairs of a bin's inner edge and its weight, the last one with
-/// the outermost edge. All bins are met equally often. Those of a lobe have the same integral, and a weight that makes
+/// The [`BINS`] bins of a filter: inner edge, outer edge and weight, then 0. All bins are met equally often. Those of a lobe have the same integral, and a weight that makes
 /// up for the lobe's share of bins, which is a whole number: close to 1, below 0 in negative lobes.
-pub fn table(filter: PixelFilter) -> Vec<Vec2> {
+pub fn table(filter: PixelFilter) -> Vec<Vec4> {
     let lobes = lobes(filter);
     let total: f64 = lobes.iter().map(|lobe| lobe.integral().abs()).sum();
     let mut table = Vec::new();
@@ -58,12 +56,15 @@ pub fn table(filter: PixelFilter) -> Vec<Vec2> {
         };
         left -= bins;
         let weight = lobe.integral().signum() * share / f64::from(bins);
+        let edge = |bin: u32| lobe.quantile(f64::from(bin) / f64::from(bins));
         for bin in 0..bins {
-            let edge = lobe.quantile(f64::from(bin) / f64::from(bins));
-            table.push(DVec2::new(edge, weight).as_vec2());
+            table.push(DVec4::new(edge(bin), 0.0, weight, 0.0).as_vec4());
         }
     }
-    table.push(DVec2::new(filter.radius, 0.0).as_vec2());
+    for bin in 0..table.len() {
+        let outermost = filter.radius as f32;
+        table[bin].y = table.get(bin + 1).map_or(outermost, |next| next.x);
+    }
     table
 }
 

@@ -176,4 +176,6 @@ pub struct Work {
     pub film_size: UVec2,
     /// The first sample, and one past the last.
     pub samples: UVec2,
+    /// The range of the loop that proves a pixel whole (`shaders/receipt.wgsl`).
+    pub proof: UVec2,
 }

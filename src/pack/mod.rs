@@ -10,7 +10,7 @@ mod pyramid;
 mod specialization;
 
 use bytemuck::Zeroable as _;
-use glam::{DMat3, DVec3, Vec2};
+use glam::{DMat3, DVec3, Vec4};
 
 use self::appearance::Appearances;
 pub use self::constants::*;
@@ -41,7 +41,7 @@ pub struct Packed {
     /// Their images: tables of places, and texels.
     pub texels: Vec<u32>,
     /// The filter's bins ([`filter::table`]); none if it is the box of the pixel.
-    pub filter_table: Vec<Vec2>,
+    pub filter_table: Vec<Vec4>,
     /// Samples of every pixel; under adaptive sampling the most that one gets.
     pub pixel_samples: u32,
     /// Whether sampling is adaptive.
@@ -112,7 +112,7 @@ pub fn pack(scene: &Scene) -> Packed {
         light_pattern: pattern(light_samples),
         light_side: side(light_samples),
         light_samples: light_samples.count,
-        filter_bins: (filter_table.len() as u32).saturating_sub(1),
+        filter_bins: filter_table.len() as u32,
         squared_error: adaptive
             .map_or(0.0, |adaptive| (adaptive.error * adaptive.error) as f32)
             .to_bits(),

@@ -1,11 +1,11 @@
 //! Reconstruction filters: integrals and moments of their tables, the positions and weights that come of them, and pictures.
 
-use glam::Vec2;
+use glam::Vec4;
 use wgray::cpu::integrator::filtered;
 use wgray::cpu::sequence::sobol_sample;
 use wgray::film::mean;
-use wgray::pack::Packed;
-use wgray::pack::filter::{BINS, height, table};
+use wgray::pack::filter::{height, table};
+use wgray::pack::{BINS, Packed};
 use wgray::scene::{Pattern, PixelFilterDescription, PixelFilterKind};
 
 use super::cornell;
@@ -68,11 +68,10 @@ fn filters_have_their_integrals() {
 }
 
 /// The weighted mean of x^power over a table's bins, each uniform and met equally often.
-fn table_moment(table: &[Vec2], power: i32) -> f64 {
+fn table_moment(table: &[Vec4], power: i32) -> f64 {
     let (mut sum, mut weights) = (0.0, 0.0);
-    for bin in table.windows(2) {
-        let [a, b] = [bin[0].x, bin[1].x].map(f64::from);
-        let weight = f64::from(bin[0].y);
+    for bin in table {
+        let [a, b, weight] = [bin.x, bin.y, bin.z].map(f64::from);
         let n = power + 1;
         sum += weight * (b.powi(n) - a.powi(n)) / (f64::from(n) * (b - a));
         weights += weight;
