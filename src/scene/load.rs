@@ -80,8 +80,7 @@ impl Scene {
             Err(error) => {
                 let text = String::from_utf8_lossy(&bytes);
                 // Up to there the lossy text is the file's.
-                let at = error.valid_up_to();
-                Err(syntax_error(&text, &origin, at..at, NOT_UTF8))
+                Err(syntax_error(&text, &origin, error.valid_up_to(), NOT_UTF8))
             }
         }
     }

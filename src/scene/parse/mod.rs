@@ -25,7 +25,8 @@ impl Description {
     /// Text that is no TOML, unknown and missing keys, unknown types, and values of the wrong type.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SceneError> {
         let table = toml::from_str(text).map_err(|error: toml::de::Error| {
-            syntax_error(text, origin, error.span().unwrap_or_default(), error.message())
+            let start = error.span().map_or(0, |span| span.start);
+            syntax_error(text, origin, start, error.message())
         })?;
         read_file(table).map_err(|problem| invalid(text, origin, problem))
     }

@@ -7,32 +7,27 @@ use crate::scene::error::{KeyPath, SceneError, Segment, cut};
 /// The message of bytes that are no text.
 pub(in crate::scene) const NOT_UTF8: &str = "not valid UTF-8";
 
-/// The error of a text that goes wrong in these bytes; `message` is what the parser says.
-pub(in crate::scene) fn syntax_error(
-    text: &str,
-    origin: &str,
-    at: std::ops::Range<usize>,
-    message: &str,
-) -> SceneError {
-    let start = text.floor_char_boundary(at.start);
-    let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
+/// The error of a text that goes wrong at the byte `at`; `message` is what the parser says.
+pub(in crate::scene) fn syntax_error(text: &str, origin: &str, at: usize, message: &str) -> SceneError {
+    let at = text.floor_char_boundary(at);
+    let line_start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
     SceneError::Syntax {
         origin: origin.to_owned(),
-        line: super::line_number(text, start),
-        column: text[line_start..start].chars().count() + 1,
-        message: explain(text, start..at.end, message),
+        line: super::line_number(text, at),
+        column: text[line_start..at].chars().count() + 1,
+        message: explain(text, at, message),
     }
 }
 
-fn explain(text: &str, at: std::ops::Range<usize>, message: &str) -> String {
+fn explain(text: &str, at: usize, message: &str) -> String {
     if message == NOT_UTF8 {
         return message.to_owned();
     }
-    let place = Place::of(text, at.start);
-    let token = token(text, at.start);
+    let place = Place::of(text, at);
+    let token = token(text, at);
     let shown = cut(token);
     let rule = if message == "duplicate key" {
-        return twice(text, &place, text.get(at).unwrap_or_default());
+        return twice(text, &place, name(text, at));
     } else if message.contains("mantissa") {
         let digits = token.trim_start_matches(['+', '-']);
         let sign = &token[..token.len() - digits.len()];
@@ -54,7 +49,7 @@ fn explain(text: &str, at: std::ops::Range<usize>, message: &str) -> String {
     } else if message.contains("number overflowed") || message.contains("as i128") {
         format!("{shown} must be a number that 64 bits can hold")
     } else if message.contains("key with no value") {
-        return match line(text, at.start).trim() {
+        return match line(text, at).trim() {
             comment if comment.starts_with("//") => {
                 format!("{} must be KEY = VALUE; a comment begins with #", cut(comment))
             }
@@ -63,11 +58,11 @@ fn explain(text: &str, at: std::ops::Range<usize>, message: &str) -> String {
     } else if message.contains("values must be quoted") && token.is_empty() {
         "has no value after its =".to_owned()
     } else if message.contains("values must be quoted") {
-        let rest = line(text, at.start);
+        let rest = line(text, at);
         let rest = rest.find(token).map_or(token, |start| {
             rest[start..].split('#').next().unwrap_or_default().trim()
         });
-        let shown = match is_in_list(text, at.start) {
+        let shown = match is_in_list(text, at) {
             true => shown,
             false => cut(rest),
         };
@@ -75,7 +70,7 @@ fn explain(text: &str, at: std::ops::Range<usize>, message: &str) -> String {
     } else if message.contains("escaped value") {
         "text in \" \" must have no single \\; / is right in paths, \\\\ is a \\, and text in ' ' is taken as it is"
             .to_owned()
-    } else if message.contains("unexpected key or value") && text[at.start..].starts_with(',') {
+    } else if message.contains("unexpected key or value") && text[at..].starts_with(',') {
         format!("{shown} must be one number, with a point and no comma")
     } else if message.contains("basic string") || message.contains("literal string") {
         "text must end with the quotes that it begins with".to_owned()
@@ -206,6 +201,18 @@ fn segments(dotted: &str) -> impl Iterator<Item = Segment> {
     parts.map(Segment::from)
 }
 
+/// The part of a dotted key that begins at a byte.
+fn name(text: &str, at: usize) -> &str {
+    let rest = &text[at..];
+    let quote = rest.chars().next().filter(|c| "\"'".contains(*c));
+    let quoted = quote.and_then(|quote| rest[1..].split(quote).next());
+    quoted.unwrap_or_else(|| {
+        rest.split(|c: char| c.is_whitespace() || ".=]".contains(c))
+            .next()
+            .unwrap_or_default()
+    })
+}
+
 /// What is told of a key or a table that is there twice.
 fn twice(text: &str, place: &Place, name: &str) -> String {
     let lines = || text.lines().enumerate();
@@ -217,7 +224,10 @@ fn twice(text: &str, place: &Place, name: &str) -> String {
         (None, None) => None,
     };
     let mut path = place.path();
-    if place.key.is_some_and(|key| !key.ends_with(name)) {
+    if place
+        .key
+        .is_some_and(|key| !key.trim_end_matches(['"', '\'']).ends_with(name))
+    {
         path.0.push(Segment::from(name)); // in a table in { }
     }
     match first {
