@@ -1,4 +1,6 @@
 //! The program `wgray`.
+// These end the program where a stream is closed or full.
+#![warn(clippy::print_stderr, clippy::print_stdout)]
 
 mod cli;
 

@@ -27,16 +27,23 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         ..Overrides::default()
     };
     let mut code = None;
+    let mut printed = Ok(());
     for path in &args.scenes {
         match check(path, &overrides, &shaders) {
-            Ok(summary) => writeln!(io::stdout().lock(), "{}: {summary}", path.display())?,
+            Ok(summary) if printed.is_ok() => {
+                printed = writeln!(io::stdout().lock(), "{}: {summary}", path.display());
+            }
+            Ok(_) => {} // nobody reads any more
             Err(error) => {
                 super::report(&error);
                 code.get_or_insert(super::exit_code(&error));
             }
         }
     }
-    Ok(code.unwrap_or(ExitCode::SUCCESS))
+    Ok(match code {
+        Some(code) => code,
+        None => super::ended(printed, ExitCode::SUCCESS),
+    })
 }
 
 fn check(path: &Path, overrides: &Overrides, shaders: &Shaders) -> anyhow::Result<String> {

@@ -7,11 +7,14 @@ use std::time::{Duration, SystemTime};
 
 use anyhow::anyhow;
 use clap::builder::NonEmptyStringValueParser;
-use wgray::dev::{Diagnostic, Listener, Report, Session, Settings, Sources, StartError, measure};
+use wgray::dev::{Diagnostic, Listener, Measured, Report, Session, Settings, Sources, StartError, measure};
+use wgray::error::RenderError;
 use wgray::gpu::Choice;
-use wgray::scene::{Overrides, SceneError};
+use wgray::image::Output;
+use wgray::scene::{Description, Overrides, SceneError};
 
 use super::Usage;
+use super::outputs::keep_inputs;
 use super::render::parse_size;
 
 /// The arguments as they are written.
@@ -30,7 +33,7 @@ pub struct Args {
     shaders: Option<PathBuf>,
 
     /// What renders. auto or gpu: a real GPU, else software Vulkan; NAME: the adapter with this as a part of its name,
-    /// driver or type
+    /// driver or type, or with this number in the list of wgray devices
     #[arg(long, value_name = "auto|gpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
     device: String,
 
@@ -65,13 +68,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         },
         shaders: shaders(args.shaders)?,
     };
-    let device = match args.device.as_str() {
+    let device = match args.device.to_lowercase().as_str() {
         "auto" => Choice::Auto,
         "gpu" => Choice::Gpu,
         "cpu" => {
             return Err(Usage("--device: cpu runs no shaders; dev needs a GPU or software Vulkan".to_string()).into());
         }
-        name => Choice::Named(name.to_string()),
+        _ => Choice::Named(args.device),
     };
     if args.measure {
         return measured(&sources, device);
@@ -79,13 +82,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.no_page && args.out.is_none() {
         return Err(Usage("--no-page: --out FILE.png must say where the picture goes".to_string()).into());
     }
-    if let Some(out) = args
-        .out
-        .as_ref()
-        .filter(|out| !out.extension().is_some_and(|end| end.eq_ignore_ascii_case("png")))
-    {
-        return Err(Usage(format!("--out: {}: must end in .png", out.display())).into());
-    }
+    let out = args.out.as_deref().map(|out| checked(out, &sources)).transpose()?;
     let listener = if args.no_page {
         None
     } else {
@@ -96,7 +93,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let session = Session::start(Settings {
         sources,
         device,
-        out: args.out.clone(),
+        out,
         report: Box::new(move |report| terminal.report(&report)),
     })
     .map_err(|error| match error {
@@ -114,13 +111,33 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let address = listener.address()?;
     Terminal::new().line("", &format!("http://{address}/: the page; Ctrl+C ends"));
     if !address.ip().is_loopback() {
-        eprintln!(
+        super::say(&format!(
             "warning: {address} is no loopback address: everybody who can reach it can look, and can save the camera \
              into the scene file"
-        );
+        ));
     }
     listener.serve(&session)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The file that --out means, behind its links: no file that is watched, nor anything but a PNG file.
+fn checked(out: &Path, sources: &Sources) -> anyhow::Result<PathBuf> {
+    let is_png = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
+    if !is_png(out) {
+        return Err(Usage(format!("--out: {}: must end in .png", out.display())).into());
+    }
+    let output = Output::find(out).map_err(RenderError::Output)?;
+    let Some(path) = output.path() else {
+        return Err(Usage(format!("--out: {}: must be a file, which is replaced", out.display())).into());
+    };
+    let text = std::fs::read_to_string(&sources.scene).unwrap_or_default();
+    let described = Description::parse(&text, "").ok();
+    let folder = sources.scene.parent().unwrap_or(Path::new(""));
+    let named = described.iter().flat_map(|described| described.files(folder));
+    let scene = std::iter::once(sources.scene.clone());
+    let inputs: Vec<PathBuf> = scene.chain(named).chain(sources.shader_files()).collect();
+    keep_inputs("--out", &output, &inputs, "choose another name")?;
+    Ok(path.to_owned())
 }
 
 /// The folder of the shaders, if they are not those in the program.
@@ -247,12 +264,12 @@ fn time(seconds: f64) -> String {
 
 fn measured(sources: &Sources, device: Choice) -> anyhow::Result<ExitCode> {
     let all = measure(sources, device).map_err(|error| anyhow!(error))?;
+    Ok(super::ended(print(&sources.scene, all), ExitCode::SUCCESS))
+}
+
+fn print(scene: &Path, all: Vec<Measured>) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    writeln!(
-        out,
-        "{}: milliseconds, median and worst",
-        Path::new(&sources.scene).display()
-    )?;
+    writeln!(out, "{}: milliseconds, median and worst", scene.display())?;
     writeln!(
         out,
         "{:<14}{:>16}{:>18}{:>22}",
@@ -270,5 +287,5 @@ fn measured(sources: &Sources, device: Choice) -> anyhow::Result<ExitCode> {
             row.change, cells[0], cells[1], cells[2]
         )?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }

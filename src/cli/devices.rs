@@ -5,10 +5,13 @@ use std::process::ExitCode;
 
 use wgray::gpu::{self, Info};
 
-pub fn run() -> anyhow::Result<ExitCode> {
-    let adapters = gpu::adapters();
+pub fn run() -> ExitCode {
+    super::ended(list(&gpu::adapters()), ExitCode::SUCCESS)
+}
+
+fn list(adapters: &[Info]) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    for info in &adapters {
+    for (number, info) in (1..).zip(adapters) {
         let Info {
             name,
             driver,
@@ -19,7 +22,7 @@ pub fn run() -> anyhow::Result<ExitCode> {
             storage_buffers,
             largest_buffer,
         } = info;
-        writeln!(out, "{name}")?;
+        writeln!(out, "{number}: {name}")?;
         writeln!(out, "    type            {kind}, by {backend}")?;
         writeln!(out, "    driver          {driver}")?;
         writeln!(
@@ -43,7 +46,7 @@ pub fn run() -> anyhow::Result<ExitCode> {
     if adapters.is_empty() {
         writeln!(out, "{}", gpu::HOW_TO_GET_VULKAN)?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 fn mebibytes(bytes: u64) -> String {

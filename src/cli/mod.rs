@@ -4,8 +4,10 @@ mod check;
 #[cfg(feature = "dev")]
 mod dev;
 mod devices;
+mod outputs;
 mod progress;
 mod render;
+mod signal;
 mod stats;
 
 use std::io::{self, Write};
@@ -25,6 +27,9 @@ struct Cli {
 
 const EXIT_CODES: &str = "\
 Exit codes: 0 done, 1 failed, 2 wrong command line, 3 bad scene, 4 no such device, 130 interrupted.";
+
+/// The exit code after a signal: 128 + SIGINT, as shells have it.
+const INTERRUPTED: u8 = 130;
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -47,7 +52,10 @@ struct Usage(String);
 /// Reads the command line, does what it says, and returns the exit code.
 pub fn main() -> ExitCode {
     let start = Instant::now();
-    let cli = Cli::parse(); // leaves with exit code 2, or 0 after --help
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(told) => return explain(&told),
+    };
     let threads = match &cli.command {
         Command::Render(args) => args.threads,
         Command::Check(_) | Command::Devices => None,
@@ -58,17 +66,24 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Render(args) => render::run(*args, start),
         Command::Check(args) => check::run(&args),
-        Command::Devices => devices::run(),
+        Command::Devices => Ok(devices::run()),
         #[cfg(feature = "dev")]
         Command::Dev(args) => dev::run(args),
     };
     match result {
         Ok(code) => code,
-        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             report(&error);
             exit_code(&error)
         }
+    }
+}
+
+/// Prints the help or the version, or what is wrong with the command line.
+fn explain(told: &clap::Error) -> ExitCode {
+    match (told.print(), told.use_stderr()) {
+        (_, true) => ExitCode::from(2),
+        (printed, false) => ended(printed, ExitCode::SUCCESS),
     }
 }
 
@@ -89,10 +104,26 @@ fn prepare_environment(threads: Option<u16>) {
 
 /// Says on standard error what went wrong.
 fn report(error: &anyhow::Error) {
-    let mut stderr = io::stderr().lock();
-    let _ = writeln!(stderr, "error: {error:#}"); // where this cannot be written there is nobody to tell
+    say(&format!("error: {error:#}"));
     if let Some(excerpt) = shader_error(error).and_then(|shader| shader.excerpt.as_ref()) {
-        let _ = writeln!(stderr, "{excerpt}");
+        say(excerpt);
+    }
+}
+
+/// A line on standard error. Where it cannot be written there is nobody to tell, and whatever is under way goes on.
+fn say(line: &str) {
+    let _ = io::stderr().lock().write_all(format!("{line}\n").as_bytes());
+}
+
+/// The exit code of a command that has printed something: a reader who has gone wanted no more, but a full disk is a
+/// failure.
+fn ended(printed: io::Result<()>, code: ExitCode) -> ExitCode {
+    match printed.and_then(|()| io::stdout().flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            say(&format!("error: standard output: cannot be written: {error}"));
+            ExitCode::FAILURE
+        }
+        _ => code,
     }
 }
 
@@ -114,16 +145,9 @@ fn exit_code(error: &anyhow::Error) -> ExitCode {
     } else {
         match error.downcast_ref::<RenderError>() {
             Some(RenderError::NoDevice(_)) => 4,
-            Some(RenderError::Cancelled) => 130, // 128 + SIGINT, as shells have it
+            Some(RenderError::Cancelled) => INTERRUPTED,
             _ => 1,
         }
     };
     ExitCode::from(code)
-}
-
-/// Whether whoever read our standard output has gone: no failure, as with `wgray devices | head -1`.
-fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    error
-        .downcast_ref::<io::Error>()
-        .is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
 }

@@ -60,7 +60,7 @@ impl Progress {
                 let tenths = (share * 10.0) as u32;
                 if tenths > self.told.0 || self.told.1.elapsed() > SILENCE {
                     let seconds = self.start.elapsed().as_secs_f64();
-                    eprintln!("{:3.0} % done after {seconds:.1} s", share * 100.0);
+                    super::say(&format!("{:3.0} % done after {seconds:.1} s", share * 100.0));
                     self.told = (tenths, Instant::now());
                 }
             }

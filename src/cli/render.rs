@@ -3,7 +3,6 @@
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -14,26 +13,32 @@ use wgray::cpu::Cpu;
 use wgray::error::RenderError;
 use wgray::film::{Film, Region, mean};
 use wgray::gpu::{self, Gpu, compose::Shaders};
-use wgray::image::{self, Aov, Band, Format, Layout};
+use wgray::image::{self, Aov, Band, Format, Layout, Pending};
 use wgray::job::{self, Backend, Cut};
 use wgray::pack::{CORNERS, Packed, pack};
 use wgray::scene::{Overrides, Pattern, Scene};
 
-use super::Usage;
+use super::outputs::Outputs;
 use super::progress::{Mode, Progress};
 use super::stats::Stats;
+use super::{Usage, say, signal};
 
 /// The arguments as they are written.
 #[derive(Debug, clap::Args)]
+#[command(after_help = super::EXIT_CODES)]
 #[command(allow_negative_numbers = true)] // so that a number out of range is told as such
 pub struct Args {
     /// Scene file; docs/scene-format.md says what is in it
     scene: PathBuf,
 
-    /// Picture to write: a .png, clamped to 0..1 and encoded by the power 1/2.2, or an .exr, linear.
+    /// Picture to write: a .png, clamped to 0..1 and encoded by the power 1/2.2, or an .exr, linear. - is standard output.
     /// If absent: the scene's name with .png, in the current folder
-    #[arg(short, long, value_name = "OUT.png|OUT.exr")]
+    #[arg(short, long, value_name = "OUT.png|OUT.exr|-")]
     output: Option<PathBuf>,
+
+    /// Format of a picture whose name does not tell; if absent, png for standard output, pipes and devices
+    #[arg(long, value_name = "png|exr", value_parser = format_parser())]
+    format: Option<Format>,
 
     /// Size of the picture in pixels, in place of the scene's
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
@@ -69,7 +74,8 @@ pub struct Args {
     crop: Option<Region>,
 
     /// What renders. auto: a real GPU, else software Vulkan, else the CPU; gpu: any adapter; cpu: the CPU without any
-    /// driver; NAME: the adapter with this as a part of its name, driver or type ("lavapipe" for Mesa's software Vulkan)
+    /// driver; NAME: the adapter with this as a part of its name, driver or type ("lavapipe" for Mesa's software Vulkan),
+    /// or with this number in the list of wgray devices
     #[arg(long, value_name = "auto|gpu|cpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
     device: String,
 
@@ -83,15 +89,15 @@ pub struct Args {
     pub threads: Option<u16>,
 
     /// What else to write, of the first hit through each pixel's centre. In an EXR these are further layers: normal.X,
-    /// .Y, .Z; depth.Z; uv.U, .V; primitive.ID. Beside a PNG they are further files, NAME.normal.png and so on: normals
-    /// moved to 0..1, depth bright where near (half bright at the picture's middle), fractions of texture coordinates in
+    /// .Y, .Z, outwards; depth.Z, along the ray, 0 where nothing is; uv.U, .V; primitive.ID. Beside a PNG they are
+    /// further files, NAME.normal.png and so on: normals moved to 0..1, depth bright where near (half bright at the picture's middle), fractions of texture coordinates in
     /// red and green, shapes in colours. Under adaptive sampling also what it is like: sample_count.N; variance.R, .G, .B
     /// of the pixel's value. Beside a PNG counts are shown on a logarithmic scale, variances by their square root
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = aov_parser())]
     aov: Vec<Aov>,
 
-    /// Writes what the render took, as JSON
-    #[arg(long, value_name = "FILE.json")]
+    /// Writes what the render took, as JSON. - is standard output
+    #[arg(long, value_name = "FILE.json|-")]
     stats: Option<PathBuf>,
 
     /// How progress is shown, on standard error
@@ -111,6 +117,13 @@ fn pattern_parser() -> impl clap::builder::TypedValueParser<Value = Pattern> {
     PossibleValuesParser::new(Pattern::ALL.map(Pattern::name)).try_map(|name| {
         let found = Pattern::ALL.into_iter().find(|pattern| pattern.name() == name);
         found.ok_or(format!("no such pattern: {name}"))
+    })
+}
+
+fn format_parser() -> impl clap::builder::TypedValueParser<Value = Format> {
+    PossibleValuesParser::new(["png", "exr"]).map(|name| match name.as_str() {
+        "png" => Format::Png,
+        _ => Format::Exr,
     })
 }
 
@@ -145,14 +158,12 @@ fn parse_crop(text: &str) -> Result<Region, String> {
 /// What the arguments come to, checked against the scene.
 struct Plan {
     scene: Packed,
-    output: PathBuf,
     format: Format,
     region: Region,
     aovs: Vec<Aov>,
     device: Device,
     exact_rounding: bool,
     threads: Option<u16>,
-    stats: Option<PathBuf>,
     progress: Mode,
     quiet: bool,
 }
@@ -164,13 +175,18 @@ enum Device {
 }
 
 impl Plan {
-    fn resolve(args: Args) -> anyhow::Result<Plan> {
-        let output = match args.output {
-            Some(output) => output,
-            None => PathBuf::from(args.scene.file_stem().unwrap_or_default()).with_added_extension("png"),
-        };
-        let format = Format::of(&output)
-            .ok_or_else(|| Usage(format!("--output: {}: must end in .png or .exr", output.display())))?;
+    fn resolve(args: Args) -> anyhow::Result<(Plan, Outputs)> {
+        let mut aovs = Vec::new();
+        for aov in args.aov {
+            if !aovs.contains(&aov) {
+                aovs.push(aov);
+            }
+        }
+        let output = args.output.unwrap_or_else(|| {
+            let name = args.scene.file_stem().unwrap_or("scene".as_ref());
+            PathBuf::from(name).with_added_extension("png")
+        });
+        let outputs = Outputs::find(&output, args.format, &aovs, args.stats.as_deref())?;
         let overrides = Overrides {
             size: args.size,
             pixel_samples: args.pixel_samples,
@@ -180,7 +196,9 @@ impl Plan {
             adaptive: args.adaptive,
             asset_root: args.asset_root,
         };
-        let scene = pack(&Scene::load(&args.scene, &overrides)?);
+        let scene = Scene::load(&args.scene, &overrides)?;
+        outputs.check(&[&[args.scene][..], &scene.files].concat())?;
+        let scene = pack(&scene);
         let (width, height) = (scene.camera.width, scene.camera.height);
         let region = args.crop.unwrap_or(Region::whole(width, height));
         if region.x1 > width || region.y1 > height {
@@ -190,12 +208,6 @@ impl Plan {
             ))
             .into());
         }
-        let mut aovs = Vec::new();
-        for aov in args.aov {
-            if !aovs.contains(&aov) {
-                aovs.push(aov);
-            }
-        }
         if let Some(aov) = aovs.iter().find(|aov| aov.is_of_film() && !scene.adaptive) {
             return Err(Usage(format!(
                 "--aov {}: is known under adaptive sampling alone; --adaptive 0 gives all pixels the most samples",
@@ -203,24 +215,23 @@ impl Plan {
             ))
             .into());
         }
-        Ok(Plan {
+        let plan = Plan {
             scene,
-            output,
-            format,
+            format: outputs.format,
             region,
             aovs,
-            device: match args.device.as_str() {
+            device: match args.device.to_lowercase().as_str() {
                 "auto" => Device::Gpu(gpu::Choice::Auto),
                 "gpu" => Device::Gpu(gpu::Choice::Gpu),
                 "cpu" => Device::Cpu,
-                name => Device::Gpu(gpu::Choice::Named(name.to_string())),
+                _ => Device::Gpu(gpu::Choice::Named(args.device)),
             },
             exact_rounding: args.exact_rounding,
             threads: args.threads,
-            stats: args.stats,
             progress: if args.quiet { Mode::None } else { args.progress },
             quiet: args.quiet,
-        })
+        };
+        Ok((plan, outputs))
     }
 
     /// Makes the device ready for the scene, and says what it is.
@@ -237,7 +248,7 @@ impl Plan {
         let device = match gpu::choose(choice) {
             Err(why) if *choice == gpu::Choice::Auto => {
                 if !self.quiet {
-                    eprintln!("warning: rendering on the CPU: {why}");
+                    say(&format!("warning: rendering on the CPU: {why}"));
                 }
                 return Ok(self.cpu());
             }
@@ -297,9 +308,10 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
     if args.verbose {
         speak();
     }
-    let plan = Plan::resolve(args)?;
+    let (plan, outputs) = Plan::resolve(args)?;
     info!(seconds = start.elapsed().as_secs_f64(), "scene read");
-    let stopped = stop_on_signal()?;
+    let outputs = outputs.begin().map_err(RenderError::Output)?;
+    let stopped = signal::stop().context("signal handler")?;
     let (backend, described) = plan.backend()?;
     let setup = start.elapsed();
     info!(seconds = setup.as_secs_f64(), "ready");
@@ -308,7 +320,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
         backend,
         described,
     };
-    let (render, camera_rays) = write_picture(&mut renderer, &stopped)?;
+    let (render, camera_rays) = write_picture(&mut renderer, outputs.pictures, &stopped)?;
     let described = renderer.described;
     let total = start.elapsed();
     info!(
@@ -316,7 +328,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
         seconds = total.as_secs_f64(),
         "picture written"
     );
-    if let Some(path) = &plan.stats {
+    if let Some(file) = outputs.stats {
         let (width, height) = (plan.region.width(), plan.region.height());
         let (pixel_samples, light_samples) = (plan.scene.pixel_samples, plan.scene.light_samples());
         let stats = Stats {
@@ -334,7 +346,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
             shadow_rays: None,
             nominal_mrays_per_s: Stats::nominal(camera_rays, light_samples, render.as_secs_f64()),
         };
-        stats.write(path).map_err(RenderError::Output)?;
+        stats.write(file).map_err(RenderError::Output)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -352,7 +364,7 @@ impl Renderer<'_> {
         match work(self.backend.as_mut()) {
             Err(why @ RenderError::CutShort { .. }) => {
                 if !self.plan.quiet {
-                    eprintln!("warning: rendering on the CPU: {why}");
+                    say(&format!("warning: rendering on the CPU: {why}"));
                 }
                 (self.backend, self.described) = self.plan.cpu();
                 work(self.backend.as_mut())
@@ -363,7 +375,11 @@ impl Renderer<'_> {
 }
 
 /// Renders band by band into the picture's files; returns the time it took without writing, and the camera's rays.
-fn write_picture(renderer: &mut Renderer, stopped: &AtomicBool) -> anyhow::Result<(Duration, u64)> {
+fn write_picture(
+    renderer: &mut Renderer,
+    files: Vec<Pending>,
+    stopped: &AtomicBool,
+) -> anyhow::Result<(Duration, u64)> {
     let plan = renderer.plan;
     let layout = Layout {
         picture: (plan.scene.camera.width, plan.scene.camera.height),
@@ -372,11 +388,12 @@ fn write_picture(renderer: &mut Renderer, stopped: &AtomicBool) -> anyhow::Resul
         middle_depth: renderer.work(|backend| middle_depth(plan, backend))?,
         most_samples: plan.scene.pixel_samples,
     };
+    let name = files.first().map(|file| file.name().to_owned()).unwrap_or_default();
     let mut progress = Progress::new(plan.progress);
     let mut time = Duration::ZERO;
     let mut strange = 0;
     let mut camera_rays = 0;
-    image::save(&plan.output, plan.format, &layout, &mut |sink| {
+    image::save(files, plan.format, &layout, &mut |sink| {
         let cut = Cut::default();
         let mut done = 0;
         for band in job::bands(plan.region, &cut, renderer.backend.largest_film()) {
@@ -416,10 +433,7 @@ fn write_picture(renderer: &mut Renderer, stopped: &AtomicBool) -> anyhow::Resul
     })?;
     drop(progress);
     if strange > 0 && !plan.quiet {
-        eprintln!(
-            "warning: {}: {strange} pixels are not finite numbers",
-            plan.output.display()
-        );
+        say(&format!("warning: {name}: {strange} pixels are not finite numbers"));
     }
     Ok((time, camera_rays))
 }
@@ -441,14 +455,6 @@ fn middle_depth(plan: &Plan, backend: &mut dyn Backend) -> Result<f32, RenderErr
         .map(|hit| hit.depth)
         .filter(|depth| *depth > 0.0)
         .unwrap_or(1.0))
-}
-
-/// Set when the user wants the render to end; it then cleans up behind itself.
-fn stop_on_signal() -> anyhow::Result<Arc<AtomicBool>> {
-    let stopped = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stopped);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("signal handler")?;
-    Ok(stopped)
 }
 
 /// Events of this program on standard error, and warnings of others.

@@ -1,7 +1,6 @@
 //! `--stats`: what a render took, as JSON.
 
 use std::io::{self, Write};
-use std::path::Path;
 
 use serde::Serialize;
 use wgray::image::Pending;
@@ -43,8 +42,7 @@ impl Stats {
         camera_rays as f64 * (1.0 + light_samples as f64) / render_s / 1e6
     }
 
-    pub fn write(&self, path: &Path) -> io::Result<()> {
-        let mut file = Pending::create(path)?;
+    pub fn write(&self, mut file: Pending) -> io::Result<()> {
         let text = serde_json::to_string_pretty(self)?;
         writeln!(file, "{text}")?;
         file.finish()

@@ -17,7 +17,8 @@ pub enum Choice {
     Auto,
     /// Any adapter.
     Gpu,
-    /// The adapter with this as part of its name, driver or type.
+    /// The adapter with this as part of its name, driver or type, or with this number in [`adapters`], counted from 1.
+    /// Several of one name are one choice, of which the first that can be opened is taken.
     Named(String),
 }
 
@@ -60,33 +61,61 @@ pub fn adapters() -> Vec<Info> {
 ///
 /// # Errors
 ///
-/// [`RenderError::NoDevice`] if no adapter fits, and that of the last one if none that fits can be opened.
+/// [`RenderError::NoDevice`] if no adapter fits, or several of different names do, and that of the last one if none that
+/// fits can be opened.
 pub fn choose(choice: &Choice) -> Result<Device, RenderError> {
     let adapters = enumerate();
-    let fitting = adapters.iter().filter(|adapter| match choice {
-        Choice::Auto | Choice::Gpu => true,
-        Choice::Named(name) => matches(&info(adapter), name),
-    });
+    let infos: Vec<Info> = adapters.iter().map(info).collect();
     let mut failure = None;
-    for adapter in fitting {
-        match open(adapter) {
+    for i in fitting(&infos, choice).map_err(RenderError::NoDevice)? {
+        match open(&adapters[i]) {
             Ok(device) => return Ok(device),
             Err(error) => failure = Some(error),
         }
     }
-    Err(failure.unwrap_or_else(|| RenderError::NoDevice(none_fits(choice, &adapters))))
+    Err(failure.unwrap_or_else(|| RenderError::NoDevice(NONE_FOUND.to_owned() + HOW_TO_GET_VULKAN)))
 }
 
-fn none_fits(choice: &Choice, adapters: &[wgpu::Adapter]) -> String {
-    let found: Vec<String> = adapters.iter().map(|adapter| info(adapter).name).collect();
-    match choice {
-        Choice::Named(name) if !found.is_empty() => {
-            format!(
-                "no adapter's name, driver or type contains '{name}'; there are: {}",
-                found.join(", ")
-            )
+const NONE_FOUND: &str = "no Vulkan, Metal or DX12 adapter found; ";
+
+/// Which adapters a choice means, the best first. The error is what to tell the user.
+fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, String> {
+    let Choice::Named(name) = choice else {
+        return Ok((0..infos.len()).collect());
+    };
+    if infos.is_empty() {
+        return Ok(Vec::new());
+    }
+    if let Some(number) = name.parse().ok().filter(|number| (1..=infos.len()).contains(number)) {
+        return Ok(vec![number - 1]);
+    }
+    let all = |fits: &dyn Fn(&Info) -> bool| -> Vec<usize> { (0..infos.len()).filter(|i| fits(&infos[*i])).collect() };
+    let whole = all(&|info| info.name.to_lowercase() == name.to_lowercase());
+    let found = match whole.is_empty() {
+        true => all(&|info| matches(info, name)),
+        false => whole,
+    };
+    let listed = |found: &[usize]| {
+        let lines = found
+            .iter()
+            .map(|i| format!("{}: {}, {}", i + 1, infos[*i].name, infos[*i].driver));
+        lines.collect::<Vec<_>>().join("; ")
+    };
+    let everything: Vec<usize> = (0..infos.len()).collect();
+    match found.as_slice() {
+        [] => {
+            let there = listed(&everything);
+            Err(format!(
+                "no adapter's name, driver or type contains '{name}'; there are {there}"
+            ))
         }
-        _ => format!("no Vulkan, Metal or DX12 adapter found; {HOW_TO_GET_VULKAN}"),
+        [first, rest @ ..] if rest.iter().any(|i| infos[*i].name != infos[*first].name) => {
+            let there = listed(&found);
+            Err(format!(
+                "'{name}' means several adapters; more of a name or driver, or a number, says which: {there}"
+            ))
+        }
+        _ => Ok(found),
     }
 }
 
@@ -256,5 +285,61 @@ impl Device {
         drop(view);
         staging.unmap();
         Ok(records)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn adapter(name: &str, driver: &str, kind: &'static str) -> Info {
+        Info {
+            name: name.to_string(),
+            driver: driver.to_string(),
+            backend: "vulkan".to_string(),
+            kind,
+            exact: true,
+            largest_binding: 1,
+            largest_buffer: 1,
+        }
+    }
+
+    #[test]
+    fn a_name_means_one_adapter_or_is_refused_with_those_that_it_fits() {
+        let infos = [
+            adapter("Radeon RX 7900", "radv Mesa 25", "discrete"),
+            adapter("Radeon RX 7900 XT", "radv Mesa 25", "discrete"),
+            adapter("Radeon 780M", "radv Mesa 25", "integrated"),
+            adapter("Radeon 780M", "amdvlk", "integrated"),
+            adapter("llvmpipe (LLVM 15)", "Mesa 22", "software"),
+        ];
+        let found = |name: &str| fitting(&infos, &Choice::Named(name.to_string()));
+        assert_eq!(found("radeon rx 7900"), Ok(vec![0]), "the whole name goes before parts");
+        assert_eq!(found("XT"), Ok(vec![1]));
+        assert_eq!(
+            found("780m"),
+            Ok(vec![2, 3]),
+            "the same card by two drivers is no doubt"
+        );
+        assert_eq!(found("amdvlk"), Ok(vec![3]));
+        assert_eq!(found("lavapipe"), Ok(vec![4]));
+        assert_eq!(found("SOFTWARE"), Ok(vec![4]));
+        for (number, i) in [("1", 0), ("4", 3), ("5", 4)] {
+            assert_eq!(found(number), Ok(vec![i]));
+        }
+        assert_eq!(found("15"), Ok(vec![4]), "no number of an adapter, so a part of a name");
+        let several = found("discrete").unwrap_err();
+        assert_eq!(
+            several,
+            "'discrete' means several adapters; more of a name or driver, or a number, says which: 1: Radeon RX 7900, radv \
+             Mesa 25; 2: Radeon RX 7900 XT, radv Mesa 25"
+        );
+        let none = found("geforce").unwrap_err();
+        assert!(
+            none.starts_with("no adapter's name, driver or type contains 'geforce'; there are 1: Radeon"),
+            "{none}"
+        );
+        assert_eq!(fitting(&infos, &Choice::Auto), Ok(vec![0, 1, 2, 3, 4]));
+        assert_eq!(fitting(&[], &Choice::Named("1".to_string())), Ok(Vec::new()));
     }
 }

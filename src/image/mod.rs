@@ -5,9 +5,9 @@ mod aov;
 mod difference;
 mod exr;
 mod file;
+mod output;
 mod png;
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::error::RenderError;
@@ -18,6 +18,7 @@ pub use aov::Aov;
 pub use difference::{Difference, difference};
 pub use exr::read_exr;
 pub use file::Pending;
+pub use output::Output;
 pub use png::encode;
 
 /// A kind of picture file.
@@ -89,25 +90,22 @@ pub fn files(path: &Path, format: Format, aovs: &[Aov]) -> Vec<PathBuf> {
     files
 }
 
-/// Writes what `render` hands to the sink. The files have their names when all rows are written; if anything fails they
-/// are as they were before.
+/// Writes what `render` hands to the sink, the picture to the first of the files, those of its AOVs to the others, in the
+/// order of [`files`]. They have their names when all rows are written; if anything fails they are as they were before.
 ///
 /// # Errors
 ///
 /// Those of `render`, and [`RenderError::Output`] if a file cannot be written.
 pub fn save(
-    path: &Path,
+    mut pending: Vec<Pending>,
     format: Format,
     layout: &Layout,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
-    let mut pending = files(path, format, &layout.aovs)
-        .iter()
-        .map(|path| Pending::create(path))
-        .collect::<io::Result<Vec<_>>>()?;
-    match format {
-        Format::Png => png::write(&mut pending, layout, render)?,
-        Format::Exr => exr::write(&mut pending[0], layout, render)?,
+    match (format, pending.first_mut()) {
+        (Format::Exr, Some(first)) => exr::write(first, layout, render)?,
+        _ => png::write(&mut pending, layout, render)?,
     }
+    pending.iter_mut().try_for_each(Pending::complete)?;
     Ok(pending.into_iter().try_for_each(Pending::finish)?)
 }

@@ -5,6 +5,7 @@ use std::io::Cursor;
 use image::error::{DecodingError, LimitError, LimitErrorKind};
 use image::{DynamicImage, ImageBuffer, ImageDecoder as _, ImageError, ImageFormat, ImageReader, Limits};
 
+use super::gray_exr::gray_exr;
 use super::texture::{Image, Texels};
 
 /// Most texels along a side.
@@ -73,6 +74,11 @@ pub(super) fn decode(
 ) -> Result<DynamicImage, Refused> {
     if format == ImageFormat::Png {
         return decode_png(bytes, fits);
+    }
+    if format == ImageFormat::OpenExr
+        && let Some(image) = gray_exr(bytes, |header| check(header, &fits))?
+    {
+        return Ok(image);
     }
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::no_limits();

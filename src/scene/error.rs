@@ -1,5 +1,6 @@
 //! What can be wrong with a scene file, and where.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::io;
 use std::path::PathBuf;
@@ -58,9 +59,29 @@ impl Problem {
     pub(super) fn new(message: impl Into<String>) -> Self {
         Self {
             key: KeyPath::default(),
-            message: message.into(),
+            message: cut_to(LONGEST_MESSAGE, &message.into()).into_owned(),
         }
     }
+}
+
+/// The longest value or key in a message, and the longest message, in characters.
+const LONGEST: usize = 60;
+const LONGEST_MESSAGE: usize = 1000;
+
+/// A value or a key for a message: where it is long, its start and its end.
+pub(super) fn cut(text: &str) -> Cow<'_, str> {
+    cut_to(LONGEST, text)
+}
+
+fn cut_to(longest: usize, text: &str) -> Cow<'_, str> {
+    let count = text.chars().count();
+    if count <= longest {
+        return text.into();
+    }
+    let kept = longest - 3;
+    let start: String = text.chars().take(kept - kept / 3).collect();
+    let end: String = text.chars().skip(count - kept / 3).collect();
+    format!("{start}...{end}").into()
 }
 
 impl fmt::Display for Problem {
@@ -108,10 +129,11 @@ impl fmt::Display for KeyPath {
                     if i > 0 {
                         f.write_str(".")?;
                     }
+                    let shown = cut(key);
                     if !key.is_empty() && key.chars().all(bare) {
-                        f.write_str(key)?;
+                        f.write_str(&shown)?;
                     } else {
-                        write!(f, "{key:?}")?;
+                        write!(f, "{shown:?}")?;
                     }
                 }
             }

@@ -5,7 +5,8 @@ use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use image::{DynamicImage, ImageFormat};
+use image::error::LimitErrorKind;
+use image::{DynamicImage, ImageError, ImageFormat};
 
 use super::decode::{Header, LONGEST_SIDE, Refused, decode};
 use super::texture::{Encoding, Image, Texels};
@@ -61,10 +62,7 @@ impl Assets {
         }
         let decoded = decode(&bytes, format, fits).map_err(|refused| match refused {
             Refused::Rule(rule) => rule,
-            Refused::Image(error) => {
-                let sides = format!("sound, and have at most {LONGEST_SIDE} texels along a side");
-                format!("{file:?} must be {sides}: {error}")
-            }
+            Refused::Image(error) => format!("{file:?} {}", refused_image(&error)),
         })?;
         drop(bytes);
         let (width, height) = (decoded.width(), decoded.height());
@@ -98,11 +96,19 @@ impl Assets {
         let path = path.map_err(|error| unreadable(file, &error))?;
         let root = self.root.canonicalize().map_err(|error| {
             let root = self.root.display();
-            format!("{file:?} must lie in {root}, which cannot be found: {error}")
+            format!("{file:?} must lie in {root}, the folder of --asset-root, which cannot be found: {error}")
         })?;
         if !path.starts_with(&root) {
             let root = self.root.display();
-            return Err(format!("{file:?} must not leave {root}, unless --asset-root allows it"));
+            return Err(match self.root == self.folder {
+                true => format!(
+                    "{file:?} must not leave the scene's folder, {root}, unless --asset-root names a folder that it lies in"
+                ),
+                false => format!(
+                    "{file:?} is {}, which must lie in {root}, the folder of --asset-root",
+                    path.display()
+                ),
+            });
         }
         if !path.is_file() {
             return Err(format!("{file:?} must be a file"));
@@ -155,6 +161,18 @@ fn read(file: &str, path: &Path) -> Result<Vec<u8>, String> {
 
 fn unreadable(file: &str, error: &io::Error) -> String {
     format!("{file:?} cannot be read: {error}")
+}
+
+/// What is told of an image that is not decoded, behind its name.
+fn refused_image(error: &ImageError) -> String {
+    match error {
+        ImageError::Limits(limit) if matches!(limit.kind(), LimitErrorKind::DimensionError) => {
+            format!("must have at most {LONGEST_SIDE} texels along a side")
+        }
+        ImageError::Limits(_) => "takes more memory when it is read than its header tells".to_string(),
+        ImageError::Unsupported(_) => format!("must be of a kind that can be read: {error}"),
+        _ => format!("is damaged or cut short: {error}"),
+    }
 }
 
 const NAMES: [(ImageFormat, &str); 4] = [

@@ -5,7 +5,7 @@ use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 use super::error::{At, Problem, SceneError};
-use super::parse::{invalid, syntax_error};
+use super::parse::{NOT_UTF8, invalid, syntax_error};
 use super::validate::{adaptive, adaptive_error, sample_count, side};
 use super::{AdaptiveDescription, Assets, Description, Pattern, SamplesDescription, Scene};
 
@@ -80,7 +80,7 @@ impl Scene {
             Err(error) => {
                 let text = String::from_utf8_lossy(&bytes);
                 // Up to there the lossy text is the file's.
-                Err(syntax_error(&text, &origin, error.valid_up_to(), "not valid UTF-8"))
+                Err(syntax_error(&text, &origin, error.valid_up_to(), NOT_UTF8))
             }
         }
     }
@@ -112,6 +112,12 @@ fn parse_beside(text: &str, origin: &str, folder: &Path, overrides: &Overrides) 
 }
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
+    if path.is_dir() {
+        return Err(io::Error::new(
+            io::ErrorKind::IsADirectory,
+            "it is a folder, and a scene is a file",
+        ));
+    }
     let mut bytes = Vec::new();
     File::open(path)?.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > LARGEST_FILE {

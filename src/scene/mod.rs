@@ -6,11 +6,14 @@
 mod decode;
 mod description;
 mod error;
+mod gray_exr;
 pub(crate) mod image_file;
 mod load;
 mod parse;
 pub(crate) mod texture;
 mod validate;
+
+use std::path::PathBuf;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -41,6 +44,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// The shapes, in file order.
     pub shapes: Vec<Shape>,
+    /// The files that the scene names, its textures' images.
+    pub files: Vec<PathBuf>,
 }
 
 /// A camera: a position, an orthonormal basis and a projection.

@@ -9,9 +9,12 @@ fn a_file_that_cannot_be_written_fails_with_1() {
     let place = Place::new();
     fs::create_dir(place.path("folder.png")).unwrap();
     for (output, message) in [
-        ("nowhere/out.png", "nowhere/out.png: cannot be written: No such file"),
+        (
+            "nowhere/out.png",
+            "nowhere/out.png: cannot be written: the folder nowhere is not there",
+        ),
         ("small.toml/out.exr", "small.toml/out.exr: cannot be written: "),
-        ("folder.png", "folder.png: cannot be written: is a directory"),
+        ("folder.png", "folder.png: cannot be written: it is a folder"),
     ] {
         let ran = place.run(&["render", "small.toml", "-o", output]);
         assert_eq!((ran.code, ran.stdout.as_str()), (1, ""), "{}", ran.stderr);
@@ -20,6 +23,7 @@ fn a_file_that_cannot_be_written_fails_with_1() {
     }
     let ran = place.run(&["render", "small.toml", "--stats", "nowhere/stats.json"]);
     assert_eq!(ran.code, 1);
+    assert_eq!(place.files(), ["folder.png"], "it is told before the render");
     assert!(
         ran.stderr.contains("nowhere/stats.json: cannot be written"),
         "{}",
@@ -39,7 +43,7 @@ fn a_file_is_replaced_by_the_next() {
 #[cfg(unix)]
 mod unix {
     use std::os::unix::fs::PermissionsExt;
-    use std::process::{Command, Stdio};
+    use std::process::{Child, Command, Stdio};
     use std::time::{Duration, Instant};
 
     use super::super::program;
@@ -79,38 +83,108 @@ mod unix {
         );
     }
 
-    /// Ctrl-C during a render that would take minutes.
+    /// A render that would take minutes, of so many samples, once it has begun its file.
+    fn long_render(place: &Place, shell: &str, options: &[&str]) -> Child {
+        let before = temporary(place);
+        let child = Command::new("sh")
+            .current_dir(place.path("."))
+            .args([
+                "-c",
+                &format!("{shell} exec \"$0\" render small.toml -o out.exr --size 2000x2000 \"$@\""),
+            ])
+            .arg(program())
+            .args(options)
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let start = Instant::now();
+        while temporary(place) == before {
+            assert!(
+                start.elapsed() < Duration::from_secs(60),
+                "no file was begun: {:?}",
+                place.files()
+            );
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        child
+    }
+
+    fn temporary(place: &Place) -> Vec<String> {
+        place
+            .files()
+            .into_iter()
+            .filter(|name| name.starts_with(".wgray-"))
+            .collect()
+    }
+
+    fn send(signal: &str, child: &Child) {
+        let sent = Command::new("kill")
+            .args([signal, &child.id().to_string()])
+            .status()
+            .unwrap();
+        assert!(sent.success());
+    }
+
     #[test]
     fn an_interrupted_render_leaves_no_trace() {
-        for device in ["cpu", "gpu"] {
+        for (device, signal) in [("cpu", "-INT"), ("gpu", "-INT"), ("cpu", "-TERM"), ("cpu", "-HUP")] {
             let place = Place::new();
             place.write("out.exr", "old");
-            let mut child = Command::new(program())
-                .current_dir(place.path("."))
-                .args(["render", "small.toml", "-o", "out.exr", "--device", device])
-                .args(["--size", "2000x2000", "--spp", "400"])
-                .stderr(Stdio::piped())
-                .spawn()
-                .unwrap();
-            let start = Instant::now();
-            while !place.files().iter().any(|name| name.starts_with(".wgray-")) {
-                assert!(
-                    start.elapsed() < Duration::from_secs(60),
-                    "no file was begun: {:?}",
-                    place.files()
-                );
-                std::thread::sleep(Duration::from_millis(20));
-            }
-            let killed = Command::new("kill")
-                .args(["-INT", &child.id().to_string()])
-                .status()
-                .unwrap();
-            assert!(killed.success());
-            let status = child.wait().unwrap();
-            assert_eq!(status.code(), Some(130));
+            let mut child = long_render(&place, "", &["--spp", "400", "--device", device]);
+            std::thread::sleep(Duration::from_millis(100)); // for the handler, which comes after the file
+            send(signal, &child);
+            assert_eq!(child.wait().unwrap().code(), Some(130), "{signal}");
             assert_eq!(place.files(), ["out.exr"]);
             assert_eq!(place.read("out.exr"), b"old");
         }
+    }
+
+    /// As `nohup` ignores SIGHUP, and shells SIGINT for what runs in the background.
+    #[test]
+    fn signals_that_were_ignored_at_the_start_stay_so() {
+        for signal in ["HUP", "INT", "TERM"] {
+            let place = Place::new();
+            let ignore = format!("trap '' {signal};");
+            let mut child = long_render(
+                &place,
+                &ignore,
+                &["--crop", "0,0,64,64", "--spp", "256", "--device", "cpu"],
+            );
+            send(&format!("-{signal}"), &child);
+            assert_eq!(child.wait().unwrap().code(), Some(0), "{signal}");
+            assert_eq!(place.files(), ["out.exr"]);
+        }
+    }
+
+    #[test]
+    fn what_a_killed_render_left_tells_whose_it_is_and_is_removed_by_the_next() {
+        let place = Place::new();
+        let mut killed = long_render(&place, "", &["--spp", "400", "--device", "cpu"]);
+        send("-KILL", &killed);
+        killed.wait().unwrap();
+        let [left] = temporary(&place).try_into().unwrap();
+        let process = format!(".wgray-{}@", killed.id());
+        assert!(left.starts_with(&process) && left.ends_with("-out.exr"), "{left}");
+        // What is another's, or is not surely ours, stays: another output's, another machine's, a folder, a living one's.
+        let other_machine = left.replace('@', "@not-");
+        let other_output = left.replace("-out.exr", "-about.exr");
+        let folder = left.replace(&process, ".wgray-1@");
+        for name in [&other_machine, &other_output] {
+            place.write(name, "");
+        }
+        fs::create_dir(place.path(&folder)).unwrap();
+        let mut living = long_render(&place, "", &["--spp", "400", "--device", "cpu"]);
+        let living_file = temporary(&place)
+            .into_iter()
+            .find(|name| name.contains(&format!("-{}@", living.id())))
+            .unwrap();
+        assert!(!place.path(&left).exists(), "removed as the next one began");
+        place.quietly(&["render", "small.toml", "-o", "out.exr", "--device", "cpu"]);
+        let mut expected = [other_machine, other_output, folder, living_file];
+        expected.sort();
+        assert_eq!(temporary(&place), expected);
+        send("-TERM", &living);
+        living.wait().unwrap();
     }
 
     #[test]

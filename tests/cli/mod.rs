@@ -3,8 +3,10 @@
 mod bad_input;
 mod commands;
 mod files;
+mod messages;
 mod options;
 mod output;
+mod outputs;
 
 use std::fs;
 use std::path::{Path, PathBuf};

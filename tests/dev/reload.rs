@@ -135,7 +135,7 @@ fn a_broken_scene_is_told_and_the_picture_stays() {
     let good = running.colors();
     for (old, new, line, said) in [
         ("radius = 0.5", "radius = -1", 33, "must be"),
-        ("radius = -1", "radius = = 1", 33, "expected"),
+        ("radius = -1", "radius = = 1", 33, "extra"),
         ("radius = = 1", "radius = 1\nradios = 2", 34, "radios"),
     ] {
         files.edit("scene.toml", old, new);

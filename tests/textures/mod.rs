@@ -5,7 +5,9 @@ mod agreement;
 mod bad_input;
 mod differentials;
 mod filters;
+
 mod generated;
+mod gray;
 mod normal_maps;
 mod patterns;
 mod specular;

@@ -11,6 +11,7 @@ pub(super) mod tagged;
 mod texture;
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -41,6 +42,16 @@ pub struct Description {
     pub lights: Vec<LightDescription>,
     /// `[[shapes]]`
     pub shapes: Vec<ShapeDescription>,
+}
+
+impl Description {
+    /// The files that it names, which are relative to the scene file's folder.
+    pub fn files(&self, folder: &Path) -> impl Iterator<Item = PathBuf> {
+        self.textures.values().filter_map(move |texture| match texture {
+            TextureDescription::Image(image) => Some(folder.join(&image.file)),
+            _ => None,
+        })
+    }
 }
 
 /// The size of the picture.

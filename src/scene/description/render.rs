@@ -64,7 +64,10 @@ impl Default for RenderDescription {
 
 /// A pattern of samples.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a table, such as { pattern = \"grid\", count = 16 }"
+)]
 pub struct SamplesDescription {
     /// How they are laid out.
     #[serde(default)]
@@ -129,7 +132,7 @@ impl Pattern {
 
 /// Adaptive sampling.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table, such as { error = 0.01 }")]
 pub struct AdaptiveDescription {
     /// The standard error of a pixel's displayed value that is aimed at.
     pub error: f64,
@@ -140,7 +143,7 @@ pub struct AdaptiveDescription {
 
 /// A reconstruction filter.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table, such as { type = \"gaussian\" }")]
 pub struct PixelFilterDescription {
     /// Its form.
     #[serde(rename = "type")]

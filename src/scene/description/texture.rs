@@ -54,7 +54,7 @@ impl<'de> Deserialize<'de> for ColorDescription {
 
 /// `{ texture = "NAME" }`
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table, such as { texture = \"NAME\" }")]
 pub struct TextureReference {
     /// Name of the texture.
     pub texture: String,
@@ -62,7 +62,7 @@ pub struct TextureReference {
 
 /// `{ texture = "NAME", strength = 1 }`
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table, such as { texture = \"NAME\" }")]
 pub struct NormalMapDescription {
     /// Name of the texture.
     pub texture: String,

@@ -1,6 +1,7 @@
 //! From the text of a scene file to its [`Description`], and from a key path to its line.
 
 mod parts;
+mod syntax;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -13,7 +14,10 @@ use toml::{Table, Value};
 use self::parts::{Broken, Kind, LARGEST, Parts};
 use super::description::tagged::{ReadError, Tagged};
 use super::description::{Description, LightDescription, MaterialDescription, ShapeDescription, TextureDescription};
-use super::error::{At, KeyPath, Problem, SceneError, Segment};
+use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
+use super::validate::{DEEPEST, MOST};
+
+pub(super) use syntax::{NOT_UTF8, syntax_error};
 
 impl Description {
     /// Reads the text of a scene file; `origin` is the file's name in messages. Values are not checked yet.
@@ -33,18 +37,6 @@ impl Description {
             None => read_file(toml::from_str(text).map_err(|error| broken(Broken::of(0, &error)))?),
         };
         read.map_err(|problem| invalid(text, origin, problem))
-    }
-}
-
-/// The error of a text that goes wrong at the byte `at`.
-pub(super) fn syntax_error(text: &str, origin: &str, at: usize, message: &str) -> SceneError {
-    let before = text.get(..at).unwrap_or(text);
-    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-    SceneError::Syntax {
-        origin: origin.to_owned(),
-        line: line_number(text, at),
-        column: before[line_start..].chars().count() + 1,
-        message: message.to_owned(),
     }
 }
 
@@ -248,26 +240,25 @@ fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) -> Result<T, 
     }
 }
 
-/// `"a", "b", "c"`
+/// `"a", "b", "c"`, the first of them where there are many.
 pub(super) fn list<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
+    const MOST: usize = 24;
     let mut text = String::new();
-    for name in names {
+    let mut names = names.into_iter();
+    for name in names.by_ref().take(MOST) {
         let comma = if text.is_empty() { "" } else { ", " };
         // Writing to a String cannot fail.
-        let _ = write!(text, "{comma}{:?}", name.as_ref());
+        let _ = write!(text, "{comma}{:?}", cut(name.as_ref()));
     }
-    text
+    match names.count() {
+        0 => text,
+        more => format!("{text} and {more} more"),
+    }
 }
 
 /// A value as the file has it, on one line, cut short where it is long.
 fn show(value: &Value) -> String {
-    const LONGEST: usize = 60;
-    let text = value.to_string().replace('\n', " ");
-    if text.chars().count() <= LONGEST {
-        return text;
-    }
-    let start: String = text.chars().take(LONGEST).collect();
-    format!("{start}...")
+    cut(&value.to_string().replace('\n', " ")).into_owned()
 }
 
 /// Makes a problem of serde's error while reading `table`, which has lost its key `type` if it is `tagged`.
@@ -308,7 +299,7 @@ fn explain(error: ReadError, table: Table, tagged: bool) -> Problem {
     } else if let (Some((_, expected)), Some(value)) = (message.rsplit_once(", expected "), value) {
         let rule = match expected {
             "f64" => "a number",
-            "u32" => "a whole number from 0 to 4294967295",
+            "u32" => &whole(path.last()),
             "a sequence of 3 f64 values" => "a list of 3 numbers",
             "an array of length 2" => "a list of 2 numbers",
             "an array of length 3" => "a list of 3 points",
@@ -326,6 +317,16 @@ fn explain(error: ReadError, table: Table, tagged: bool) -> Problem {
         key: KeyPath(path),
         message,
     }
+}
+
+/// What a key's whole number must be. How small it may be exactly is checked later, beside other keys.
+fn whole(key: Option<&Segment>) -> String {
+    let (low, high) = match key {
+        Some(Segment::Key(key)) if key == "seed" => (0, u32::MAX),
+        Some(Segment::Key(key)) if key == "max_depth" => (1, DEEPEST),
+        _ => (1, MOST),
+    };
+    format!("a whole number from {low} to {high}")
 }
 
 #[cfg(test)]

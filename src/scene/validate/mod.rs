@@ -23,11 +23,11 @@ const FARTHEST: f64 = 1e9;
 /// Smallest and largest length.
 const LENGTHS: (f64, f64) = (1e-9, 1e9);
 /// Most bounces of a path.
-const DEEPEST: u32 = 64;
+pub(super) const DEEPEST: u32 = 64;
 /// Largest component of a colour.
 const BRIGHTEST: f64 = 1e6;
 /// Most pixels along a side of the picture, and most samples.
-const MOST: u32 = 65_536;
+pub(super) const MOST: u32 = 65_536;
 /// The sine of the smallest angle between directions that are not parallel; likewise the smallest height of a
 /// triangle or tetrahedron relative to its longest edge.
 const FLATTEST: f64 = 1e-6;
@@ -72,6 +72,7 @@ impl Description {
             textures,
             materials,
             shapes,
+            files: self.files(&assets.folder).collect(),
         })
     }
 }
@@ -153,7 +154,17 @@ pub(super) fn adaptive_error(error: f64) -> Checked<f64> {
 pub(super) fn adaptive(description: &AdaptiveDescription, pixel_samples: &SamplesDescription) -> Checked<Adaptive> {
     let SamplesDescription { pattern, count } = *pixel_samples;
     check(pattern.goes_on(), || {
-        "the pattern of pixel_samples must not be a grid, which has no further samples".to_owned()
+        let name = pattern.name();
+        let others: Vec<_> = Pattern::ALL
+            .into_iter()
+            .filter(|pattern| pattern.goes_on())
+            .map(Pattern::name)
+            .collect();
+        format!(
+            "the pattern of pixel_samples is {name:?}, which has no further samples; it must be one of {}, as with \
+             --pixel-pattern sobol",
+            list(others)
+        )
     })?;
     let error = adaptive_error(description.error).at("error")?;
     let most = description.max_samples;

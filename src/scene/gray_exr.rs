@@ -1,0 +1,50 @@
+//! EXR files of one channel, whatever its name, as gray: the image library reads such of red, green and blue alone.
+
+use std::io::Cursor;
+
+use exr::error::Error;
+use exr::prelude::{ReadChannels as _, ReadLayers as _};
+use image::error::DecodingError;
+use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat};
+
+use super::decode::{Header, Refused};
+
+/// The image, if the file has one layer with one channel, and perhaps an opacity `A`, which is ignored. `check` is asked
+/// before anything but the header is read.
+pub(super) fn gray_exr(
+    bytes: &[u8],
+    check: impl Fn(Header) -> Result<(), Refused>,
+) -> Result<Option<DynamicImage>, Refused> {
+    let damaged = |error: Error| ImageError::Decoding(DecodingError::new(ImageFormat::OpenExr.into(), error));
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
+    let [header] = meta.headers.as_slice() else {
+        return Ok(None);
+    };
+    let names = header.channels.list.iter().map(|channel| channel.name.to_string());
+    let names: Vec<String> = names.filter(|name| name != "A").collect();
+    let [name] = names.as_slice() else { return Ok(None) };
+    if header.deep {
+        return Ok(None);
+    }
+    let size = header.layer_size;
+    let side = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
+    check(Header {
+        width: side(size.width()),
+        height: side(size.height()),
+        is_deep: true,
+    })?;
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(damaged)?;
+    let layer = image.layer_data;
+    let channel = (layer.channel_data.list.iter()).find(|channel| channel.name.to_string() == *name);
+    let values = channel.iter().flat_map(|channel| channel.sample_data.values_as_f32());
+    let colors: Vec<f32> = values.flat_map(|value| [value; 3]).collect();
+    let (width, height) = (layer.size.width() as u32, layer.size.height() as u32);
+    Ok(ImageBuffer::from_vec(width, height, colors).map(DynamicImage::ImageRgb32F))
+}

@@ -1,0 +1,312 @@
+//! Messages: none ends a job, whatever became of the stream that they go to, and each says what helps.
+
+use super::{Place, Ran, SCENE};
+
+#[cfg(unix)]
+mod unix {
+    use std::process::Command;
+
+    use super::super::program;
+    use super::*;
+
+    fn sh(place: &Place, line: &str) -> Ran {
+        let output = Command::new("sh")
+            .current_dir(place.path("."))
+            .args(["-c", line])
+            .arg(program())
+            .output()
+            .unwrap();
+        Ran {
+            code: output.status.code().unwrap_or(-1),
+            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+        }
+    }
+
+    /// Streams that take nothing: full, closed, or with a reader who has gone.
+    const NOWHERE: [&str; 3] = ["2>/dev/full", "2>&-", "2>&1 >&3 3>&- | true"];
+
+    #[test]
+    fn a_render_is_done_whatever_became_of_standard_error() {
+        for nowhere in NOWHERE {
+            for options in [
+                "--progress plain --size 64x64",
+                "--verbose",
+                // The driver is not there: a warning.
+                "--device auto",
+            ] {
+                let place = Place::new();
+                let driver = "VK_DRIVER_FILES=/nonexistent.json VK_ICD_FILENAMES=/nonexistent.json";
+                let line = format!(
+                    "{{ {{ {driver} $0 render small.toml {options}; echo $? > code; }} {nowhere}; }} 3>&1; exit $(cat code)"
+                );
+                let ran = sh(&place, &line);
+                assert_eq!(ran.code, 0, "{line}: {}", ran.stderr);
+                assert!(
+                    place.files().contains(&"small.png".to_owned()),
+                    "{line}: {:?}",
+                    place.files()
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn exit_codes_stay_whatever_became_of_standard_error() {
+        let place = Place::new();
+        place.write("bad.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
+        for nowhere in NOWHERE {
+            for (command, code) in [
+                ("check bad.toml", 3),
+                ("render bad.toml", 3),
+                ("render small.toml --device abacus", 4),
+                ("render small.toml --colour", 2),
+                ("render small.toml -o nowhere/a.png", 1),
+                ("dev bad.toml --no-page", 2),
+                ("", 2),
+            ] {
+                let line = format!("{{ {{ $0 {command}; echo $? > code; }} {nowhere}; }} 3>&1; exit $(cat code)");
+                let ran = sh(&place, &line);
+                assert_eq!(ran.code, code, "{line}: {}", ran.stderr);
+            }
+        }
+    }
+
+    /// A reader who has gone has seen enough; a full disk is a failure.
+    #[test]
+    fn what_is_printed_is_complete_or_the_exit_code_says_so() {
+        let place = Place::new();
+        for command in ["devices", "check small.toml", "--help", "render --help", "--version"] {
+            let full = sh(&place, &format!("$0 {command} > /dev/full"));
+            assert_eq!(full.code, 1, "{command}: {}", full.stderr);
+            assert!(
+                full.stderr
+                    .starts_with("error: standard output: cannot be written: No space left"),
+                "{command}: {}",
+                full.stderr
+            );
+            for (line, code) in [
+                (
+                    format!("{{ $0 {command}; echo $? > code; }} | true; exit $(cat code)"),
+                    0,
+                ),
+                (format!("$0 {command} >&-"), 0),
+            ] {
+                let ran = sh(&place, &line);
+                assert_eq!((ran.code, ran.stderr.as_str()), (code, ""), "{line}");
+            }
+        }
+        place.write("bad.toml", "");
+        let ran = sh(
+            &place,
+            "{ $0 check small.toml small.toml bad.toml small.toml; echo $? > code; } | true; exit $(cat code)",
+        );
+        assert_eq!(ran.code, 3, "the check goes on without a reader: {}", ran.stderr);
+    }
+}
+
+/// The message of a scene in which a line was put in place of the radius, or of one of [render].
+fn told(from: &str, to: &str) -> String {
+    let place = Place::new();
+    assert!(SCENE.contains(from), "{from}");
+    place.write("bad.toml", &SCENE.replacen(from, to, 1));
+    let ran = place.run(&["check", "bad.toml"]);
+    assert_eq!((ran.code, ran.stdout.as_str()), (3, ""), "{}", ran.stderr);
+    assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+    ran.stderr.trim_end().to_owned()
+}
+
+#[test]
+fn values_of_a_wrong_kind_are_told_with_the_right_kind() {
+    let samples = "pixel_samples = { pattern = \"random\", count = 3 }";
+    for (from, to, message) in [
+        (
+            samples,
+            "pixel_samples = 16",
+            "bad.toml:6: render.pixel_samples: 16 must be a table, such as { pattern = \"grid\", count = 16 }",
+        ),
+        (
+            samples,
+            "pixel_samples = 'sobol'",
+            "bad.toml:6: render.pixel_samples: \"sobol\" must be a table, such as { pattern =",
+        ),
+        (
+            samples,
+            "filter = 'gaussian'",
+            "bad.toml:6: render.filter: \"gaussian\" must be a table, such as { type = \"gaussian\" }",
+        ),
+        (
+            samples,
+            "adaptive = 0.01",
+            "bad.toml:6: render.adaptive: 0.01 must be a table, such as { error = 0.01 }",
+        ),
+        (
+            samples,
+            "adaptive = { error = 0.01 }",
+            "render.adaptive: the pattern of pixel_samples is \"grid\", which has no further samples; it must be one of \"jittered\", \"random\", \"halton\", \"sobol\", as with --pixel-pattern sobol",
+        ),
+        (
+            "width = 10",
+            "width = -1",
+            "bad.toml:1: image.width: -1 must be a whole number from 1 to 65536",
+        ),
+        (
+            "width = 10",
+            "width = 9.5",
+            "bad.toml:1: image.width: 9.5 must be a whole number from 1 to 65536",
+        ),
+        (
+            "width = 10",
+            "width = 5000000000",
+            "bad.toml:1: image.width: 5000000000 must be a whole number from 1 to 65536",
+        ),
+        (
+            samples,
+            "max_depth = -1",
+            "bad.toml:6: render.max_depth: -1 must be a whole number from 1 to 64",
+        ),
+        (
+            samples,
+            "seed = -1",
+            "bad.toml:6: render.seed: -1 must be a whole number from 0 to 4294967295",
+        ),
+        (
+            samples,
+            "pixel_samples = { count = -4 }",
+            "bad.toml:6: render.pixel_samples.count: -4 must be a whole number from 1 to 65536",
+        ),
+        (
+            samples,
+            "shadow_epsilon = .5",
+            "bad.toml:6:18: render.shadow_epsilon: .5 must have a digit before its point, as 0.5 has",
+        ),
+        (
+            samples,
+            "seed = 1\nseed = 2",
+            "bad.toml:7:1: render.seed: is there twice, first in line 6; one must go",
+        ),
+    ] {
+        let found = told(from, to);
+        assert!(found.contains(message), "{found}\n{message}");
+    }
+}
+
+/// What the parser says of a whole number is what the checks say of it.
+#[test]
+fn a_whole_numbers_range_is_the_same_wherever_it_is_told() {
+    let render = |line: &str| (String::from("[render]"), format!("[render]\n{line}"));
+    for (key, (from, to)) in [
+        ("width", ("width = 10".to_owned(), "width = N".to_owned())),
+        ("height", ("height = 6".to_owned(), "height = N".to_owned())),
+        ("max_depth", render("max_depth = N")),
+        ("count", ("count = 3".to_owned(), "count = N".to_owned())),
+    ] {
+        let [negative, zero] = ["-1", "0"].map(|value| told(&from, &to.replace('N', value)));
+        let range = |message: &str| message.split(" from ").nth(1).map(str::to_owned);
+        assert!(
+            range(&zero).is_some() && range(&zero) == range(&negative),
+            "{key}: {zero} and {negative}"
+        );
+    }
+}
+
+#[test]
+fn messages_of_long_keys_and_values_are_short() {
+    let long = "k".repeat(1_000_000);
+    for (from, to) in [
+        ("[render]", format!("{long} = 1\n[render]")),
+        ("[render]", format!("[render]\n{long} = 1")),
+        ("[render]", format!("[render]\n{long} = 1\n{long} = 2")),
+        ("[render]", format!("[render]\n{long}")),
+        ("[render]", format!("[render]\nseed = {long}")),
+        ("[render]", format!("[render]\nseed = '{long}'")),
+        ("[render]", format!("[render]\nshadows = '{long}'")),
+        ("[render]", format!("[render]\nseed = {}", "9".repeat(1_000_000))),
+        ("material = \"gray\"", format!("material = '{long}'")),
+        ("type = \"phong\"", format!("type = '{long}'")),
+        (
+            "[materials.gray]",
+            format!("[materials.{long}]\ntype = 'phong'\nshininess = 0\n[materials.gray]"),
+        ),
+        (
+            "[materials.gray]",
+            format!("[textures.a]\ntype = 'image'\nfile = '{long}'\n[materials.gray]"),
+        ),
+    ] {
+        let message = told(from, &to);
+        assert!(message.len() < 1500, "{} bytes: {}", message.len(), &message[..200]);
+        assert!(message.contains("..."), "{message}");
+    }
+    let many: String = (0..2000)
+        .map(|i| format!("[materials.m{i}]\ntype = 'mirror'\n"))
+        .collect();
+    let message = told(
+        "[[shapes]]\ntype = \"sphere\"\nmaterial = \"gray\"",
+        &format!("{many}[[shapes]]\ntype = \"sphere\"\nmaterial = \"m\""),
+    );
+    assert!(message.len() < 1500 && message.contains(" and 1977 more"), "{message}");
+}
+
+#[test]
+fn wrong_arguments_are_told_with_the_way_out() {
+    let place = Place::new();
+    let grid = SCENE.replacen("pixel_samples = { pattern = \"random\", count = 3 }\n", "", 1);
+    place.write("grid.toml", &grid);
+    let adaptive = place.run(&["render", "grid.toml", "--adaptive", "0.1"]);
+    assert_eq!(adaptive.code, 2);
+    assert!(
+        adaptive
+            .stderr
+            .starts_with("error: --adaptive: the pattern of pixel_samples is \"grid\", ")
+            && adaptive.stderr.contains("--pixel-pattern sobol"),
+        "{}",
+        adaptive.stderr
+    );
+    for scene in [".", "..", "/"] {
+        for command in ["render", "check"] {
+            let ran = place.run(&[command, scene]);
+            assert_eq!(ran.code, 3);
+            assert_eq!(
+                ran.stderr,
+                format!("error: {scene}: cannot be read: it is a folder, and a scene is a file\n")
+            );
+        }
+    }
+    for device in ["CPU", "Cpu", "GPU", "AUTO"] {
+        place.quietly(&["render", "small.toml", "--device", device]);
+    }
+    place.quietly(&["render", "small.toml", "--device", "1"]);
+    let dev = place.run(&["dev", "small.toml", "--no-page", "--device", "CPU"]);
+    assert!(dev.stderr.contains("cpu runs no shaders"), "{}", dev.stderr);
+}
+
+#[test]
+fn an_image_outside_the_asset_root_is_told_with_both() {
+    let place = Place::new();
+    image::RgbImage::new(2, 2).save(place.path("tile.png")).unwrap();
+    std::fs::create_dir(place.path("sub")).unwrap();
+    let texture = "[textures.a]\ntype = 'image'\nfile = 'tile.png'\n[[lights]]";
+    place.write("tile.toml", &SCENE.replacen("[[lights]]", texture, 1));
+    let ran = place.run(&["check", "tile.toml", "--asset-root", "sub"]);
+    assert_eq!(ran.code, 3);
+    assert!(
+        ran.stderr.contains("must lie in sub, the folder of --asset-root"),
+        "{}",
+        ran.stderr
+    );
+    assert!(!ran.stderr.contains("unless"), "{}", ran.stderr);
+    place.write(
+        "tile.toml",
+        &SCENE.replacen("[[lights]]", &texture.replace("tile.png", "../tile.png"), 1),
+    );
+    std::fs::rename(place.path("tile.toml"), place.path("sub/tile.toml")).unwrap();
+    let ran = place.run(&["check", "sub/tile.toml"]);
+    assert!(
+        ran.stderr
+            .contains("must not leave the scene's folder, sub, unless --asset-root names a folder that it lies in"),
+        "{}",
+        ran.stderr
+    );
+    let ran = place.run(&["check", "sub/tile.toml", "--asset-root", "."]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+}

@@ -1,0 +1,424 @@
+//! Where a render may write to: no input, nothing twice, through pipes and devices, and never instead of them.
+
+use std::fs;
+
+use super::{Place, Ran, SCENE};
+
+/// A scene with an image, a normal map, and an image that no material names.
+fn textured(place: &Place) {
+    let texture = |name: &str, file: &str, encoding: &str| {
+        image::RgbImage::new(2, 2).save(place.path(file)).unwrap();
+        format!("[textures.{name}]\ntype = 'image'\nfile = '{file}'\nencoding = '{encoding}'\n")
+    };
+    let scene = SCENE.replacen(
+        "[[lights]]",
+        &format!(
+            "{}{}{}[[lights]]",
+            texture("colour", "tiles.png", "srgb"),
+            texture("bumps", "wall.normal.png", "linear"),
+            texture("unused", "spare.png", "srgb"),
+        ),
+        1,
+    );
+    place.write("tiles.toml", &scene);
+}
+
+/// The render refused, and every file is as it was.
+#[track_caller]
+fn refused(place: &Place, arguments: &[&str], code: i32, message: &str) {
+    let content = |place: &Place| -> Vec<(String, Vec<u8>)> {
+        let files = place.files().into_iter().filter(|name| place.path(name).is_file());
+        files.map(|name| (name.clone(), place.read(&name))).collect()
+    };
+    let before = content(place);
+    let ran = place.run(&[&["render", "--device", "cpu"], arguments].concat());
+    assert_eq!(
+        (ran.code, ran.stdout.as_str()),
+        (code, ""),
+        "{arguments:?}: {}",
+        ran.stderr
+    );
+    assert!(ran.stderr.contains(message), "{arguments:?}: {}", ran.stderr);
+    assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+    assert!(before == content(place), "{arguments:?} changed a file");
+}
+
+#[test]
+fn no_input_is_replaced() {
+    let place = Place::new();
+    textured(&place);
+    let keeps = "is a file that the scene is made of, and must stay; choose another name by --output";
+    refused(&place, &["tiles.toml"], 2, &format!("--output: tiles.png: {keeps}"));
+    refused(
+        &place,
+        &["tiles.toml", "-o", "spare.png"],
+        2,
+        &format!("--output: spare.png: {keeps}"),
+    );
+    let aov = format!("--aov normal: wall.normal.png: {keeps}");
+    refused(
+        &place,
+        &["tiles.toml", "-o", "wall.png", "--aov", "depth,normal"],
+        2,
+        &aov,
+    );
+    fs::copy(place.path("small.toml"), place.path("scene.png")).unwrap();
+    refused(&place, &["scene.png"], 2, &format!("--output: scene.png: {keeps}"));
+    // An EXR has its AOVs inside, so that it replaces nothing.
+    place.quietly(&[
+        "render",
+        "tiles.toml",
+        "-o",
+        "wall.exr",
+        "--aov",
+        "normal",
+        "--device",
+        "cpu",
+    ]);
+}
+
+#[cfg(unix)]
+#[test]
+fn no_input_is_replaced_through_links() {
+    let place = Place::new();
+    textured(&place);
+    let path = |name: &str| place.path(name);
+    std::os::unix::fs::symlink("tiles.png", path("soft.png")).unwrap();
+    std::os::unix::fs::symlink(".", path("folder")).unwrap();
+    std::os::unix::fs::symlink("small.toml", path("scene.json")).unwrap();
+    fs::hard_link(path("tiles.png"), path("hard.png")).unwrap();
+    for output in ["soft.png", "hard.png", "folder/tiles.png"] {
+        let told = format!("--output: {output}: is the file ./tiles.png, which the scene is made of and must stay");
+        refused(&place, &["tiles.toml", "-o", output], 2, &told);
+    }
+    refused(
+        &place,
+        &["small.toml", "--stats", "scene.json"],
+        2,
+        "--stats: scene.json: must not end in .toml",
+    );
+}
+
+#[test]
+fn no_output_is_written_twice() {
+    let place = Place::new();
+    for (arguments, told) in [
+        (
+            &["-o", "q", "--format", "png", "--stats", "./q"][..],
+            "--stats: ./q: is where --output writes to",
+        ),
+        (
+            &["-o", "-", "--stats", "-"],
+            "--stats: standard output: is where --output writes to",
+        ),
+        (
+            &["-o", "q.png", "--stats", "q.png"],
+            "--stats: q.png: must not end in .png, nor lead to such a file",
+        ),
+        (&["--stats", "Q.EXR"], "--stats: Q.EXR: must not end in .exr"),
+        (
+            &["--stats", "other.toml"],
+            "--stats: other.toml: must not end in .toml, nor lead to such a file: that is a",
+        ),
+        (
+            &["-o", "other.toml", "--format", "exr"],
+            "--output: other.toml: must not end in .toml",
+        ),
+    ] {
+        refused(&place, &[&["small.toml"], arguments].concat(), 2, told);
+    }
+}
+
+#[test]
+fn the_picture_of_the_development_mode_is_no_input() {
+    let place = Place::new();
+    textured(&place);
+    std::fs::create_dir(place.path("folder.png")).unwrap();
+    for (out, code, told) in [
+        (
+            "tiles.png",
+            2,
+            "--out: tiles.png: is a file that the scene is made of, and must stay; choose another name",
+        ),
+        (
+            "./spare.png",
+            2,
+            "--out: ./spare.png: is a file that the scene is made of",
+        ),
+        ("tiles.toml", 2, "--out: tiles.toml: must end in .png"),
+        ("folder.png", 1, "folder.png: cannot be written: it is a folder"),
+        (
+            "nowhere/a.png",
+            1,
+            "nowhere/a.png: cannot be written: the folder nowhere is not there",
+        ),
+    ] {
+        let ran = place.run(&["dev", "tiles.toml", "--no-page", "--out", out]);
+        assert_eq!(ran.code, code, "{}", ran.stderr);
+        assert!(ran.stderr.contains(told), "{}", ran.stderr);
+    }
+}
+
+#[test]
+fn the_format_is_told_by_the_name_or_the_option() {
+    let place = Place::new();
+    refused(
+        &place,
+        &["small.toml", "-o", "q.png", "--format", "exr"],
+        2,
+        "--format: must be what the name of --output says",
+    );
+    refused(
+        &place,
+        &["small.toml", "-o", "q.gif"],
+        2,
+        "q.gif: must end in .png or .exr, or --format must say which",
+    );
+    place.quietly(&["render", "small.toml", "-o", "q", "--format", "exr", "--device", "cpu"]);
+    place.quietly(&[
+        "render",
+        "small.toml",
+        "-o",
+        "q.exr",
+        "--format",
+        "exr",
+        "--device",
+        "cpu",
+    ]);
+    assert_eq!(place.read("q"), place.read("q.exr"));
+}
+
+#[cfg(unix)]
+mod unix {
+    use std::os::unix::fs::{FileTypeExt, PermissionsExt};
+    use std::process::{Command, Stdio};
+
+    use super::super::program;
+    use super::*;
+
+    /// Runs a line of bash in which `$0` is the program.
+    fn bash(place: &Place, line: &str) -> Ran {
+        let output = Command::new("bash")
+            .current_dir(place.path("."))
+            .args(["-c", line])
+            .arg(program())
+            .output()
+            .unwrap();
+        Ran {
+            code: output.status.code().unwrap_or(-1),
+            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+        }
+    }
+
+    #[track_caller]
+    fn quiet(place: &Place, line: &str) {
+        let ran = bash(place, line);
+        assert_eq!(
+            (ran.code, ran.stdout.as_str(), ran.stderr.as_str()),
+            (0, "", ""),
+            "{line}"
+        );
+    }
+
+    /// The picture on standard output is the file that would be there.
+    #[test]
+    fn standard_output_takes_a_picture_or_figures() {
+        let place = Place::new();
+        place.quietly(&["render", "small.toml", "-o", "file.png", "--device", "cpu"]);
+        place.quietly(&[
+            "render",
+            "small.toml",
+            "-o",
+            "file.exr",
+            "--aov",
+            "normal",
+            "--device",
+            "cpu",
+        ]);
+        for (line, file) in [
+            ("$0 render small.toml --device cpu -o - | cat > got", "file.png"),
+            ("$0 render small.toml --device cpu -o - > got", "file.png"),
+            (
+                "$0 render small.toml --device cpu -o /dev/stdout | cat > got",
+                "file.png",
+            ),
+            ("$0 render small.toml --device cpu -o /dev/fd/1 > got", "file.png"),
+            (
+                "$0 render small.toml --device cpu -o >(cat > got); while ! [ -s got ]; do sleep 0.02; done",
+                "file.png",
+            ),
+            (
+                "$0 render small.toml --device cpu -o - --format exr --aov normal > got",
+                "file.exr",
+            ),
+            (
+                "mkfifo p.exr; cat p.exr > got & $0 render small.toml --device cpu -o p.exr --aov normal; wait",
+                "file.exr",
+            ),
+        ] {
+            place.write("got", "");
+            quiet(&place, line);
+            assert_eq!(place.read("got"), place.read(file), "{line}");
+        }
+        assert!(fs::metadata(place.path("p.exr")).unwrap().file_type().is_fifo());
+        for way in ["-", "/dev/stdout", "/dev/fd/1"] {
+            place.write("got", "first\n");
+            quiet(
+                &place,
+                &format!("$0 render small.toml --device cpu -o q.png --stats {way} >> got"),
+            );
+            let got = String::from_utf8(place.read("got")).unwrap();
+            let figures = got.strip_prefix("first\n").unwrap_or_else(|| panic!("{way}: {got}"));
+            serde_json::from_str::<serde_json::Value>(figures).unwrap();
+        }
+        refused(
+            &place,
+            &["small.toml", "-o", "-", "--aov", "normal"],
+            2,
+            "--aov normal: is a file beside a PNG, and there is none beside standard output; --format exr puts it into",
+        );
+    }
+
+    #[test]
+    fn an_input_on_standard_output_is_kept() {
+        let place = Place::new();
+        textured(&place);
+        let before = place.read("tiles.png");
+        let ran = bash(&place, "$0 render tiles.toml --device cpu -o - >> tiles.png");
+        assert_eq!(ran.code, 2, "{}", ran.stderr);
+        assert!(
+            ran.stderr
+                .contains("--output: standard output: is the file ./tiles.png"),
+            "{}",
+            ran.stderr
+        );
+        assert_eq!(place.read("tiles.png"), before);
+    }
+
+    #[test]
+    fn devices_are_written_through() {
+        let place = Place::new();
+        quiet(
+            &place,
+            "$0 render small.toml --device cpu -o /dev/null --stats /dev/null",
+        );
+        assert!(fs::metadata("/dev/null").unwrap().file_type().is_char_device());
+        for (line, told) in [
+            (
+                "$0 render small.toml --device cpu -o /dev/full",
+                "error: /dev/full: cannot be written: No space left",
+            ),
+            (
+                "$0 render small.toml --device cpu -o - > /dev/full",
+                "error: standard output: cannot be written: No space left",
+            ),
+            (
+                "$0 render small.toml --device cpu --stats - > /dev/full",
+                "error: standard output: cannot be written: No space",
+            ),
+            (
+                "{ $0 render small.toml --device cpu -o -; echo $? > code; } | true; exit $(cat code)",
+                "error: standard output: cannot be written: Broken pipe",
+            ),
+        ] {
+            let ran = bash(&place, line);
+            assert_eq!(ran.code, 1, "{line}: {}", ran.stderr);
+            assert!(ran.stderr.starts_with(told), "{line}: {}", ran.stderr);
+        }
+    }
+
+    #[test]
+    fn a_folder_for_temporary_files_that_is_not_there_is_told() {
+        let place = Place::new();
+        let ran = place.run_with(
+            &["render", "small.toml", "-o", "-", "--device", "cpu"],
+            &[("TMPDIR", "/nonexistent")],
+        );
+        assert_eq!((ran.code, ran.stdout.as_str()), (1, ""));
+        assert!(
+            ran.stderr
+                .contains("standard output: cannot be written: it must first be whole in /nonexistent"),
+            "{}",
+            ran.stderr
+        );
+        refused(
+            &place,
+            &["small.toml", "-o", "out.png/"],
+            1,
+            "out.png/: cannot be written: it is a folder",
+        );
+    }
+
+    #[test]
+    fn a_link_stays_and_its_target_is_replaced() {
+        let place = Place::new();
+        fs::create_dir(place.path("inner")).unwrap();
+        place.write("inner/there.png", "old");
+        std::os::unix::fs::symlink("inner/there.png", place.path("there.png")).unwrap();
+        std::os::unix::fs::symlink("inner/new.png", place.path("new.png")).unwrap();
+        std::os::unix::fs::symlink("new.png", place.path("twice.png")).unwrap();
+        std::os::unix::fs::symlink("ring.png", place.path("ring.png")).unwrap();
+        place.quietly(&["render", "small.toml", "-o", "there.png", "--device", "cpu"]);
+        place.quietly(&["render", "small.toml", "-o", "twice.png", "--device", "cpu"]);
+        for name in ["there.png", "new.png", "twice.png"] {
+            assert!(fs::symlink_metadata(place.path(name)).unwrap().is_symlink());
+            assert!(place.read(name).starts_with(b"\x89PNG"), "{name}");
+        }
+        assert_eq!(fs::read_dir(place.path("inner")).unwrap().count(), 2);
+        refused(
+            &place,
+            &["small.toml", "-o", "ring.png"],
+            1,
+            "ring.png: cannot be written: ",
+        );
+    }
+
+    /// By its mode alone: these tests may run as root, who may write everything.
+    #[test]
+    fn a_read_only_file_is_refused_and_others_keep_their_mode() {
+        let place = Place::new();
+        for (name, mode) in [("fixed.png", 0o444), ("open.png", 0o640)] {
+            place.write(name, "old");
+            fs::set_permissions(place.path(name), fs::Permissions::from_mode(mode)).unwrap();
+        }
+        refused(
+            &place,
+            &["small.toml", "-o", "fixed.png"],
+            1,
+            "fixed.png: cannot be written: it is read-only",
+        );
+        refused(
+            &place,
+            &["small.toml", "--format", "exr", "-o", "q", "--stats", "nowhere/s"],
+            1,
+            "nowhere/s: cannot be written: the folder nowhere is not there",
+        );
+        place.quietly(&["render", "small.toml", "-o", "open.png", "--device", "cpu"]);
+        let mode = fs::metadata(place.path("open.png")).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o640);
+    }
+
+    /// A pipe that nobody reads keeps the program waiting, and Ctrl+C still ends it.
+    #[test]
+    fn waiting_for_a_reader_can_be_interrupted() {
+        let place = Place::new();
+        let made = Command::new("mkfifo").arg(place.path("p.png")).status().unwrap();
+        assert!(made.success());
+        let mut child = Command::new(program())
+            .current_dir(place.path("."))
+            .args(["render", "small.toml", "-o", "p.png", "--device", "cpu"])
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        assert!(child.try_wait().unwrap().is_none(), "it waits");
+        let killed = Command::new("kill")
+            .args(["-INT", &child.id().to_string()])
+            .status()
+            .unwrap();
+        assert!(killed.success());
+        assert!(!child.wait().unwrap().success());
+        assert_eq!(place.files(), ["p.png"]);
+    }
+}
