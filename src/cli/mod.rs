@@ -13,7 +13,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::{Parser, Subcommand};
-use wgray::error::{RenderError, ShaderError};
+use wgray::error::{RenderError, ShaderError, ShaderErrors};
 use wgray::scene::SceneError;
 
 #[derive(Debug, Parser)]
@@ -90,16 +90,23 @@ fn prepare_environment(threads: Option<u16>) {
 /// Says on standard error what went wrong.
 fn report(error: &anyhow::Error) {
     let mut stderr = io::stderr().lock();
-    let _ = writeln!(stderr, "error: {error:#}"); // where this cannot be written there is nobody to tell
-    if let Some(excerpt) = shader_error(error).and_then(|shader| shader.excerpt.as_ref()) {
-        let _ = writeln!(stderr, "{excerpt}");
+    let shader = shader_errors(error);
+    if shader.is_empty() {
+        let _ = writeln!(stderr, "error: {error:#}"); // where this cannot be written there is nobody to tell
+    }
+    for error in shader {
+        let _ = writeln!(stderr, "error: {error}");
+        if let Some(excerpt) = &error.excerpt {
+            let _ = writeln!(stderr, "{excerpt}");
+        }
     }
 }
 
-fn shader_error(error: &anyhow::Error) -> Option<&ShaderError> {
-    match error.downcast_ref() {
-        Some(RenderError::Shader(shader)) => Some(shader),
-        _ => error.downcast_ref(),
+fn shader_errors(error: &anyhow::Error) -> &[ShaderError] {
+    match (error.downcast_ref(), error.downcast_ref::<ShaderErrors>()) {
+        (Some(RenderError::Shader(error)), _) => std::slice::from_ref(error),
+        (_, Some(errors)) => &errors.0,
+        _ => &[],
     }
 }
 

@@ -191,7 +191,7 @@ impl Painter {
     fn settle(&mut self, since: (Instant, bool)) {
         let Some((loaded, shaders)) = self.wanted() else { return };
         if self.shaders.as_ref() == Some(&shaders) {
-            self.problems.shader = None;
+            self.problems.shader.clear();
         }
         let constants = constants(&loaded.packed);
         let fits = |known: &Arc<Shaders>, of| *known == shaders && constants == of;
@@ -268,26 +268,26 @@ impl Painter {
                 return;
             }
         };
-        if let Some(error) = &built.refused {
-            self.refuse(&pending, Some(error));
+        if let Some(errors) = &built.refused {
+            let problems = errors.0.iter().map(|error| self.of_shader(error)).collect();
+            self.refuse((pending.shaders.clone(), pending.constants), problems);
         }
         match built.result {
-            Ok((gpu, shaders)) => {
+            Some(Ok((gpu, shaders))) => {
                 self.state.compile_seconds = Some(built.took.as_secs_f64());
                 self.compiled = self.state.compile_seconds;
                 self.run(*gpu, shaders, pending.constants);
             }
-            Err(RenderError::Shader(error)) => {
-                self.refuse(&pending, Some(&error));
+            None => {
                 self.since = None;
                 self.settle((Instant::now(), true)); // the scene may have changed meanwhile: the running kernel shows that
             }
-            Err(error) => {
+            Some(Err(error)) => {
                 let (view, running) = (self.view, &mut self.running);
                 let lives = |running: &mut Running| guarded(|| running.canvas.content(view)).is_ok();
                 if running.as_mut().is_some_and(lives) {
                     // The driver refuses what naga does not; the device is well.
-                    self.refuse(&pending, None);
+                    self.refuse((pending.shaders, pending.constants), Vec::new());
                     self.problems.device = Some((&error).into());
                     self.since = None;
                     self.settle((Instant::now(), true));
@@ -326,9 +326,9 @@ impl Painter {
     }
 
     /// Remembers that shaders are wrong for a scene like this, so that they are not tried again.
-    fn refuse(&mut self, pending: &Pending, error: Option<&ShaderError>) {
-        self.refused.push((pending.shaders.clone(), pending.constants));
-        self.problems.shader = error.map(|error| self.of_shader(error));
+    fn refuse(&mut self, shaders: (Arc<Shaders>, Constants), problems: Vec<Diagnostic>) {
+        self.refused.push(shaders);
+        self.problems.shader = problems;
     }
 
     /// A shader's error, with the path by which the user knows the file.

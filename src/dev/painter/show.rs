@@ -16,16 +16,15 @@ use crate::dev::save::replace;
 pub struct Problems {
     pub scene: Option<Diagnostic>,
     pub files: Option<Diagnostic>,
-    pub shader: Option<Diagnostic>,
+    pub shader: Vec<Diagnostic>,
     pub device: Option<Diagnostic>,
     pub out: Option<Diagnostic>,
 }
 
 impl Problems {
     fn all(&self) -> impl Iterator<Item = &Diagnostic> {
-        [&self.files, &self.shader, &self.scene, &self.device, &self.out]
-            .into_iter()
-            .flatten()
+        let others = [&self.scene, &self.device, &self.out].into_iter().flatten();
+        self.files.iter().chain(&self.shader).chain(others)
     }
 }
 
