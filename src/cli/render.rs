@@ -437,7 +437,7 @@ fn middle_depth(plan: &Plan, backend: &mut dyn Backend) -> Result<f32, RenderErr
 }
 
 /// Set when the user wants the render to end; it then cleans up behind itself.
-fn stop_on_signal() -> anyhow::Result<Arc<AtomicBool>> {
+pub fn stop_on_signal() -> anyhow::Result<Arc<AtomicBool>> {
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("signal handler")?;

@@ -174,6 +174,7 @@ impl Running {
             sources,
             device: Choice::Auto,
             out,
+            only_for_viewers: false,
             report: Box::new(|_| ()),
         };
         Running {

@@ -74,6 +74,10 @@ function showProgress(header) {
   element("samples").textContent = counts ? `${samples} of ${total}` : "1 ray a pixel";
   element("speed").textContent = counts && speed ? withPrefix(speed) : "–";
   element("size").textContent = `${header.width} × ${header.height}`;
+  const [shownWidth, shownHeight] = header.finest;
+  element("smaller").parentElement.hidden = shownWidth === header.width && shownHeight === header.height;
+  element("smaller").textContent = `${shownWidth} × ${shownHeight}; wgray render makes the whole one`;
+  showFaults(header);
   if (header.latency !== null) element("latency").textContent = seconds(header.latency);
   const verdict = element("differing");
   if (differing) {
@@ -89,6 +93,20 @@ function showProgress(header) {
   }
 }
 
+// Pixels that are no light, "GPU: 3 pixels are NaN, 1 infinite"; rings lead to them.
+function showFaults({ faults, width, height, sent }) {
+  const names = { picture: "", gpu: "GPU: ", cpu: "CPU: " };
+  const told = faults.map(([part, found]) => {
+    const counts = ["nan", "infinite", "negative"].filter((kind) => found[kind]).map((kind) => {
+      return `${found[kind].toLocaleString("en")} ${kind === "nan" ? "NaN" : kind}`;
+    });
+    return counts.length ? `${names[part]}${counts.join(", ")}` : "";
+  }).filter(Boolean);
+  element("faults").hidden = !told.length;
+  const all = (width / sent[0]) * (height / sent[1]) > 1.5 ? "Pixels so far" : "Pixels";
+  element("fault-counts").textContent = told.length ? `${all} that are no light: ${told.join("; ")}` : "";
+}
+
 function showState(next) {
   state = next;
   document.title = `${next.problems.length ? "✗ " : ""}${next.scene} – wgray`;
@@ -101,6 +119,8 @@ function showState(next) {
   element("moved").hidden = !next.camera_moved;
   element("save").disabled = element("reset").disabled = !next.camera_moved;
   element("compare").hidden = next.view !== "compare";
+  element("undo").hidden = !next.can_undo;
+  element("marks").checked = picture.marks = next.marks;
   element("gain").value = next.gain;
   element("gain-shown").textContent = `× ${next.gain}`;
   for (const input of document.querySelectorAll("input[name=view]")) input.checked = input.value === next.view;
@@ -194,6 +214,8 @@ const choose = (name, value) => {
 
 element("views").addEventListener("change", (event) => ask({ view: event.target.value }));
 element("gain").addEventListener("change", (event) => ask({ gain: Number(event.target.value) }));
+element("marks").addEventListener("change", (event) => ask({ marks: event.target.checked }));
+element("undo").addEventListener("click", () => ask("undo_save"));
 element("copy").addEventListener("click", copyCamera);
 element("save").addEventListener("click", () => ask("save_camera"));
 element("reset").addEventListener("click", () => ask("reset_camera"));

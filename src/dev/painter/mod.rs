@@ -5,17 +5,20 @@ mod show;
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
 use self::show::Problems;
 use super::build::{Builder, Built, Request, guarded};
+use super::camera::merged;
 use super::canvas::Canvas;
 use super::diagnostic::Diagnostic;
 use super::messages::{Event, Report, State};
 use super::picture::{Frame, View};
-use super::source::{Constants, Loaded, Snapshot, Sources, constants};
+use super::save::Saved;
+use super::source::{Constants, Loaded, Snapshot, Sources, Stamp, constants};
 use crate::error::{RenderError, ShaderError};
 use crate::gpu::compose::Shaders;
 use crate::gpu::{Device, Gpu};
@@ -33,6 +36,8 @@ pub struct Painter {
     sources: Sources,
     builder: Builder,
     out: Option<PathBuf>,
+    /// How many look, if nothing is rendered while nobody does.
+    looking: Option<Arc<AtomicUsize>>,
     /// The picture that the file was last written for.
     written: Option<u64>,
     report: Box<dyn Fn(Report) + Send>,
@@ -59,8 +64,15 @@ pub struct Painter {
     camera: Option<CameraDescription>,
     /// Whether it moved since the picture was begun.
     camera_waits: bool,
+    /// The last save of a camera, while it can be taken back.
+    saved: Option<Saved>,
+    /// Whether it was, and the file has not been read again.
+    taken_back: bool,
     view: View,
     gain: f32,
+    marks: bool,
+    /// The sizes that were told last, asked for and shown, of a picture that is too large.
+    smaller: Option<([u32; 2], [u32; 2])>,
 
     /// Counts the pictures.
     revision: u64,
@@ -95,6 +107,7 @@ impl Painter {
         device: Device,
         builder: Builder,
         out: Option<PathBuf>,
+        looking: Option<Arc<AtomicUsize>>,
         report: Box<dyn Fn(Report) + Send>,
         state_sender: watch::Sender<Arc<State>>,
         frame_sender: watch::Sender<Option<Arc<Frame>>>,
@@ -110,6 +123,7 @@ impl Painter {
             sources,
             builder,
             out,
+            looking,
             written: None,
             report,
             state_sender,
@@ -127,8 +141,12 @@ impl Painter {
             problems: Problems::default(),
             camera: None,
             camera_waits: false,
+            saved: None,
+            taken_back: false,
             view: View::default(),
             gain: GAIN,
+            marks: true,
+            smaller: None,
             revision: 0,
             since: None,
             latency: None,
@@ -145,6 +163,10 @@ impl Painter {
             Event::Files(snapshot, noticed) => self.take_files(*snapshot, noticed),
             Event::Built(built) => self.take_built(*built),
             Event::Command(command) => self.take_command(command),
+            Event::Viewers => {
+                // Nobody has waited for the picture until now.
+                self.since = self.since.map(|(_, saved)| (Instant::now(), saved));
+            }
             #[cfg(test)]
             Event::Lose => self.device.iter().for_each(Device::destroy),
             Event::Stop => {}
@@ -153,12 +175,19 @@ impl Painter {
     }
 
     fn take_files(&mut self, snapshot: Snapshot, noticed: Instant) {
+        if let Some((_, Stamp::Content(content))) = snapshot.files.first()
+            && self.saved.as_ref().is_some_and(|saved| !saved.is(content))
+        {
+            self.saved = None; // nothing of the save is there to be taken back
+        }
         match snapshot.scene {
             Ok(loaded) => {
                 self.problems.scene = None;
-                if self.loaded.as_ref().is_some_and(|old| old.camera != loaded.camera) {
-                    self.camera = None; // whoever changes the file's camera wants to see it
+                // Whoever changes the file's camera wants to see it; what a save has written and is taken back was on screen.
+                if let (Some(camera), Some(old), false) = (&self.camera, &self.loaded, self.taken_back) {
+                    self.camera = merged(camera, &old.camera, &loaded.camera);
                 }
+                self.taken_back = false;
                 self.loaded = Some(loaded);
             }
             Err(problem) => self.problems.scene = Some(problem),
@@ -247,6 +276,7 @@ impl Painter {
     /// A picture has been begun, by the camera as it is now.
     fn begun(&mut self, since: (Instant, bool)) {
         self.camera_waits = false;
+        self.tell_size();
         self.changed(since);
     }
 
@@ -344,6 +374,9 @@ impl Painter {
 
     /// Whether [`work`](Self::work) has anything to do.
     pub fn has_work(&self) -> bool {
+        if self.looking.as_ref().is_some_and(|looking| looking.load(Ordering::SeqCst) == 0) {
+            return false;
+        }
         self.running.as_ref().is_some_and(|running| {
             let more = !running.canvas.is_done(self.view);
             // While a kernel is compiled the processor is left to the compiler, but for the camera.

@@ -8,7 +8,7 @@ use crate::dev::build::guarded;
 use crate::dev::camera::text;
 use crate::dev::diagnostic::Diagnostic;
 use crate::dev::messages::Report;
-use crate::dev::picture::{Content, Frame, Header, Names, View, png_of};
+use crate::dev::picture::{Content, Frame, Header, Look, Names, View, png_of};
 use crate::dev::save::replace;
 
 /// What is wrong, by where it comes from.
@@ -46,7 +46,8 @@ impl Painter {
             Err(error) => return self.fail(&error),
         };
         let ([width, height], (samples, total), speed) = (canvas.size(), canvas.samples(), canvas.speed());
-        let whole = sent == [width, height] && samples > 0;
+        let finest = canvas.finest_size();
+        let whole = sent == finest && samples > 0;
         if let (Content::Color(colors), true) = (&content, whole) {
             self.write_out(|| png_of(colors), done);
         }
@@ -60,6 +61,7 @@ impl Painter {
             width,
             height,
             sent,
+            finest,
             samples,
             total,
             done,
@@ -71,7 +73,13 @@ impl Painter {
             shapes: loaded.scene.shapes.len() as u32,
             materials: loaded.materials.clone(),
         });
-        let frame = Frame::new(header, content, names.unwrap_or_default(), self.gain);
+        let bins = self.loaded.iter().flat_map(|loaded| &loaded.packed.filter_table);
+        let look = Look {
+            gain: self.gain,
+            marks: self.marks,
+            negative: bins.into_iter().any(|bin| bin.y < 0.0),
+        };
+        let frame = Frame::new(header, content, names.unwrap_or_default(), look);
         self.frame_sender.send_replace(Some(Arc::new(frame)));
         self.last_frame = Instant::now();
         self.frame_cost = start.elapsed();
@@ -105,6 +113,18 @@ impl Painter {
         }
     }
 
+    /// Says in the terminal that the picture is too large to be shown whole; once for each size.
+    pub(super) fn tell_size(&mut self) {
+        let sizes = self.running.as_ref().map(|running| (running.canvas.size(), running.canvas.finest_size()));
+        let smaller = sizes.filter(|(asked, shown)| asked != shown);
+        if self.smaller != smaller {
+            self.smaller = smaller;
+            if let Some((asked, shown)) = smaller {
+                (self.report)(Report::Smaller(asked, shown));
+            }
+        }
+    }
+
     /// Tells everybody the state, where it has changed.
     pub(super) fn tell(&mut self) {
         let camera = self
@@ -120,9 +140,10 @@ impl Painter {
         }
         self.state.camera = camera.map(text).unwrap_or_default();
         self.state.camera_moved = self.camera.is_some();
+        self.state.can_undo = self.saved.is_some();
         self.state.problems = problems;
         self.state.compiling = self.pending.is_some();
-        (self.state.view, self.state.gain) = (self.view, self.gain);
+        (self.state.view, self.state.gain, self.state.marks) = (self.view, self.gain, self.marks);
         if **self.state_sender.borrow() != self.state {
             self.state_sender.send_replace(Arc::new(self.state.clone()));
         }
