@@ -36,8 +36,8 @@ impl Fault {
     }
 }
 
-/// So many places are told, spread over all that there are.
-const PLACES: usize = 64;
+/// A picture is cut into so many parts along each side; of each one place is told.
+const PARTS: usize = 8;
 
 /// How many pixels of a picture are wrong.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -48,23 +48,31 @@ pub struct Faults {
     pub infinite: usize,
     /// Others with a negative one.
     pub negative: usize,
-    /// The places of some of them.
+    /// The places of some of them, one in each part of the picture that has any.
     pub places: Vec<[u32; 2]>,
 }
 
 impl Faults {
     /// Those of a picture of this width.
     pub fn count(faults: &[Option<Fault>], width: u32) -> Faults {
-        let found: Vec<(usize, Fault)> = (0..).zip(faults).filter_map(|(i, fault)| Some((i, (*fault)?))).collect();
-        let of = |kind: Fault| found.iter().filter(|(_, fault)| *fault == kind).count();
-        let step = found.len().div_ceil(PLACES).max(1);
-        let place = |(i, _): &(usize, Fault)| [(i % width as usize) as u32, (i / width as usize) as u32];
-        Faults {
-            nan: of(Fault::Nan),
-            infinite: of(Fault::Infinite),
-            negative: of(Fault::Negative),
-            places: found.iter().step_by(step).map(place).collect(),
+        let width = width as usize;
+        let height = faults.len().div_ceil(width.max(1));
+        let mut counted = Faults::default();
+        let mut told = [false; PARTS * PARTS];
+        for (i, fault) in faults.iter().enumerate() {
+            match fault {
+                None => continue,
+                Some(Fault::Nan) => counted.nan += 1,
+                Some(Fault::Infinite) => counted.infinite += 1,
+                Some(Fault::Negative) => counted.negative += 1,
+            }
+            let (x, y) = (i % width, i / width);
+            let part = &mut told[y * PARTS / height * PARTS + x * PARTS / width];
+            if !std::mem::replace(part, true) {
+                counted.places.push([x as u32, y as u32]);
+            }
         }
+        counted
     }
 }
 
@@ -117,7 +125,12 @@ mod tests {
         assert_eq!(rgb, [7, 7, 7, 255, 0, 255, 0, 255, 255, 0, 255, 0]);
         let allowed = faults(&pixels, true, |color| *color);
         assert_eq!(Faults::count(&allowed, 4).negative, 0);
-        let many = Faults::count(&[Some(Fault::Nan); 1000], 10);
-        assert!(many.nan == 1000 && many.places.len() <= PLACES && many.places.len() > PLACES / 2);
+        let mut many = [Some(Fault::Negative); 1000];
+        let counted = Faults::count(&many, 10);
+        assert_eq!((counted.negative, counted.places.len()), (1000, PARTS * PARTS));
+        many[10..].fill(None);
+        many[999] = Some(Fault::Nan);
+        let counted = Faults::count(&many, 10);
+        assert!(counted.places.contains(&[9, 99]), "one that is alone is not left out");
     }
 }

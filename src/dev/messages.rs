@@ -85,6 +85,12 @@ pub struct State {
     pub compiling: bool,
     /// Seconds that the last one took.
     pub compile_seconds: Option<f64>,
+    /// How many commands have been followed.
+    pub heard: u64,
+    /// The number of the last frame.
+    pub frame: u64,
+    /// Whether there will be more frames without anything happening.
+    pub busy: bool,
     /// The last thing that was said, and how many were before it.
     pub notice: Option<Notice>,
 }

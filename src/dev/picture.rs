@@ -98,6 +98,8 @@ pub enum Content {
 /// What is told about a frame beside its pictures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Header {
+    /// Counts the frames.
+    pub number: u64,
     /// Counts the changes of scene, shaders and camera: which of them the frame shows.
     pub revision: u64,
     /// What it shows.

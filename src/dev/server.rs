@@ -113,7 +113,7 @@ struct Shared {
     guard: Guard,
     state: watch::Receiver<Arc<messages::State>>,
     frames: watch::Receiver<Option<Arc<Frame>>>,
-    send: Arc<dyn Fn(Command) -> bool + Send + Sync>,
+    send: Arc<dyn Fn(Command) -> Option<u64> + Send + Sync>,
     seats: Arc<Semaphore>,
     viewers: Viewers,
 }
@@ -192,6 +192,8 @@ enum Tell<'a> {
         y: u32,
         values: Vec<(&'static str, String)>,
     },
+    /// The number of a command that was given; the state says when it has been followed.
+    Asked(u64),
     Refused(String),
 }
 
@@ -246,7 +248,8 @@ fn answer(asked: &str, shared: &Shared) -> Option<Tell<'static>> {
             Some(Tell::Pixel { x, y, values })
         }
         Ok(Ask::Command(command)) => {
-            (!(shared.send)(command)).then(|| Tell::Refused("busy: a command was dropped".to_string()))
+            let dropped = || Tell::Refused("busy: a command was dropped".to_string());
+            Some((shared.send)(command).map_or_else(dropped, Tell::Asked))
         }
         Err(error) => Some(Tell::Refused(format!("not understood: {error}"))),
     }

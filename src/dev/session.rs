@@ -1,9 +1,9 @@
 //! A session: the files of a scene, watched and rendered by a thread of their own.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
@@ -38,6 +38,8 @@ const WAITING: usize = 256;
 /// A running session; it ends when this is dropped.
 pub struct Session {
     events: SyncSender<Event>,
+    /// How many commands were given.
+    asked: Arc<Mutex<u64>>,
     /// What is known.
     pub state: watch::Receiver<Arc<State>>,
     /// The newest picture, once there is one. Whoever is slow misses some.
@@ -134,6 +136,7 @@ impl Session {
                 events: events.clone(),
             },
             events,
+            asked: Arc::default(),
             state,
             frames,
             watch: Some(watch),
@@ -143,6 +146,8 @@ impl Session {
 
     /// Asks for something.
     pub fn send(&self, command: Command) {
+        let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
+        *asked += 1;
         let _ = self.events.send(Event::Command(command)); // the thread lives as long as this
     }
 
@@ -151,10 +156,18 @@ impl Session {
         self.viewers.clone()
     }
 
-    /// A way to ask for things from other threads, without ever waiting: false if too much is asked for already.
-    pub fn commands(&self) -> impl Fn(Command) -> bool + Send + Sync + 'static {
-        let events = self.events.clone();
-        move |command| !matches!(events.try_send(Event::Command(command)), Err(TrySendError::Full(_)))
+    /// A way to ask for things from other threads, without ever waiting: gives the number that [`State::heard`] reaches
+    /// when it is followed, or nothing if too much is asked for already.
+    pub fn commands(&self) -> impl Fn(Command) -> Option<u64> + Send + Sync + 'static {
+        let (events, asked) = (self.events.clone(), self.asked.clone());
+        move |command| {
+            let mut asked = asked.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Err(TrySendError::Full(_)) = events.try_send(Event::Command(command)) {
+                return None;
+            }
+            *asked += 1;
+            Some(*asked)
+        }
     }
 }
 

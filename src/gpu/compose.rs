@@ -157,6 +157,14 @@ impl Shaders {
         })
     }
 
+    /// The same with another text of a file.
+    #[cfg(test)]
+    pub(super) fn with(mut self, name: &str, text: String) -> Shaders {
+        self.files.retain(|(file, _)| file != name);
+        self.files.push((name.to_string(), text));
+        self
+    }
+
     /// A kernel that reads the scene from buffers, or, if `baked` is the text of the functions that know the scene, has
     /// it as constants.
     pub fn compose(&self, kernel: Kernel, baked: Option<&str>) -> Source {

@@ -111,9 +111,8 @@ impl Sides<'_> {
                 None => Some(match known().find(|known| known.name == variable.name) {
                     Some(known) => format!("`{name}` must be at {}", place_of(known)),
                     None => format!(
-                        "`{name}`: nothing is bound at {}; the program binds {}",
+                        "`{name}`: the program binds nothing at {}",
                         place_of(variable),
-                        known().filter(|known| known.binding.is_some()).map(described).collect::<Vec<_>>().join(", ")
                     ),
                 }),
             };
@@ -131,7 +130,7 @@ impl Sides<'_> {
                 let file = self.file_with(right.global_variables.get_span(handle));
                 let ty = type_name(right, known.ty);
                 let space = space_name(known.space);
-                let message = format!("{} {space} {}: {ty} is missing", place_of(known), described_name(known));
+                let message = format!("{} {space} {}: {ty} is missing", place_of(known), name_of(known));
                 self.tell(file, message);
             }
         }
@@ -183,13 +182,8 @@ fn place_of(variable: &GlobalVariable) -> String {
     format!("@group({}) @binding({})", at.0, at.1)
 }
 
-fn described_name(variable: &GlobalVariable) -> &str {
+fn name_of(variable: &GlobalVariable) -> &str {
     variable.name.as_deref().unwrap_or_default()
-}
-
-fn described(variable: &GlobalVariable) -> String {
-    let binding = variable.binding.map(|at| at.binding).unwrap_or_default();
-    format!("{binding} `{}`", described_name(variable))
 }
 
 fn space_name(space: AddressSpace) -> &'static str {

@@ -59,6 +59,11 @@ export class Picture {
     this.#schedule();
   }
 
+  // Whether what the user did has been asked for and drawn.
+  isSettled() {
+    return !this.scheduled;
+  }
+
   // Reads the pixel beside the last one read.
   moveCursor(dx, dy) {
     if (!this.header) return;
@@ -111,7 +116,7 @@ export class Picture {
       context.imageSmoothingEnabled = sent[0] < width || (side < 4 && !Number.isInteger(side));
       context.imageSmoothingQuality = "high";
       context.drawImage(image, 0, 0, width * view.scale, height * view.scale);
-      if (this.marks) this.#ring(context, panel, view);
+      if (this.marks && view.scale < 4) this.#ring(context, panel, view);
       if (this.cursor && view.scale >= 6) {
         context.lineWidth = 1;
         for (const [color, inset] of [["#000", 0], ["#fff", 1]]) {
@@ -135,7 +140,7 @@ export class Picture {
       for (const [color, lineWidth] of [["#000", 4], ["#fff", 2]]) {
         Object.assign(context, { strokeStyle: color, lineWidth });
         context.beginPath();
-        context.arc(cx * view.scale, cy * view.scale, 8 + view.scale, 0, 2 * Math.PI);
+        context.arc(cx * view.scale, cy * view.scale, 8, 0, 2 * Math.PI);
         context.stroke();
       }
     }

@@ -74,6 +74,10 @@ pub struct Painter {
     /// The sizes that were told last, asked for and shown, of a picture that is too large.
     smaller: Option<([u32; 2], [u32; 2])>,
 
+    /// Counts the commands that were followed.
+    heard: u64,
+    /// Counts the frames.
+    frames: u64,
     /// Counts the pictures.
     revision: u64,
     /// When the change was noticed that the picture does not show yet, and whether a file was saved.
@@ -147,6 +151,8 @@ impl Painter {
             gain: GAIN,
             marks: true,
             smaller: None,
+            heard: 0,
+            frames: 0,
             revision: 0,
             since: None,
             latency: None,
@@ -162,7 +168,10 @@ impl Painter {
         match event {
             Event::Files(snapshot, noticed) => self.take_files(*snapshot, noticed),
             Event::Built(built) => self.take_built(*built),
-            Event::Command(command) => self.take_command(command),
+            Event::Command(command) => {
+                self.take_command(command);
+                self.heard += 1;
+            }
             Event::Viewers => {
                 // Nobody has waited for the picture until now.
                 self.since = self.since.map(|(_, saved)| (Instant::now(), saved));

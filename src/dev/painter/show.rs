@@ -55,7 +55,9 @@ impl Painter {
         self.latency = since
             .map(|(noticed, _)| noticed.elapsed().as_secs_f64())
             .or(self.latency);
+        self.frames += 1;
         let header = Header {
+            number: self.frames,
             revision: self.revision,
             view,
             width,
@@ -140,6 +142,8 @@ impl Painter {
         }
         self.state.camera = camera.map(text).unwrap_or_default();
         self.state.camera_moved = self.camera.is_some();
+        (self.state.heard, self.state.frame) = (self.heard, self.frames);
+        self.state.busy = self.camera_waits || self.pending.is_some() || (self.running.is_some() && !self.is_done());
         self.state.can_undo = self.saved.is_some();
         self.state.problems = problems;
         self.state.compiling = self.pending.is_some();
