@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 
 use naga::back::{pipeline_constants::process_overrides, spv};
-use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
-use naga::{Module, Span, WithSpan};
+use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationError, ValidationFlags, Validator};
+use naga::{GlobalVariable, Handle, Module, Span, WithSpan};
 
 use super::compose::{Kernel, ROUNDING, Source};
 use super::prune::prune;
@@ -50,6 +50,13 @@ impl Checked {
     /// The kernel as naga has it.
     pub(super) fn module(&self) -> &Module {
         &self.module
+    }
+
+    /// Whether an entry point writes a variable, itself or by what it calls.
+    pub(super) fn writes(&self, entry: &str, variable: Handle<GlobalVariable>) -> bool {
+        let position = self.module.entry_points.iter().position(|known| known.name == entry);
+        let usage = position.map(|i| self.info.get_entry_point(i)[variable]);
+        usage.is_some_and(|usage| usage.intersects(GlobalUse::WRITE | GlobalUse::ATOMIC))
     }
 
     /// The kernel as SPIR-V for one specialisation, computed on the device exactly as it is written.

@@ -3,25 +3,31 @@
 
 use naga::{AddressSpace, ArraySize, GlobalVariable, Handle, Module, ShaderStage, Span, StorageAccess, Type, TypeInner};
 
-use super::compile::check;
+use super::compile::{Checked, check};
 use super::compose::{Kernel, Shaders, Source};
 use super::functions::functions;
 use super::wording::type_name;
 use crate::error::ShaderError;
 
-/// What is wrong with the interface of a kernel that naga accepts.
-pub fn mistakes(kernel: Kernel, source: &Source, module: &Module) -> Result<Vec<ShaderError>, ShaderError> {
+/// What is wrong with the interface of a kernel that naga accepts. What it writes is looked at if it is `whole`, with the
+/// bodies of all its functions.
+pub fn mistakes(
+    kernel: Kernel,
+    source: &Source,
+    checked: &Checked,
+    whole: bool,
+) -> Result<Vec<ShaderError>, ShaderError> {
     let built_in = Shaders::built_in().compose(kernel, None);
     let right = check(&built_in)?;
     let sides = Sides {
         kernel,
         source,
-        own: module,
+        own: checked.module(),
         built_in: &built_in,
         right: right.module(),
         found: Vec::new(),
     };
-    Ok(sides.compared())
+    Ok(sides.compared(checked, &right, whole))
 }
 
 struct Sides<'a> {
@@ -34,11 +40,46 @@ struct Sides<'a> {
 }
 
 impl Sides<'_> {
-    fn compared(mut self) -> Vec<ShaderError> {
+    fn compared(mut self, own: &Checked, right: &Checked, whole: bool) -> Vec<ShaderError> {
         self.entry_point();
         self.bindings();
         self.constants();
+        if whole && self.found.is_empty() {
+            self.results(own, right);
+        }
         self.found
+    }
+
+    /// What the program reads after a call must have been written.
+    fn results(&mut self, own: &Checked, right: &Checked) {
+        let entry = self.kernel.entry_point();
+        let at = |module: &Module, binding| {
+            let mut all = module.global_variables.iter();
+            all.find(|(_, variable)| variable.binding == binding).map(|(handle, _)| handle)
+        };
+        for (handle, known) in self.right.global_variables.iter() {
+            let mine = known.binding.and_then(|binding| at(self.own, Some(binding)));
+            if let Some(mine) = mine
+                && right.writes(entry, handle)
+                && !own.writes(entry, mine)
+            {
+                let span = self.place_of_function(entry);
+                let name = name_of(known);
+                let hint = match name {
+                    "receipt" => ": every pixel must end with `sign(local)`",
+                    _ => "",
+                };
+                self.tell(span, format!("`{entry}` never writes `{name}`, which the program reads{hint}"));
+            }
+        }
+    }
+
+    /// A function's head.
+    fn place_of_function(&self, name: &str) -> Option<Span> {
+        let texts = functions(&self.source.text);
+        let text = texts.iter().find(|text| text.name == name)?;
+        let head = self.source.text[text.start..text.body.start].trim_end();
+        Some(Span::from(text.start..text.start + head.len()))
     }
 
     fn tell(&mut self, span: Option<Span>, message: String) {
@@ -58,13 +99,7 @@ impl Sides<'_> {
         let Some(right) = self.right.entry_points.iter().find(is_it) else { return };
         let size = right.workgroup_size;
         let attributes = format!("@compute @workgroup_size({}, {})", size[0], size[1]);
-        let texts = functions(&self.source.text);
-        let place = |name: &str| {
-            let text = texts.iter().find(|text| text.name == name)?;
-            let length = text.body.start - text.start;
-            let head = self.source.text[text.start..][..length].trim_end();
-            Some(Span::from(text.start..text.start + head.len()))
-        };
+        let place = |name: &str| self.place_of_function(name);
         let (span, message) = match self.own.entry_points.iter().find(is_it) {
             Some(own) if own.workgroup_size == size && own.workgroup_size_overrides.is_none() => return,
             Some(own) => {

@@ -54,7 +54,7 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result
 fn mistakes(kernel: Kernel, source: Source, packed: &Packed) -> Vec<ShaderError> {
     let (mut errors, rest) = mistakes_of_functions(source);
     let Some((source, checked)) = rest else { return errors };
-    match interface::mistakes(kernel, &source, checked.module()) {
+    match interface::mistakes(kernel, &source, &checked, errors.is_empty()) {
         Ok(more) => errors.extend(more),
         Err(error) => errors.push(error),
     }
@@ -267,6 +267,18 @@ mod tests {
             &["specialization.wgsl: `MINE` has no value"],
         );
         says(&[("specialization.wgsl", "", "override MINE: f32 = 2.0;")], &[]);
+    }
+
+    #[test]
+    fn results_must_be_written() {
+        says(
+            &[(RENDER, "    sign(local);\n", "")],
+            &["kernels/render.wgsl: `render` never writes `receipt`, which the program reads: every pixel must end with `sign(local)`"],
+        );
+        says(
+            &[(AOV, "first_hits[place.y * work.film_size.x + place.x] =", "let hit =")],
+            &["kernels/aov.wgsl: `aov` never writes `first_hits`"],
+        );
     }
 
     /// Whatever naga calls things by, a person is not told numbers of what is in its tables.

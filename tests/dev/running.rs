@@ -173,8 +173,8 @@ impl Running {
         let settings = Settings {
             sources,
             device: Choice::Auto,
+            only_for_viewers: out.is_some(), // a file needs the picture as a viewer does
             out,
-            only_for_viewers: false,
             report: Box::new(|_| ()),
         };
         Running {

@@ -25,6 +25,7 @@ impl Painter {
             Command::View(view) => {
                 self.view = view;
                 if let Some(running) = &mut self.running {
+                    running.halted = false;
                     match guarded(|| running.canvas.change_view(view)) {
                         Ok(()) => self.changed((Instant::now(), false)), // the camera may have moved meanwhile
                         Err(error) => return self.fail(&error),
@@ -61,6 +62,9 @@ impl Painter {
 
     fn camera_moved(&mut self) {
         self.camera_waits = true;
+        if let Some(running) = &mut self.running {
+            running.halted = false;
+        }
         self.since.get_or_insert((Instant::now(), false));
     }
 

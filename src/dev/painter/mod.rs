@@ -49,10 +49,12 @@ pub struct Painter {
     loaded: Option<Arc<Loaded>>,
     /// The newest shaders that could be read.
     shaders: Option<Arc<Shaders>>,
-    /// The last shaders that could be rendered with.
+    /// The last shaders that made a picture.
     good: Option<Arc<Shaders>>,
     /// Shaders that were refused for these constants.
     refused: Vec<(Arc<Shaders>, Constants)>,
+    /// The last that were refused because the driver cut them short: in another scene it may not.
+    cut: Option<(Arc<Shaders>, Constants)>,
     device: Option<Device>,
     running: Option<Running>,
     pending: Option<Pending>,
@@ -94,6 +96,8 @@ pub struct Painter {
 
 struct Running {
     canvas: Canvas,
+    /// Whether the driver cuts it short: it rests until something changes.
+    halted: bool,
     shaders: Arc<Shaders>,
     constants: Constants,
 }
@@ -137,6 +141,7 @@ impl Painter {
             shaders: None,
             good: None,
             refused: Vec::new(),
+            cut: None,
             device: Some(device),
             running: None,
             pending: None,
@@ -197,6 +202,10 @@ impl Painter {
                     self.camera = merged(camera, &old.camera, &loaded.camera);
                 }
                 self.taken_back = false;
+                if self.loaded.as_ref().is_some_and(|old| old.packed != loaded.packed) {
+                    let cut = self.cut.take();
+                    self.refused.retain(|known| Some(known) != cut.as_ref());
+                }
                 self.loaded = Some(loaded);
             }
             Err(problem) => self.problems.scene = Some(problem),
@@ -275,6 +284,7 @@ impl Painter {
             self.since = None;
             return;
         }
+        running.halted = false;
         match guarded(|| running.canvas.update(&packed, view)) {
             Ok(true) => self.begun(since),
             Ok(false) => {} // it fits, so this cannot be
@@ -321,6 +331,13 @@ impl Painter {
                 self.since = None;
                 self.settle((Instant::now(), true)); // the scene may have changed meanwhile: the running kernel shows that
             }
+            Some(Err(error @ (RenderError::CutShort { .. } | RenderError::Shader(_)))) => {
+                let tried = match built.refused {
+                    Some(_) => self.good.clone().unwrap_or(pending.shaders),
+                    None => pending.shaders,
+                };
+                self.refuse_cut((tried, pending.constants), &error);
+            }
             Some(Err(error)) => {
                 let (view, running) = (self.view, &mut self.running);
                 let lives = |running: &mut Running| guarded(|| running.canvas.content(view)).is_ok();
@@ -351,9 +368,9 @@ impl Painter {
         });
         match canvas {
             Ok(canvas) => {
-                self.good = Some(shaders.clone());
                 self.running = Some(Running {
                     canvas,
+                    halted: false,
                     shaders,
                     constants,
                 });
@@ -368,6 +385,30 @@ impl Painter {
     fn refuse(&mut self, shaders: (Arc<Shaders>, Constants), problems: Vec<Diagnostic>) {
         self.refused.push(shaders);
         self.problems.shader = problems;
+    }
+
+    /// What a driver does not render whole is not tried again, until the scene or the shaders are others.
+    fn refuse_cut(&mut self, shaders: (Arc<Shaders>, Constants), error: &RenderError) {
+        let problem = self.of_render(error);
+        self.cut = Some(shaders.clone());
+        self.refuse(shaders, vec![problem]);
+        self.since = None;
+        self.settle((Instant::now(), true));
+    }
+
+    /// A picture that the kernel cannot make, with what can be done.
+    fn of_render(&self, error: &RenderError) -> Diagnostic {
+        match error {
+            RenderError::Shader(error) => self.of_shader(error),
+            error => {
+                let edited = self.shaders.as_ref().is_some_and(|shaders| **shaders != Shaders::built_in());
+                let way_out = match edited {
+                    true => "; shorten the loops, and end each kernel with `sign(local)` for every pixel",
+                    false => "",
+                };
+                Diagnostic::plain(if edited { "shader" } else { "scene" }, format!("{error}{way_out}"))
+            }
+        }
     }
 
     /// A shader's error, with the path by which the user knows the file.
@@ -386,7 +427,7 @@ impl Painter {
         if self.looking.as_ref().is_some_and(|looking| looking.load(Ordering::SeqCst) == 0) {
             return false;
         }
-        self.running.as_ref().is_some_and(|running| {
+        self.running.as_ref().filter(|running| !running.halted).is_some_and(|running| {
             let more = !running.canvas.is_done(self.view);
             // While a kernel is compiled the processor is left to the compiler, but for the camera.
             self.camera_waits || (more && (self.pending.is_none() || running.canvas.is_new()))
@@ -418,8 +459,20 @@ impl Painter {
         }
     }
 
-    /// The device refused something, or is lost: another one is opened, a few times.
+    /// The device refused something, or is lost: another one is opened, a few times. Not so if it cuts the kernel short:
+    /// then the last good shaders go on, or where there are none others the picture rests.
     fn fail(&mut self, error: &RenderError) {
+        if let (RenderError::CutShort { .. } | RenderError::Shader(_), Some(running)) = (error, &mut self.running) {
+            if self.good.as_ref().is_some_and(|good| *good != running.shaders) {
+                let shaders = (running.shaders.clone(), running.constants);
+                self.stop_running();
+                self.refuse_cut(shaders, error);
+            } else {
+                running.halted = true;
+                self.problems.cut = Some(self.of_render(error));
+            }
+            return self.tell();
+        }
         self.stop_running();
         self.problems.device = Some(error.into());
         self.device = None;

@@ -17,13 +17,15 @@ pub struct Problems {
     pub scene: Option<Diagnostic>,
     pub files: Option<Diagnostic>,
     pub shader: Vec<Diagnostic>,
+    /// The picture cannot be rendered whole.
+    pub cut: Option<Diagnostic>,
     pub device: Option<Diagnostic>,
     pub out: Option<Diagnostic>,
 }
 
 impl Problems {
     fn all(&self) -> impl Iterator<Item = &Diagnostic> {
-        let others = [&self.scene, &self.device, &self.out].into_iter().flatten();
+        let others = [&self.cut, &self.scene, &self.device, &self.out].into_iter().flatten();
         self.files.iter().chain(&self.shader).chain(others)
     }
 }
@@ -79,13 +81,17 @@ impl Painter {
         let look = Look {
             gain: self.gain,
             marks: self.marks,
-            negative: bins.into_iter().any(|bin| bin.y < 0.0),
+            negative: bins.into_iter().any(|bin| bin.z < 0.0),
         };
         let frame = Frame::new(header, content, names.unwrap_or_default(), look);
         self.frame_sender.send_replace(Some(Arc::new(frame)));
         self.last_frame = Instant::now();
         self.frame_cost = start.elapsed();
         self.failures = 0;
+        self.problems.cut = None;
+        if let Some(running) = self.running.as_ref().filter(|_| done || whole) {
+            self.good = Some(running.shaders.clone());
+        }
         if let Some((noticed, saved)) = since {
             self.first_frame = saved.then_some(self.last_frame);
             if saved {
