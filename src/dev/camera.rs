@@ -101,7 +101,11 @@ pub fn merged(
 ) -> Option<CameraDescription> {
     let mut merged = moved.clone();
     match (&mut merged, old, new) {
-        (CameraDescription::Perspective(c), CameraDescription::Perspective(old), CameraDescription::Perspective(new)) => {
+        (
+            CameraDescription::Perspective(c),
+            CameraDescription::Perspective(old),
+            CameraDescription::Perspective(new),
+        ) => {
             take(&mut c.position, &old.position, &new.position);
             take(&mut c.look_at, &old.look_at, &new.look_at);
             take(&mut c.up, &old.up, &new.up);

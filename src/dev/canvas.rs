@@ -118,7 +118,11 @@ impl Canvas {
         self.hits.clear();
         self.shown = false;
         self.finest = finest(camera.width, camera.height, self.gpu.largest_film());
-        let scale = if view.aov().is_some() { self.finest } else { self.first_scale() };
+        let scale = if view.aov().is_some() {
+            self.finest
+        } else {
+            self.first_scale()
+        };
         self.begin(scale)
     }
 
@@ -170,8 +174,14 @@ impl Canvas {
             cpu.begin(region)?;
             self.cpu = cpu.film()?;
         }
-        self.steps
-            .start(region, if scale > self.finest { 1 } else { self.scene.pixel_samples });
+        self.steps.start(
+            region,
+            if scale > self.finest {
+                1
+            } else {
+                self.scene.pixel_samples
+            },
+        );
         Ok(())
     }
 
@@ -309,7 +319,11 @@ impl Canvas {
 
     /// Samples that every pixel of the whole picture has, and will have.
     pub fn samples(&self) -> (u32, u32) {
-        let so_far = if self.stage.scale == self.finest { self.steps.samples() } else { 0 };
+        let so_far = if self.stage.scale == self.finest {
+            self.steps.samples()
+        } else {
+            0
+        };
         (so_far, self.scene.pixel_samples)
     }
 

@@ -43,7 +43,8 @@ pub struct Measured {
 /// What to tell the user; `None` if it was stopped. The copies are gone in every case.
 pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Result<Vec<Measured>, Option<String>> {
     let told = |error: std::io::Error| Some(error.to_string());
-    let text = fs::read_to_string(&sources.scene).map_err(|error| Some(format!("{}: {error}", sources.scene.display())))?;
+    let text =
+        fs::read_to_string(&sources.scene).map_err(|error| Some(format!("{}: {error}", sources.scene.display())))?;
     let folder = sources
         .scene
         .parent()

@@ -34,7 +34,9 @@ impl Saved {
         let place = self.path.display();
         let now = fs::read(&self.path).map_err(|error| format!("{place}: {error}"))?;
         if !self.is(&now) {
-            return Err(format!("{place}: has been changed since the camera was saved, and stays as it is"));
+            return Err(format!(
+                "{place}: has been changed since the camera was saved, and stays as it is"
+            ));
         }
         replace(&self.path, self.before.as_bytes()).map_err(|error| format!("{place}: cannot be written: {error}"))
     }
@@ -141,8 +143,16 @@ fn added(text: &str, table: &dyn TableLike, key: &str, value: &str) -> Option<Ed
     }
     // Its line begins as the first key's does: with blanks, or with `camera.`
     let line_end = text[last..].find('\n').map_or(text.len(), |i| last + i);
-    let line_end = if text[..line_end].ends_with('\r') { line_end - 1 } else { line_end };
-    let line_break = if text[line_end..].starts_with('\r') { "\r\n" } else { "\n" };
+    let line_end = if text[..line_end].ends_with('\r') {
+        line_end - 1
+    } else {
+        line_end
+    };
+    let line_break = if text[line_end..].starts_with('\r') {
+        "\r\n"
+    } else {
+        "\n"
+    };
     Some((line_end..line_end, format!("{line_break}{before_key}{key} = {value}")))
 }
 

@@ -126,7 +126,16 @@ impl Session {
         let (frame_sender, frames) = watch::channel(None);
         let looking = Arc::new(AtomicUsize::new(0));
         let wanted_by = (only_for_viewers && out.is_none()).then(|| looking.clone());
-        let painter = Painter::new(sources, device, builder, out, wanted_by, report, state_sender, frame_sender);
+        let painter = Painter::new(
+            sources,
+            device,
+            builder,
+            out,
+            wanted_by,
+            report,
+            state_sender,
+            frame_sender,
+        );
         let thread = std::thread::Builder::new()
             .name("render".to_string())
             .spawn(move || run(painter, inbox))?;

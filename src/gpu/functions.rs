@@ -21,8 +21,12 @@ pub fn functions(text: &str) -> Vec<FunctionText<'_>> {
     let mut at = 0;
     while let Some(start) = next_word(&plain, at, "fn") {
         let name = text[start + 2..].trim_start();
-        let name = &name[..name.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(name.len())];
-        let Some(open) = plain[start..].find('{').map(|i| start + i) else { break };
+        let name = &name[..name
+            .find(|c: char| !c.is_alphanumeric() && c != '_')
+            .unwrap_or(name.len())];
+        let Some(open) = plain[start..].find('{').map(|i| start + i) else {
+            break;
+        };
         let Some(close) = closing(&plain, open) else { break };
         let head = &plain[start..open];
         let result = head.rfind("->").map_or("", |arrow| &text[start + arrow + 2..open]);
@@ -67,9 +71,10 @@ fn without_comments(text: &str) -> String {
 /// Where a word is next, with no letter or digit beside it.
 fn next_word(text: &str, from: usize, word: &str) -> Option<usize> {
     let part_of_name = |c: char| c.is_alphanumeric() || c == '_';
-    text[from..].match_indices(word).map(|(i, _)| from + i).find(|&i| {
-        !text[..i].ends_with(part_of_name) && !text[i + word.len()..].starts_with(part_of_name)
-    })
+    text[from..]
+        .match_indices(word)
+        .map(|(i, _)| from + i)
+        .find(|&i| !text[..i].ends_with(part_of_name) && !text[i + word.len()..].starts_with(part_of_name))
 }
 
 /// The brace that closes the one at a place.
@@ -95,7 +100,10 @@ mod tests {
         let text = "// fn no() {\nfn one(a: f32) -> vec3f { if a > 1.0 { /* } */ } return v; }\n\
             @compute @workgroup_size(8) /* fn */ fn two(){}\nfn ä() -> @builtin(position) vec4f { } fn open() { {";
         let found = functions(text);
-        let seen: Vec<_> = found.iter().map(|f| (f.name, f.result, &text[f.body.clone()])).collect();
+        let seen: Vec<_> = found
+            .iter()
+            .map(|f| (f.name, f.result, &text[f.body.clone()]))
+            .collect();
         assert_eq!(
             seen,
             [

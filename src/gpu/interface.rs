@@ -1,7 +1,9 @@
 //! What the program and a kernel must agree on: entry point, workgroup size, bindings, layouts, constants. The built-in
 //! kernel says what is right; a device would take anything, and show garbage.
 
-use naga::{AddressSpace, ArraySize, GlobalVariable, Handle, Module, ShaderStage, Span, StorageAccess, Type, TypeInner};
+use naga::{
+    AddressSpace, ArraySize, GlobalVariable, Handle, Module, ShaderStage, Span, StorageAccess, Type, TypeInner,
+};
 
 use super::compile::{Checked, check};
 use super::compose::{Kernel, Shaders, Source};
@@ -55,7 +57,8 @@ impl Sides<'_> {
         let entry = self.kernel.entry_point();
         let at = |module: &Module, binding| {
             let mut all = module.global_variables.iter();
-            all.find(|(_, variable)| variable.binding == binding).map(|(handle, _)| handle)
+            all.find(|(_, variable)| variable.binding == binding)
+                .map(|(handle, _)| handle)
         };
         for (handle, known) in self.right.global_variables.iter() {
             let mine = known.binding.and_then(|binding| at(self.own, Some(binding)));
@@ -69,7 +72,10 @@ impl Sides<'_> {
                     "receipt" => ": every pixel must end with `sign(local)`",
                     _ => "",
                 };
-                self.tell(span, format!("`{entry}` never writes `{name}`, which the program reads{hint}"));
+                self.tell(
+                    span,
+                    format!("`{entry}` never writes `{name}`, which the program reads{hint}"),
+                );
             }
         }
     }
@@ -96,7 +102,9 @@ impl Sides<'_> {
     fn entry_point(&mut self) {
         let name = self.kernel.entry_point();
         let is_it = |entry: &&naga::EntryPoint| entry.name == name && entry.stage == ShaderStage::Compute;
-        let Some(right) = self.right.entry_points.iter().find(is_it) else { return };
+        let Some(right) = self.right.entry_points.iter().find(is_it) else {
+            return;
+        };
         let size = right.workgroup_size;
         let attributes = format!("@compute @workgroup_size({}, {})", size[0], size[1]);
         let place = |name: &str| self.place_of_function(name);
@@ -145,10 +153,7 @@ impl Sides<'_> {
                 Some(known) => self.difference(variable, known),
                 None => Some(match known().find(|known| known.name == variable.name) {
                     Some(known) => format!("`{name}` must be at {}", place_of(known)),
-                    None => format!(
-                        "`{name}`: the program binds nothing at {}",
-                        place_of(variable),
-                    ),
+                    None => format!("`{name}`: the program binds nothing at {}", place_of(variable),),
                 }),
             };
             if let Some(message) = message {
@@ -183,7 +188,10 @@ impl Sides<'_> {
             right: self.right,
         };
         let why = layouts.difference(variable.ty, known.ty, name)?;
-        Some(format!("`{name}` is not laid out as what the program binds at {}: {why}", place_of(known)))
+        Some(format!(
+            "`{name}` is not laid out as what the program binds at {}: {why}",
+            place_of(known)
+        ))
     }
 
     fn constants(&mut self) {
@@ -193,7 +201,10 @@ impl Sides<'_> {
             let ty = type_name(right, known.ty);
             let Some((at, found)) = own.overrides.iter().find(|(_, own)| own.name == known.name) else {
                 let file = self.file_with(right.overrides.get_span(handle));
-                self.tell(file, format!("`override {name}: {ty};` is missing; the program sets it"));
+                self.tell(
+                    file,
+                    format!("`override {name}: {ty};` is missing; the program sets it"),
+                );
                 continue;
             };
             if found.id.is_some() || type_name(own, found.ty) != ty {
@@ -288,7 +299,8 @@ impl Layouts<'_> {
                 })
             }
             (
-                is @ (TypeInner::Scalar(_) | TypeInner::Vector { .. } | TypeInner::Matrix { .. } | TypeInner::Atomic(_)),
+                is
+                @ (TypeInner::Scalar(_) | TypeInner::Vector { .. } | TypeInner::Matrix { .. } | TypeInner::Atomic(_)),
                 must,
             ) if is == must => None,
             _ => {

@@ -48,7 +48,11 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result
             errors.push(error);
         }
     }
-    if errors.is_empty() { Ok(()) } else { Err(ShaderErrors(errors)) }
+    if errors.is_empty() {
+        Ok(())
+    } else {
+        Err(ShaderErrors(errors))
+    }
 }
 
 fn mistakes(kernel: Kernel, source: Source, packed: &Packed) -> Vec<ShaderError> {
@@ -86,7 +90,9 @@ fn mistakes_of_functions(mut source: Source) -> (Vec<ShaderError>, Option<(Sourc
         let culprit = match at {
             Some(at) => texts.iter().position(|text| (text.start..text.body.end).contains(&at)),
             // naga does not say where: it is where the mistake goes with the body.
-            None => (0..texts.len()).find(|i| check_at(&emptied(*i)).err().map(|(error, _)| error).as_ref() != Some(&error)),
+            None => {
+                (0..texts.len()).find(|i| check_at(&emptied(*i)).err().map(|(error, _)| error).as_ref() != Some(&error))
+            }
         };
         if let (None, Some(i)) = (at, culprit) {
             let function = &texts[i];
@@ -164,7 +170,11 @@ mod tests {
                 (ADAPTIVE, "= moments;", "= moments.xyz;"),
                 ("phong.wgsl", "", "fn one() -> f32 { return missing; }"),
                 ("phong.wgsl", "", "fn two() -> f32 { return vec2f(1.0); }"),
-                ("light.wgsl", "", "fn three(a: f32) -> bool { let b = a && true; return b; }"),
+                (
+                    "light.wgsl",
+                    "",
+                    "fn three(a: f32) -> bool { let b = a && true; return b; }",
+                ),
             ],
             &[
                 "kernels/render.wgsl: expected",
@@ -187,7 +197,10 @@ mod tests {
             &[(RENDER, "@workgroup_size(8, 8)", "@workgroup_size(PLANES, 8)")],
             &["kernels/render.wgsl: workgroup size of `render` is set by an override"],
         );
-        says(&[(AOV, "fn aov", "fn ova")], &["kernels/aov.wgsl: must be called `aov`, not `ova`"]);
+        says(
+            &[(AOV, "fn aov", "fn ova")],
+            &["kernels/aov.wgsl: must be called `aov`, not `ova`"],
+        );
         let built_in = Shaders::built_in();
         let text = built_in.text(AOV);
         let start = text.find("@compute").unwrap();
@@ -196,7 +209,10 @@ mod tests {
             &["kernels/aov.wgsl:1:1: there is no entry point: @compute @workgroup_size(8, 8) fn aov"],
         );
         says(
-            &[(AOV, "@compute @workgroup_size(8, 8)", ""), (AOV, "@builtin(global_invocation_id) ", "")],
+            &[
+                (AOV, "@compute @workgroup_size(8, 8)", ""),
+                (AOV, "@builtin(global_invocation_id) ", ""),
+            ],
             &["kernels/aov.wgsl: `aov` must be the entry point: @compute"],
         );
     }
@@ -209,13 +225,23 @@ mod tests {
             &["kernels/render.wgsl: `film` must be at @group(0) @binding(10)"],
         );
         says(
-            &[(RENDER, film, ""), (RENDER, "film[index] = sum;", ""), (RENDER, "film[index]", "vec4f()")],
-            &["kernels/render.wgsl:1:1: @group(0) @binding(10) .. `var<storage, read_write>` film: array<vec4<f32>> is missing"],
+            &[
+                (RENDER, film, ""),
+                (RENDER, "film[index] = sum;", ""),
+                (RENDER, "film[index]", "vec4f()"),
+            ],
+            &[
+                "kernels/render.wgsl:1:1: @group(0) @binding(10) .. `var<storage, read_write>` film: array<vec4<f32>> is missing",
+            ],
         );
         says(
             &[
                 (RENDER, "array<vec4f>", "array<vec2f>"),
-                (RENDER, "var sum = film[index]", "var sum = vec4f(film[index], 0.0, 0.0)"),
+                (
+                    RENDER,
+                    "var sum = film[index]",
+                    "var sum = vec4f(film[index], 0.0, 0.0)",
+                ),
                 (RENDER, "= sum;", "= sum.xy;"),
             ],
             &["kernels/render.wgsl: `film[]` is `vec2<f32>` and must be `vec4<f32>`"],
@@ -243,7 +269,14 @@ mod tests {
             &["bindings.wgsl: `camera` is not laid out .. `camera.more` is `f32` and must be `vec3<f32>`"],
         );
         says(
-            &[("layout.wgsl", "    width: u32,", "    height: u32,"), ("layout.wgsl", "    height: u32,\n    forward", "    width: u32,\n    forward")],
+            &[
+                ("layout.wgsl", "    width: u32,", "    height: u32,"),
+                (
+                    "layout.wgsl",
+                    "    height: u32,\n    forward",
+                    "    width: u32,\n    forward",
+                ),
+            ],
             &["bindings.wgsl: `camera.height` is at byte 28 and must be at byte 44"],
         );
         says(
@@ -255,11 +288,19 @@ mod tests {
     #[test]
     fn constants_must_be_those_that_the_program_sets() {
         says(
-            &[("specialization.wgsl", "override NORMAL_MAPS: u32;", "const NORMAL_MAPS = 0u;")],
+            &[(
+                "specialization.wgsl",
+                "override NORMAL_MAPS: u32;",
+                "const NORMAL_MAPS = 0u;",
+            )],
             &["specialization.wgsl: `override NORMAL_MAPS: u32;` is missing"],
         );
         says(
-            &[("specialization.wgsl", "override NORMAL_MAPS", "@id(7) override NORMAL_MAPS")],
+            &[(
+                "specialization.wgsl",
+                "override NORMAL_MAPS",
+                "@id(7) override NORMAL_MAPS",
+            )],
             &["specialization.wgsl: `NORMAL_MAPS` must be `override NORMAL_MAPS: u32;`"],
         );
         says(
@@ -273,7 +314,9 @@ mod tests {
     fn results_must_be_written() {
         says(
             &[(RENDER, "    sign(local);\n", "")],
-            &["kernels/render.wgsl: `render` never writes `receipt`, which the program reads: every pixel must end with `sign(local)`"],
+            &[
+                "kernels/render.wgsl: `render` never writes `receipt`, which the program reads: every pixel must end with `sign(local)`",
+            ],
         );
         says(
             &[(AOV, "first_hits[place.y * work.film_size.x + place.x] =", "let hit =")],
@@ -285,16 +328,32 @@ mod tests {
     #[test]
     fn messages_name_what_is_in_the_source() {
         let with = |body: &str| {
-            said(&[("phong.wgsl", "", &format!("fn wrong(a: f32, b: vec3f, n: u32) {{\n    {body}\n}}"))])
+            said(&[(
+                "phong.wgsl",
+                "",
+                &format!("fn wrong(a: f32, b: vec3f, n: u32) {{\n    {body}\n}}"),
+            )])
         };
         for (body, wanted) in [
             ("if n { }", "the condition `n` of type `u32` must be `bool`"),
-            ("let x = b + vec2f();", "`b` of type `vec3<f32>` and `vec2f()` of type `vec2<f32>` do not go together"),
+            (
+                "let x = b + vec2f();",
+                "`b` of type `vec3<f32>` and `vec2f()` of type `vec2<f32>` do not go together",
+            ),
             ("let x = !a;", "`a` of type `f32` cannot be the operand"),
-            ("let x = wronged(a, a, n); }\nfn wronged(a: f32, b: vec3f, n: u32) -> f32 { return a;", "`wronged`: argument 2, `a` of type `f32`, must be `vec3<f32>`"),
+            (
+                "let x = wronged(a, a, n); }\nfn wronged(a: f32, b: vec3f, n: u32) -> f32 { return a;",
+                "`wronged`: argument 2, `a` of type `f32`, must be `vec3<f32>`",
+            ),
             ("return a;", "`a` of type `f32` is returned where nothing is declared"),
-            ("var x = film;", "`x`: type `array<vec4<f32>>` cannot be that of a variable"),
-            ("let x = select(a, a, n);", "the condition of `select` must be `bool`, not `u32`"),
+            (
+                "var x = film;",
+                "`x`: type `array<vec4<f32>>` cannot be that of a variable",
+            ),
+            (
+                "let x = select(a, a, n);",
+                "the condition of `select` must be `bool`, not `u32`",
+            ),
             ("let x = vec3f(1.0, 2u, 3.0);", "value 2 has a type that does not fit"),
             ("let x = n << 40u;", "a shift by more bits than `u32` has"),
             ("let x = lights[a].area;", "Accessing with index `a`"),
@@ -306,11 +365,20 @@ mod tests {
         ] {
             let said = with(body);
             // `film` is in two kernels only: in the third it is another mistake.
-            let line = said.iter().find(|line| line.contains(wanted)).unwrap_or_else(|| panic!("{body}: {said:?}"));
+            let line = said
+                .iter()
+                .find(|line| line.contains(wanted))
+                .unwrap_or_else(|| panic!("{body}: {said:?}"));
             let message = line.split_once(' ').unwrap().1;
             assert!(line.starts_with("phong.wgsl:"), "{line}");
-            let numbered = message.as_bytes().windows(2).any(|pair| pair[0] == b'[' && pair[1].is_ascii_digit());
-            assert!(!(numbered && !message.contains("materials[0]")) && !message.contains("Some("), "{line}");
+            let numbered = message
+                .as_bytes()
+                .windows(2)
+                .any(|pair| pair[0] == b'[' && pair[1].is_ascii_digit());
+            assert!(
+                !(numbered && !message.contains("materials[0]")) && !message.contains("Some("),
+                "{line}"
+            );
         }
     }
 }

@@ -4,8 +4,8 @@ use std::error::Error;
 
 use naga::common::wgsl::TypeContext as _;
 use naga::front::Typifier;
-use naga::proc::ResolveContext;
 use naga::front::wgsl::ParseError;
+use naga::proc::ResolveContext;
 use naga::valid::{
     CallError, ComposeError, EntryPointError, ExpressionError, FunctionError, GlobalVariableError, LocalVariableError,
     ValidationError,
@@ -146,7 +146,8 @@ impl Words<'_> {
     /// What is wrong inside of a function.
     fn inside(&self, function: &Function, error: &FunctionError) -> String {
         let value = |handle: Handle<Expression>| self.value(function, handle);
-        let typed = |handle: Handle<Expression>| format!("{} of type `{}`", value(handle), self.type_of(function, handle));
+        let typed =
+            |handle: Handle<Expression>| format!("{} of type `{}`", value(handle), self.type_of(function, handle));
         match error {
             FunctionError::InvalidStoreTypes { pointer, value } => format!(
                 "{} cannot be stored in {} of type `{}`",
@@ -158,9 +159,14 @@ impl Words<'_> {
                 expression,
                 expected_ty,
             } => match (expression, expected_ty) {
-                (Some(value), Some(ty)) => format!("{} is returned where `{}` is declared", typed(*value), self.name(*ty)),
+                (Some(value), Some(ty)) => {
+                    format!("{} is returned where `{}` is declared", typed(*value), self.name(*ty))
+                }
                 (Some(value), None) => format!("{} is returned where nothing is declared", typed(*value)),
-                (None, Some(ty)) => format!("not every way to the end returns the `{}` that is declared", self.name(*ty)),
+                (None, Some(ty)) => format!(
+                    "not every way to the end returns the `{}` that is declared",
+                    self.name(*ty)
+                ),
                 (None, None) => chain(error),
             },
             FunctionError::InvalidIfType(handle) => format!("the condition {} must be `bool`", typed(*handle)),
@@ -173,7 +179,10 @@ impl Words<'_> {
                 }
                 _ => format!("`{name}`: {}", chain(source)),
             },
-            FunctionError::InvalidCall { function: called, error } => {
+            FunctionError::InvalidCall {
+                function: called,
+                error,
+            } => {
                 let called = self.module.functions[*called].name.as_deref().unwrap_or("a function");
                 match error {
                     CallError::ArgumentType {
@@ -186,14 +195,19 @@ impl Words<'_> {
                         typed(*seen_expression),
                         self.name(*required)
                     ),
-                    _ => format!("`{called}`: {}", named(&chain(error), |i| self.nth_value(&function.expressions, i))),
+                    _ => format!(
+                        "`{called}`: {}",
+                        named(&chain(error), |i| self.nth_value(&function.expressions, i))
+                    ),
                 }
             }
             FunctionError::Expression { handle, source } => {
                 let types = match source {
-                    ExpressionError::InvalidBinaryOperandTypes { lhs_expr, rhs_expr, .. } => {
-                        Some(format!("{} and {} do not go together", typed(*lhs_expr), typed(*rhs_expr)))
-                    }
+                    ExpressionError::InvalidBinaryOperandTypes { lhs_expr, rhs_expr, .. } => Some(format!(
+                        "{} and {} do not go together",
+                        typed(*lhs_expr),
+                        typed(*rhs_expr)
+                    )),
                     ExpressionError::InvalidUnaryOperandType(_, operand) => {
                         Some(format!("{} cannot be the operand", typed(*operand)))
                     }
@@ -202,9 +216,10 @@ impl Words<'_> {
                         self.inner(reject),
                         self.inner(accept)
                     )),
-                    ExpressionError::SelectConditionNotABool { actual } => {
-                        Some(format!("the condition of `select` must be `bool`, not `{}`", self.inner(actual)))
-                    }
+                    ExpressionError::SelectConditionNotABool { actual } => Some(format!(
+                        "the condition of `select` must be `bool`, not `{}`",
+                        self.inner(actual)
+                    )),
                     ExpressionError::ShiftAmountTooLarge { lhs_type, .. } => {
                         Some(format!("a shift by more bits than `{}` has", self.inner(lhs_type)))
                     }
@@ -273,18 +288,20 @@ impl Words<'_> {
 
     /// The type of what a pointer points at.
     fn stored_in(&self, function: &Function, pointer: Handle<Expression>) -> String {
-        self.resolved(function, pointer, |types| match types[pointer].inner_with(&self.module.types) {
-            TypeInner::Pointer { base, .. } => self.name(*base),
-            TypeInner::ValuePointer {
-                size: Some(size),
-                scalar,
-                ..
-            } => self.inner(&TypeInner::Vector {
-                size: *size,
-                scalar: *scalar,
-            }),
-            TypeInner::ValuePointer { scalar, .. } => self.inner(&TypeInner::Scalar(*scalar)),
-            other => self.inner(other),
+        self.resolved(function, pointer, |types| {
+            match types[pointer].inner_with(&self.module.types) {
+                TypeInner::Pointer { base, .. } => self.name(*base),
+                TypeInner::ValuePointer {
+                    size: Some(size),
+                    scalar,
+                    ..
+                } => self.inner(&TypeInner::Vector {
+                    size: *size,
+                    scalar: *scalar,
+                }),
+                TypeInner::ValuePointer { scalar, .. } => self.inner(&TypeInner::Scalar(*scalar)),
+                other => self.inner(other),
+            }
         })
     }
 

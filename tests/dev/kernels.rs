@@ -10,7 +10,11 @@ const ADAPTIVE: &str = "shaders/kernels/adaptive.wgsl";
 fn problems(running: &Running) -> Vec<String> {
     let state = running.state();
     let place = |place: &Option<String>| place.clone().unwrap_or_default();
-    state.problems.iter().map(|problem| format!("{}: {}", place(&problem.place), problem.message)).collect()
+    state
+        .problems
+        .iter()
+        .map(|problem| format!("{}: {}", place(&problem.place), problem.message))
+        .collect()
 }
 
 #[test]
@@ -22,10 +26,19 @@ fn mistakes_in_kernels_that_are_not_used_are_told_at_once() {
     files.edit(AOV, "fn aov", "fn avo");
     files.edit(ADAPTIVE, "= moments;", "= moments.xyz;");
     files.edit(KERNEL, "@workgroup_size(8, 8)", "@workgroup_size(4, 4)");
-    let told = running.wait("all problems", |running| Some(problems(running)).filter(|all| all.len() == 3));
-    for (file, words) in [(AOV, "must be called `aov`"), (ADAPTIVE, "`moments.xyz`"), (KERNEL, "(4, 4)")] {
+    let told = running.wait("all problems", |running| {
+        Some(problems(running)).filter(|all| all.len() == 3)
+    });
+    for (file, words) in [
+        (AOV, "must be called `aov`"),
+        (ADAPTIVE, "`moments.xyz`"),
+        (KERNEL, "(4, 4)"),
+    ] {
         let path = files.path(file).display().to_string();
-        assert!(told.iter().any(|told| told.starts_with(&path) && told.contains(words)), "{file}: {told:?}");
+        assert!(
+            told.iter().any(|told| told.starts_with(&path) && told.contains(words)),
+            "{file}: {told:?}"
+        );
     }
     assert_eq!(running.colors(), good);
     // The session goes on with the last good shaders, that kernel's among them.
@@ -34,7 +47,9 @@ fn mistakes_in_kernels_that_are_not_used_are_told_at_once() {
     running.wait_done(revision);
     running.session.send(Command::View(View::Normal));
     running.wait("the normals", |running| {
-        running.frame().filter(|frame| frame.header.view == View::Normal && frame.header.done)
+        running
+            .frame()
+            .filter(|frame| frame.header.view == View::Normal && frame.header.done)
     });
     assert_eq!(problems(&running).len(), 3);
     running.session.send(Command::View(View::Color));
@@ -55,7 +70,9 @@ fn long_loop(files: &Files, file: &str, before: &str) {
 
 #[test]
 fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
-    let small = SCENE.replace("width = 40", "width = 8").replace("height = 30", "height = 8");
+    let small = SCENE
+        .replace("width = 40", "width = 8")
+        .replace("height = 30", "height = 8");
     let files = Files::new(&small);
     let running = files.start();
     running.wait_rendered(&files);
@@ -70,7 +87,9 @@ fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
         pairs.into_iter().all(|(new, old)| *new == old * 0.5)
     };
     let cut = running.wait("a problem or the whole picture", |running| {
-        let told = problems(running).iter().any(|told| told.contains("ends long loops early"));
+        let told = problems(running)
+            .iter()
+            .any(|told| told.contains("ends long loops early"));
         let whole = running.frame().is_some_and(|frame| frame.header.done) && halved(running);
         (told || whole).then_some(told)
     });
@@ -83,7 +102,10 @@ fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
         running.session.send(Command::ResetCamera);
         assert!(!problems(&running).is_empty());
     }
-    files.write(KERNEL, wgray::gpu::compose::Shaders::built_in().text("kernels/render.wgsl"));
+    files.write(
+        KERNEL,
+        wgray::gpu::compose::Shaders::built_in().text("kernels/render.wgsl"),
+    );
     running.wait_rendered(&files);
 
     // In a kernel of another view: that view is told, the picture is there.
@@ -91,7 +113,9 @@ fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
     running.wait_well();
     running.session.send(Command::View(View::Normal));
     running.wait("a problem or the normals", |running| {
-        let told = problems(running).iter().any(|told| told.contains("ends long loops early"));
+        let told = problems(running)
+            .iter()
+            .any(|told| told.contains("ends long loops early"));
         let frame = running.frame()?;
         (told || frame.header.view == View::Normal && frame.header.done).then_some(())
     });

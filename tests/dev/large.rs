@@ -17,7 +17,10 @@ fn a_picture_that_is_too_large_is_shown_smaller() {
         assert_eq!([header.width, header.height], [size.0, size.1]);
         assert_eq!(header.sent, header.finest);
         assert!(header.finest.into_iter().all(|side| side <= longest), "{header:?}");
-        assert!(u64::from(header.finest[0]) * u64::from(header.finest[1]) <= 1 << 24, "{header:?}");
+        assert!(
+            u64::from(header.finest[0]) * u64::from(header.finest[1]) <= 1 << 24,
+            "{header:?}"
+        );
         assert!(frame.pixel(size.0 - 1, size.1 - 1).is_some() && frame.pixel(size.0, 0).is_none());
         let colors = running.colors();
         assert_eq!([colors.width, colors.height], header.finest);
@@ -30,7 +33,9 @@ fn a_picture_that_is_too_large_is_shown_smaller() {
         }
         running.session.send(Command::View(View::Normal));
         let frame = running.wait("the normals", |running| {
-            running.frame().filter(|frame| frame.header.view == View::Normal && frame.header.done)
+            running
+                .frame()
+                .filter(|frame| frame.header.view == View::Normal && frame.header.done)
         });
         assert_eq!(frame.header.sent, frame.header.finest);
         assert_eq!(running.state().problems, []);

@@ -20,7 +20,9 @@ fn an_interrupted_measurement_leaves_no_files() {
         .unwrap();
     let names = || -> Vec<_> {
         let entries = fs::read_dir(files.folder.path()).unwrap();
-        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+        entries
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect()
     };
     let start = Instant::now();
     while !(names().iter().any(|name| name.starts_with(".wgray-measure-"))
@@ -31,7 +33,10 @@ fn an_interrupted_measurement_leaves_no_files() {
         std::thread::sleep(Duration::from_millis(5));
     }
     std::thread::sleep(Duration::from_millis(300)); // into the middle
-    Command::new("kill").args(["-INT", &program.id().to_string()]).status().unwrap();
+    Command::new("kill")
+        .args(["-INT", &program.id().to_string()])
+        .status()
+        .unwrap();
     assert_eq!(program.wait().unwrap().code(), Some(130));
     let mut left = names();
     left.sort();

@@ -80,13 +80,18 @@ impl Painter {
 
     /// Takes the last save back; the camera stays where it is.
     fn undo_save(&mut self) {
-        let (Some(saved), Some(loaded)) = (self.saved.take(), &self.loaded) else { return };
+        let (Some(saved), Some(loaded)) = (self.saved.take(), &self.loaded) else {
+            return;
+        };
         let result = saved.undo();
         if result.is_ok() {
             self.camera.get_or_insert_with(|| loaded.camera.clone());
             self.taken_back = true;
         }
-        self.notice(&result, format!("{} is as it was before the save", self.sources.scene.display()));
+        self.notice(
+            &result,
+            format!("{} is as it was before the save", self.sources.scene.display()),
+        );
         (self.report)(Report::Unsaved(result));
     }
 

@@ -401,7 +401,10 @@ impl Painter {
         match error {
             RenderError::Shader(error) => self.of_shader(error),
             error => {
-                let edited = self.shaders.as_ref().is_some_and(|shaders| **shaders != Shaders::built_in());
+                let edited = self
+                    .shaders
+                    .as_ref()
+                    .is_some_and(|shaders| **shaders != Shaders::built_in());
                 let way_out = match edited {
                     true => "; shorten the loops, and end each kernel with `sign(local)` for every pixel",
                     false => "",
@@ -424,14 +427,21 @@ impl Painter {
 
     /// Whether [`work`](Self::work) has anything to do.
     pub fn has_work(&self) -> bool {
-        if self.looking.as_ref().is_some_and(|looking| looking.load(Ordering::SeqCst) == 0) {
+        if self
+            .looking
+            .as_ref()
+            .is_some_and(|looking| looking.load(Ordering::SeqCst) == 0)
+        {
             return false;
         }
-        self.running.as_ref().filter(|running| !running.halted).is_some_and(|running| {
-            let more = !running.canvas.is_done(self.view);
-            // While a kernel is compiled the processor is left to the compiler, but for the camera.
-            self.camera_waits || (more && (self.pending.is_none() || running.canvas.is_new()))
-        })
+        self.running
+            .as_ref()
+            .filter(|running| !running.halted)
+            .is_some_and(|running| {
+                let more = !running.canvas.is_done(self.view);
+                // While a kernel is compiled the processor is left to the compiler, but for the camera.
+                self.camera_waits || (more && (self.pending.is_none() || running.canvas.is_new()))
+            })
     }
 
     /// Does one call's worth of work.

@@ -123,7 +123,10 @@ impl Painter {
 
     /// Says in the terminal that the picture is too large to be shown whole; once for each size.
     pub(super) fn tell_size(&mut self) {
-        let sizes = self.running.as_ref().map(|running| (running.canvas.size(), running.canvas.finest_size()));
+        let sizes = self
+            .running
+            .as_ref()
+            .map(|running| (running.canvas.size(), running.canvas.finest_size()));
         let smaller = sizes.filter(|(asked, shown)| asked != shown);
         if self.smaller != smaller {
             self.smaller = smaller;
