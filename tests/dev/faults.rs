@@ -63,7 +63,10 @@ fn faults_of_a_shader_are_counted_and_marked() {
 fn negative_light_of_a_filter_with_negative_lobes_is_no_fault() {
     let edges = SCENE
         .replace("[render]", "[render]\nfilter = { type = 'mitchell' }")
-        .replace("pixel_samples = { pattern = \"grid\", count = 4 }", "pixel_samples = { pattern = 'sobol', count = 16 }")
+        .replace(
+            "pixel_samples = { pattern = \"grid\", count = 4 }",
+            "pixel_samples = { pattern = 'sobol', count = 16 }",
+        )
         .replace("[0.8, 0.8, 0.8]", "[50, 50, 50]");
     let files = Files::new(&edges);
     let running = files.start();

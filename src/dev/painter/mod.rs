@@ -1,6 +1,7 @@
 //! What a session does with what happens: decides what is rendered, compiled, shown and told.
 
 mod commands;
+mod kernels;
 mod show;
 
 use std::path::PathBuf;
@@ -11,17 +12,15 @@ use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
 use self::show::Problems;
-use super::build::{Builder, Built, Request, guarded};
+use super::build::{Builder, Request, guarded};
 use super::camera::merged;
 use super::canvas::Canvas;
-use super::diagnostic::Diagnostic;
 use super::messages::{Event, Report, State};
 use super::picture::{Frame, View};
 use super::save::Saved;
 use super::source::{Constants, Loaded, Snapshot, Sources, Stamp, constants};
-use crate::error::{RenderError, ShaderError};
+use crate::gpu::Device;
 use crate::gpu::compose::Shaders;
-use crate::gpu::{Device, Gpu};
 use crate::scene::CameraDescription;
 
 /// Pictures of more samples are shown no more often than this, and a tenth of the time is spent on them at most.
@@ -305,126 +304,6 @@ impl Painter {
         self.since.get_or_insert(since);
     }
 
-    fn take_built(&mut self, built: Built) {
-        let pending = match self.pending.take() {
-            Some(pending) if pending.id == built.id => pending,
-            other => {
-                self.pending = other; // the result is late: files were saved while it was made
-                let _ = guarded(|| {
-                    drop(built.result);
-                    Ok(())
-                });
-                return;
-            }
-        };
-        if let Some(errors) = &built.refused {
-            let problems = errors.0.iter().map(|error| self.of_shader(error)).collect();
-            self.refuse((pending.shaders.clone(), pending.constants), problems);
-        }
-        match built.result {
-            Some(Ok((gpu, shaders))) => {
-                self.state.compile_seconds = Some(built.took.as_secs_f64());
-                self.compiled = self.state.compile_seconds;
-                self.run(*gpu, shaders, pending.constants);
-            }
-            None => {
-                self.since = None;
-                self.settle((Instant::now(), true)); // the scene may have changed meanwhile: the running kernel shows that
-            }
-            Some(Err(error @ (RenderError::CutShort { .. } | RenderError::Shader(_)))) => {
-                let tried = match built.refused {
-                    Some(_) => self.good.clone().unwrap_or(pending.shaders),
-                    None => pending.shaders,
-                };
-                self.refuse_cut((tried, pending.constants), &error);
-            }
-            Some(Err(error)) => {
-                let (view, running) = (self.view, &mut self.running);
-                let lives = |running: &mut Running| guarded(|| running.canvas.content(view)).is_ok();
-                if running.as_mut().is_some_and(lives) {
-                    // The driver refuses what naga does not; the device is well.
-                    self.refuse((pending.shaders, pending.constants), Vec::new());
-                    self.problems.device = Some((&error).into());
-                    self.since = None;
-                    self.settle((Instant::now(), true));
-                } else {
-                    self.fail(&error);
-                }
-            }
-        }
-    }
-
-    /// Starts to render with a kernel.
-    fn run(&mut self, mut gpu: Gpu, shaders: Arc<Shaders>, constants: Constants) {
-        let Some(loaded) = self.loaded.clone() else { return };
-        let info = &gpu.device().info;
-        self.state.device = format!("{}, {}", info.name, info.driver);
-        self.device = Some(gpu.device().clone());
-        let (packed, view) = (self.packed(&loaded), self.view);
-        self.stop_running();
-        let canvas = guarded(|| {
-            gpu.update(&packed)?; // the scene may have changed since it was uploaded
-            Canvas::new(gpu, packed, view)
-        });
-        match canvas {
-            Ok(canvas) => {
-                self.running = Some(Running {
-                    canvas,
-                    halted: false,
-                    shaders,
-                    constants,
-                });
-                self.problems.device = None;
-                self.begun((Instant::now(), true));
-            }
-            Err(error) => self.fail(&error),
-        }
-    }
-
-    /// Remembers that shaders are wrong for a scene like this, so that they are not tried again.
-    fn refuse(&mut self, shaders: (Arc<Shaders>, Constants), problems: Vec<Diagnostic>) {
-        self.refused.push(shaders);
-        self.problems.shader = problems;
-    }
-
-    /// What a driver does not render whole is not tried again, until the scene or the shaders are others.
-    fn refuse_cut(&mut self, shaders: (Arc<Shaders>, Constants), error: &RenderError) {
-        let problem = self.of_render(error);
-        self.cut = Some(shaders.clone());
-        self.refuse(shaders, vec![problem]);
-        self.since = None;
-        self.settle((Instant::now(), true));
-    }
-
-    /// A picture that the kernel cannot make, with what can be done.
-    fn of_render(&self, error: &RenderError) -> Diagnostic {
-        match error {
-            RenderError::Shader(error) => self.of_shader(error),
-            error => {
-                let edited = self
-                    .shaders
-                    .as_ref()
-                    .is_some_and(|shaders| **shaders != Shaders::built_in());
-                let way_out = match edited {
-                    true => "; shorten the loops, and end each kernel with `sign(local)` for every pixel",
-                    false => "",
-                };
-                Diagnostic::plain(if edited { "shader" } else { "scene" }, format!("{error}{way_out}"))
-            }
-        }
-    }
-
-    /// A shader's error, with the path by which the user knows the file.
-    fn of_shader(&self, error: &ShaderError) -> Diagnostic {
-        let mut problem = Diagnostic::from(error);
-        if let (Some(folder), Some(place)) = (&self.sources.shaders, &mut problem.place)
-            && place.contains(".wgsl:")
-        {
-            *place = folder.join(&*place).display().to_string();
-        }
-        problem
-    }
-
     /// Whether [`work`](Self::work) has anything to do.
     pub fn has_work(&self) -> bool {
         if self
@@ -467,40 +346,5 @@ impl Painter {
             }
             Err(error) => self.fail(&error),
         }
-    }
-
-    /// The device refused something, or is lost: another one is opened, a few times. Not so if it cuts the kernel short:
-    /// then the last good shaders go on, or where there are none others the picture rests.
-    fn fail(&mut self, error: &RenderError) {
-        if let (RenderError::CutShort { .. } | RenderError::Shader(_), Some(running)) = (error, &mut self.running) {
-            if self.good.as_ref().is_some_and(|good| *good != running.shaders) {
-                let shaders = (running.shaders.clone(), running.constants);
-                self.stop_running();
-                self.refuse_cut(shaders, error);
-            } else {
-                running.halted = true;
-                self.problems.cut = Some(self.of_render(error));
-            }
-            return self.tell();
-        }
-        self.stop_running();
-        self.problems.device = Some(error.into());
-        self.device = None;
-        self.pending = None;
-        self.refused.clear(); // another device may take them
-        self.failures += 1;
-        if let Some((loaded, shaders)) = self.wanted().filter(|_| self.failures <= ATTEMPTS) {
-            self.request(&loaded, shaders);
-        }
-        self.tell();
-    }
-
-    /// Gives up the running kernel. What a lost device holds may not be given back without a panic.
-    fn stop_running(&mut self) {
-        let running = self.running.take();
-        let _ = guarded(|| {
-            drop(running);
-            Ok(())
-        });
     }
 }
