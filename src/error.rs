@@ -1,8 +1,11 @@
 //! What can go wrong, as types.
 
+use std::fmt;
+
 use thiserror::Error;
 
 use crate::gpu::compose::Source;
+use crate::gpu::wording::chain;
 
 /// A shader that naga refuses: where and why.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -17,21 +20,6 @@ pub struct ShaderError {
 }
 
 impl ShaderError {
-    pub(crate) fn parse(source: &Source, error: &naga::front::wgsl::ParseError) -> ShaderError {
-        let mut labels = error.labels();
-        let (span, label) = labels.next().unzip();
-        let label = label
-            .filter(|label| !label.is_empty())
-            .map(|label| format!(" ({label})"))
-            .unwrap_or_default();
-        ShaderError::at(source, span, format!("{}{label}", error.message()))
-    }
-
-    pub(crate) fn invalid(source: &Source, error: &naga::WithSpan<naga::valid::ValidationError>) -> ShaderError {
-        let span = error.spans().map(|(span, _)| *span).last();
-        ShaderError::at(source, span, chain(error.as_inner()))
-    }
-
     pub(crate) fn other(stage: &str, error: &dyn std::error::Error) -> ShaderError {
         ShaderError {
             place: stage.to_string(),
@@ -40,7 +28,7 @@ impl ShaderError {
         }
     }
 
-    fn at(source: &Source, span: Option<naga::Span>, message: String) -> ShaderError {
+    pub(crate) fn at(source: &Source, span: Option<naga::Span>, message: String) -> ShaderError {
         let range = span.and_then(|span| span.to_range());
         let Some((file, text, offset)) = range.clone().and_then(|range| source.locate(range.start)) else {
             return ShaderError {
@@ -71,16 +59,18 @@ impl ShaderError {
     }
 }
 
-/// An error's message with those of its causes.
-fn chain(error: &dyn std::error::Error) -> String {
-    let mut message = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        message.push_str(": ");
-        message.push_str(&cause.to_string());
-        source = cause.source();
+/// All that is wrong with shaders: one mistake at least.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub struct ShaderErrors(pub Vec<ShaderError>);
+
+impl fmt::Display for ShaderErrors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, error) in self.0.iter().enumerate() {
+            let line = if i == 0 { "" } else { "\n" };
+            write!(f, "{line}{error}")?;
+        }
+        Ok(())
     }
-    message
 }
 
 /// Why a picture could not be rendered.

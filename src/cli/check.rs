@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use wgray::gpu::{check_kernels, compose::Shaders};
+use wgray::gpu::{Forms, check_kernels, compose::Shaders};
 use wgray::pack::pack;
 use wgray::scene::{Overrides, Scene};
 
@@ -14,6 +14,10 @@ pub struct Args {
     #[arg(value_name = "SCENE", required = true)]
     scenes: Vec<PathBuf>,
 
+    /// Folder of the shaders to check, with the files of the project's own, in place of those in the program
+    #[arg(long, value_name = "DIR")]
+    shaders: Option<PathBuf>,
+
     /// Folder that files named by the scenes, their textures, must lie in, in place of the scenes' own
     #[arg(long, value_name = "DIR")]
     asset_root: Option<PathBuf>,
@@ -21,7 +25,10 @@ pub struct Args {
 
 /// Checks all files, whatever is wrong with some; the exit code is that of the first bad one.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let shaders = Shaders::built_in();
+    let shaders = match &args.shaders {
+        Some(folder) => Shaders::read(folder)?,
+        None => Shaders::built_in(),
+    };
     let overrides = Overrides {
         asset_root: args.asset_root.clone(),
         ..Overrides::default()
@@ -49,7 +56,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 fn check(path: &Path, overrides: &Overrides, shaders: &Shaders) -> anyhow::Result<String> {
     let scene = Scene::load(path, overrides)?;
     let packed = pack(&scene);
-    check_kernels(&packed, shaders)?;
+    check_kernels(&packed, shaders, Forms::All)?;
     Ok(format!(
         "good; {} x {} pixels, {} samples each, {} of light; shapes: {} of {} primitives; lights: {}",
         scene.width,

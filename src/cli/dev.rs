@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, SystemTime};
 
-use anyhow::anyhow;
+use anyhow::{Context as _, anyhow};
 use clap::builder::NonEmptyStringValueParser;
 use wgray::dev::{Diagnostic, Listener, Measured, Report, Session, Settings, Sources, StartError, measure};
 use wgray::error::RenderError;
@@ -16,6 +16,7 @@ use wgray::scene::{Description, Overrides, SceneError};
 use super::Usage;
 use super::outputs::keep_inputs;
 use super::render::parse_size;
+use super::signal;
 
 /// The arguments as they are written.
 #[derive(Debug, clap::Args)]
@@ -94,6 +95,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         sources,
         device,
         out,
+        only_for_viewers: true,
         report: Box::new(move |report| terminal.report(&report)),
     })
     .map_err(|error| match error {
@@ -193,8 +195,17 @@ impl Terminal {
                 );
             }
             Report::Finished { seconds } => self.line("", &format!("all samples after another {}", time(*seconds))),
+            Report::Smaller([width, height], [less_wide, less_high]) => self.line(
+                "",
+                &format!(
+                    "{width} x {height} pixels are too many to be shown: every picture here is {less_wide} x {less_high}; \
+                     wgray render makes the whole one"
+                ),
+            ),
             Report::Saved(Ok(())) => self.line(GREEN, "camera saved into the scene file"),
             Report::Saved(Err(error)) => self.line(RED, &format!("camera not saved: {error}")),
+            Report::Unsaved(Ok(())) => self.line(GREEN, "camera's save taken back"),
+            Report::Unsaved(Err(error)) => self.line(RED, &format!("camera's save not taken back: {error}")),
         }
     }
 
@@ -263,7 +274,11 @@ fn time(seconds: f64) -> String {
 }
 
 fn measured(sources: &Sources, device: Choice) -> anyhow::Result<ExitCode> {
-    let all = measure(sources, device).map_err(|error| anyhow!(error))?;
+    let stopped = signal::stop().context("signal handler")?;
+    let all = measure(sources, device, &stopped).map_err(|error| match error {
+        Some(error) => anyhow!(error),
+        None => RenderError::Cancelled.into(),
+    })?;
     Ok(super::ended(print(&sources.scene, all), ExitCode::SUCCESS))
 }
 

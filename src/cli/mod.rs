@@ -15,7 +15,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::{Parser, Subcommand};
-use wgray::error::{RenderError, ShaderError};
+use wgray::error::{RenderError, ShaderError, ShaderErrors};
 use wgray::scene::SceneError;
 
 #[derive(Debug, Parser)]
@@ -104,9 +104,15 @@ fn prepare_environment(threads: Option<u16>) {
 
 /// Says on standard error what went wrong.
 fn report(error: &anyhow::Error) {
-    say(&format!("error: {error:#}"));
-    if let Some(excerpt) = shader_error(error).and_then(|shader| shader.excerpt.as_ref()) {
-        say(excerpt);
+    let shader = shader_errors(error);
+    if shader.is_empty() {
+        say(&format!("error: {error:#}"));
+    }
+    for error in shader {
+        say(&format!("error: {error}"));
+        if let Some(excerpt) = &error.excerpt {
+            say(excerpt);
+        }
     }
 }
 
@@ -127,10 +133,11 @@ fn ended(printed: io::Result<()>, code: ExitCode) -> ExitCode {
     }
 }
 
-fn shader_error(error: &anyhow::Error) -> Option<&ShaderError> {
-    match error.downcast_ref() {
-        Some(RenderError::Shader(shader)) => Some(shader),
-        _ => error.downcast_ref(),
+fn shader_errors(error: &anyhow::Error) -> &[ShaderError] {
+    match (error.downcast_ref(), error.downcast_ref::<ShaderErrors>()) {
+        (Some(RenderError::Shader(error)), _) => std::slice::from_ref(error),
+        (_, Some(errors)) => &errors.0,
+        _ => &[],
     }
 }
 

@@ -7,9 +7,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use crate::error::{RenderError, ShaderError};
+use crate::error::{RenderError, ShaderErrors};
 use crate::gpu::compose::Shaders;
-use crate::gpu::{Choice, Device, Gpu, Options, choose};
+use crate::gpu::{Choice, Device, Forms, Gpu, Options, check_kernels, choose};
 use crate::pack::Packed;
 
 /// What is to be made.
@@ -30,10 +30,10 @@ pub struct Request {
 pub struct Built {
     /// The request's.
     pub id: u64,
-    /// The scene on a device, and the shaders that it has.
-    pub result: Result<(Box<Gpu>, Arc<Shaders>), RenderError>,
+    /// The scene on a device, and the shaders that it has; `None` if the request's are wrong, and have no fallback.
+    pub result: Option<Result<(Box<Gpu>, Arc<Shaders>), RenderError>>,
     /// What is wrong with the request's shaders.
-    pub refused: Option<ShaderError>,
+    pub refused: Option<ShaderErrors>,
     /// How long it took to compile.
     pub took: Duration,
 }
@@ -92,25 +92,19 @@ fn build(choice: &Choice, request: Request) -> Built {
         fallback,
     } = request;
     let start = Instant::now();
-    let mut refused = None;
-    let result = guarded(|| {
-        let device = device.map_or_else(|| choose(choice), Ok)?;
-        // In buffers: a change of the scene then needs no compiler.
-        let options = Options {
-            baked: false,
-            ..Options::best(&device)
-        };
-        match (Gpu::new(&device, &packed, &shaders, options), &fallback) {
-            (Ok(gpu), _) => Ok((Box::new(gpu), shaders)),
-            (Err(RenderError::Shader(error)), Some(fallback)) => {
-                refused = Some(error);
-                Ok((
-                    Box::new(Gpu::new(&device, &packed, fallback, options)?),
-                    fallback.clone(),
-                ))
-            }
-            (Err(error), _) => Err(error),
-        }
+    // Every kernel, whether it is used now or by another view later.
+    let refused = check_kernels(&packed, &shaders, Forms::Buffers).err();
+    let usable = if refused.is_some() { fallback } else { Some(shaders) };
+    let result = usable.map(|shaders| {
+        guarded(|| {
+            let device = device.map_or_else(|| choose(choice), Ok)?;
+            // In buffers: a change of the scene then needs no compiler.
+            let options = Options {
+                baked: false,
+                ..Options::best(&device)
+            };
+            Ok((Box::new(Gpu::new(&device, &packed, &shaders, options)?), shaders))
+        })
     });
     Built {
         id,

@@ -92,6 +92,46 @@ pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
     if new.validate().is_ok() { new } else { camera.clone() }
 }
 
+/// A moved camera after the file's was edited: what the edit changed is the file's, the rest stays. `None` if that is
+/// the file's camera.
+pub fn merged(
+    moved: &CameraDescription,
+    old: &CameraDescription,
+    new: &CameraDescription,
+) -> Option<CameraDescription> {
+    let mut merged = moved.clone();
+    match (&mut merged, old, new) {
+        (
+            CameraDescription::Perspective(c),
+            CameraDescription::Perspective(old),
+            CameraDescription::Perspective(new),
+        ) => {
+            take(&mut c.position, &old.position, &new.position);
+            take(&mut c.look_at, &old.look_at, &new.look_at);
+            take(&mut c.up, &old.up, &new.up);
+            take(&mut c.fov, &old.fov, &new.fov);
+        }
+        (
+            CameraDescription::Orthographic(c),
+            CameraDescription::Orthographic(old),
+            CameraDescription::Orthographic(new),
+        ) => {
+            take(&mut c.position, &old.position, &new.position);
+            take(&mut c.look_at, &old.look_at, &new.look_at);
+            take(&mut c.up, &old.up, &new.up);
+            take(&mut c.height, &old.height, &new.height);
+        }
+        _ => return None, // another kind of camera
+    }
+    (merged != *new && merged.validate().is_ok()).then_some(merged)
+}
+
+fn take<T: Copy + PartialEq>(value: &mut T, old: &T, new: &T) {
+    if old != new {
+        *value = *new;
+    }
+}
+
 fn rounded(point: DVec3, scale: f64) -> DVec3 {
     DVec3::from(point.to_array().map(|x| round(x, scale)))
 }
@@ -212,6 +252,23 @@ mod tests {
             text,
             "[camera]\nposition = [-1.15852, -3.74517, 1.79468]\nlook_at = [0, 0, 1]\nup = [0, 0, 1]\nfov = 45\n"
         );
+    }
+
+    #[test]
+    fn an_edit_changes_what_it_changes_and_a_move_the_rest() {
+        let file = perspective();
+        let turned = moved(&file, Move::Orbit(0.3, 0.2));
+        let wide = camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 60");
+        let both = merged(&turned, &file, &wide).unwrap();
+        assert_eq!(view(&both).position, view(&turned).position);
+        assert!(matches!(&both, CameraDescription::Perspective(c) if c.fov == 60.0));
+        let elsewhere = camera("position = [0, -5, 1]\nlook_at = [0, 0, 1]\nfov = 45");
+        assert_eq!(merged(&turned, &file, &elsewhere), None, "the look_at has not moved");
+        assert_eq!(merged(&turned, &file, &turned), None, "it was saved");
+        assert_eq!(merged(&turned, &file, &orthographic()), None);
+        let through = camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nup = [1, 0, 0]\nfov = 45");
+        let side = camera("position = [4, 0, 1]\nlook_at = [0, 0, 1]\nfov = 45");
+        assert_eq!(merged(&side, &file, &through), None, "it would look along its up");
     }
 
     #[test]

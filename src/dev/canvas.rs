@@ -22,6 +22,9 @@ const COARSE: Duration = Duration::from_millis(60);
 const COARSE_PIXELS: f64 = 10_000.0;
 /// The coarsest picture has one pixel for so many along each side.
 const COARSEST: u32 = 32;
+/// The most pixels that are shown, and the most along a side: browsers show no larger pictures.
+const MOST_PIXELS: u64 = 1 << 24;
+const LONGEST_SIDE: u32 = 1 << 14;
 /// First hits that are found in one call.
 const HITS_PER_CALL: u32 = 1 << 17;
 
@@ -32,6 +35,8 @@ pub struct Canvas {
     scene: Packed,
     /// The camera of the whole picture.
     camera: Camera,
+    /// Pixels of the whole picture along each side of one of the finished film: more than one where it is too large.
+    finest: u32,
     /// Whether the CPU renders the same.
     compare: bool,
     stage: Stage,
@@ -70,6 +75,7 @@ impl Canvas {
             gpu,
             scene,
             camera,
+            finest: 1,
             compare: false,
             stage,
             steps: Steps::new(&Cut::default(), CALL, Order::Pixels),
@@ -111,7 +117,12 @@ impl Canvas {
         self.under = None;
         self.hits.clear();
         self.shown = false;
-        let scale = if view.aov().is_some() { 1 } else { self.first_scale() };
+        self.finest = finest(camera.width, camera.height, self.gpu.largest_film());
+        let scale = if view.aov().is_some() {
+            self.finest
+        } else {
+            self.first_scale()
+        };
         self.begin(scale)
     }
 
@@ -119,12 +130,12 @@ impl Canvas {
     pub fn change_view(&mut self, view: View) -> Result<(), RenderError> {
         self.shown = false;
         let film = view.aov().is_none();
-        let nothing_there = self.stage.scale == 1 && self.steps.samples() == 0;
+        let nothing_there = self.stage.scale == self.finest && self.steps.samples() == 0;
         let other_film = self.compare != (view == View::Compare);
         if film && (other_film || nothing_there) {
             self.restart(self.camera, view)
-        } else if !film && self.stage.scale > 1 {
-            self.begin(1)
+        } else if !film && self.stage.scale > self.finest {
+            self.begin(self.finest)
         } else {
             Ok(())
         }
@@ -139,17 +150,12 @@ impl Canvas {
         ((pixels / affordable.max(1.0)).sqrt().ceil() as u32)
             .next_power_of_two()
             .min(COARSEST)
+            .max(self.finest)
     }
 
     fn begin(&mut self, scale: u32) -> Result<(), RenderError> {
-        let (width, height) = (self.camera.width.div_ceil(scale), self.camera.height.div_ceil(scale));
+        let [width, height] = self.size_at(scale);
         let region = Region::whole(width, height);
-        if region.pixels() > self.gpu.largest_film() {
-            let device = self.gpu.device().info.name.clone();
-            let most = self.gpu.largest_film();
-            let message = format!("a picture of {width} x {height} pixels is too large here: it can show {most}");
-            return Err(RenderError::Device { device, message });
-        }
         self.stage = Stage {
             scale,
             width,
@@ -168,9 +174,19 @@ impl Canvas {
             cpu.begin(region)?;
             self.cpu = cpu.film()?;
         }
-        self.steps
-            .start(region, if scale > 1 { 1 } else { self.scene.pixel_samples });
+        self.steps.start(
+            region,
+            if scale > self.finest {
+                1
+            } else {
+                self.scene.pixel_samples
+            },
+        );
         Ok(())
+    }
+
+    fn size_at(&self, scale: u32) -> [u32; 2] {
+        [self.camera.width.div_ceil(scale), self.camera.height.div_ceil(scale)]
     }
 
     /// Whether nothing of the picture has been worth showing yet.
@@ -181,8 +197,11 @@ impl Canvas {
     /// Whether there is nothing left to do for a view.
     pub fn is_done(&self, view: View) -> bool {
         match view.aov() {
-            Some(_) => self.hits.len() as u64 == u64::from(self.camera.width) * u64::from(self.camera.height),
-            None => self.stage.scale == 1 && self.steps.is_done(),
+            Some(_) => {
+                let [width, height] = self.finest_size();
+                self.hits.len() as u64 == Region::whole(width, height).pixels()
+            }
+            None => self.stage.scale == self.finest && self.steps.is_done(),
         }
     }
 
@@ -197,7 +216,7 @@ impl Canvas {
     }
 
     fn step_hits(&mut self, view: View) -> Result<bool, RenderError> {
-        let Camera { width, height, .. } = self.camera;
+        let [width, height] = self.finest_size();
         let first = (self.hits.len() / width as usize) as u32;
         let rows = (HITS_PER_CALL / width).max(1).min(height - first);
         let strip = Region {
@@ -224,12 +243,11 @@ impl Canvas {
             self.steps.step(&mut self.gpu)?;
         }
         self.stage.begun = true;
-        if self.stage.scale > 1 && self.steps.is_done() {
+        if self.stage.scale > self.finest && self.steps.is_done() {
             let gpu = self.gpu_pixels()?;
             let cpu = self.compare.then(|| self.cpu_pixels());
             self.under = Some((gpu, cpu));
-            let scale = self.stage.scale;
-            self.begin(if scale > 4 { scale / 4 } else { 1 })?;
+            self.begin((self.stage.scale / 4).max(self.finest))?;
             return Ok(true);
         }
         let first_pass = passes == 0 && self.steps.samples() > 0;
@@ -252,7 +270,7 @@ impl Canvas {
     /// The picture as it is now, and its width and height.
     pub fn content(&mut self, view: View) -> Result<(Content, [u32; 2]), RenderError> {
         if let Some(aov) = view.aov() {
-            return Ok((self.hits_so_far(aov), [self.camera.width, self.camera.height]));
+            return Ok((self.hits_so_far(aov), self.finest_size()));
         }
         let size = [self.stage.width, self.stage.height];
         if view == View::Samples {
@@ -284,7 +302,8 @@ impl Canvas {
             ..bytemuck::Zeroable::zeroed()
         };
         let mut hits = self.hits.clone();
-        hits.resize((self.camera.width * self.camera.height) as usize, nothing);
+        let [width, height] = self.finest_size();
+        hits.resize(Region::whole(width, height).pixels() as usize, nothing);
         Content::Hits(aov, hits)
     }
 
@@ -293,9 +312,18 @@ impl Canvas {
         [self.camera.width, self.camera.height]
     }
 
+    /// Width and height of what is shown of it at the end.
+    pub fn finest_size(&self) -> [u32; 2] {
+        self.size_at(self.finest)
+    }
+
     /// Samples that every pixel of the whole picture has, and will have.
     pub fn samples(&self) -> (u32, u32) {
-        let so_far = if self.stage.scale == 1 { self.steps.samples() } else { 0 };
+        let so_far = if self.stage.scale == self.finest {
+            self.steps.samples()
+        } else {
+            0
+        };
         (so_far, self.scene.pixel_samples)
     }
 
@@ -303,6 +331,16 @@ impl Canvas {
     pub fn speed(&self) -> Option<f64> {
         self.steps.speed()
     }
+}
+
+/// The least scale at which a picture can be shown.
+fn finest(width: u32, height: u32, largest_film: u64) -> u32 {
+    let most = largest_film.min(MOST_PIXELS);
+    let fits = |scale: &u32| {
+        let (width, height) = (width.div_ceil(*scale), height.div_ceil(*scale));
+        Region::whole(width, height).pixels() <= most && width.max(height) <= LONGEST_SIDE
+    };
+    (1..).find(fits).unwrap_or(1) // the picture of one pixel fits
 }
 
 /// The same work done by both backends.
@@ -332,5 +370,28 @@ impl Backend for Both<'_> {
 
     fn largest_film(&self) -> u64 {
         self.gpu.largest_film()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_that_is_too_large_gets_smaller_as_little_as_it_can() {
+        for (width, height, film, scale) in [
+            (2048, 2048, 1 << 22, 1),
+            (2049, 2048, 1 << 22, 2),
+            (3000, 3000, 1 << 22, 2),
+            (3000, 3000, 1 << 30, 1),
+            (4097, 4096, u64::MAX, 2),
+            (1, 16_384, 1 << 22, 1),
+            (16_385, 1, 1 << 22, 2),
+            (65_536, 1, 1 << 22, 4),
+            (65_536, 65_536, 1 << 22, 32),
+            (1, 1, 1, 1),
+        ] {
+            assert_eq!(finest(width, height, film), scale, "{width} x {height}");
+        }
     }
 }

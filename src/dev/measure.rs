@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
 use toml_edit::{DocumentMut, value};
@@ -39,10 +40,11 @@ pub struct Measured {
 ///
 /// # Errors
 ///
-/// What to tell the user.
-pub fn measure(sources: &Sources, device: Choice) -> Result<Vec<Measured>, String> {
-    let told = |error: std::io::Error| error.to_string();
-    let text = fs::read_to_string(&sources.scene).map_err(|error| format!("{}: {error}", sources.scene.display()))?;
+/// What to tell the user; `None` if it was stopped. The copies are gone in every case.
+pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Result<Vec<Measured>, Option<String>> {
+    let told = |error: std::io::Error| Some(error.to_string());
+    let text =
+        fs::read_to_string(&sources.scene).map_err(|error| Some(format!("{}: {error}", sources.scene.display())))?;
     let folder = sources
         .scene
         .parent()
@@ -72,17 +74,18 @@ pub fn measure(sources: &Sources, device: Choice) -> Result<Vec<Measured>, Strin
         },
         device,
         out: None,
+        only_for_viewers: false,
         report: Box::new(|_| ()),
     })
-    .map_err(|error| error.to_string())?;
-    let mut clock = Clock { session };
+    .map_err(|error| Some(error.to_string()))?;
+    let mut clock = Clock { session, stopped };
     clock.after("start", || Ok(()))?;
     let kernel = copies.path().join("kernels/render.wgsl");
     let kernel_text = shaders.text("kernels/render.wgsl").to_string();
     if !kernel_text.contains(PLACE) {
-        return Err(format!(
+        return Err(Some(format!(
             "kernels/render.wgsl must contain '{PLACE}', which is changed to measure"
-        ));
+        )));
     }
     // Every run has kernels of its own: factors that are not the same as f32.
     let now = SystemTime::now()
@@ -115,16 +118,17 @@ fn brighter(text: &str, i: usize) -> String {
     document.to_string()
 }
 
-struct Clock {
+struct Clock<'a> {
     session: Session,
+    stopped: &'a AtomicBool,
 }
 
-impl Clock {
+impl Clock<'_> {
     fn all(
         &mut self,
         change: &'static str,
-        make: &mut dyn FnMut(usize, &Session) -> Result<(), String>,
-    ) -> Result<Measured, String> {
+        make: &mut dyn FnMut(usize, &Session) -> Result<(), Option<String>>,
+    ) -> Result<Measured, Option<String>> {
         let mut measured = Measured {
             change,
             stopped: Vec::new(),
@@ -143,14 +147,21 @@ impl Clock {
     }
 
     /// The times from a change.
-    fn after(&self, change: &str, make: impl FnOnce() -> Result<(), String>) -> Result<[Duration; 3], String> {
+    fn after(
+        &self,
+        change: &str,
+        make: impl FnOnce() -> Result<(), Option<String>>,
+    ) -> Result<[Duration; 3], Option<String>> {
         let revision = self.frame().map(|frame| frame.header.revision);
         let start = Instant::now();
         make()?;
         let (mut stopped, mut first) = (None, None);
         while start.elapsed() < LONGEST {
+            if self.stopped.load(Ordering::Relaxed) {
+                return Err(None);
+            }
             if let Some(problem) = self.session.state.borrow().problems.first() {
-                return Err(format!("{change}: {}", problem.message));
+                return Err(Some(format!("{change}: {}", problem.message)));
             }
             if self.session.state.borrow().compiling {
                 stopped.get_or_insert(start.elapsed());
@@ -158,13 +169,13 @@ impl Clock {
             if let Some(frame) = self.frame().filter(|frame| Some(frame.header.revision) > revision) {
                 let first = *first.get_or_insert(start.elapsed());
                 let header = &frame.header;
-                if header.sent == [header.width, header.height] && header.samples > 0 {
+                if header.sent == header.finest && header.samples > 0 {
                     return Ok([stopped.unwrap_or(first), first, start.elapsed()]);
                 }
             }
             std::thread::sleep(Duration::from_millis(1));
         }
-        Err(format!("{change}: no picture within {} s", LONGEST.as_secs()))
+        Err(Some(format!("{change}: no picture within {} s", LONGEST.as_secs())))
     }
 
     fn frame(&self) -> Option<Arc<Frame>> {

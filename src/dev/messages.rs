@@ -30,8 +30,12 @@ pub enum Report {
         /// Since the first picture.
         seconds: f64,
     },
+    /// The picture is larger than what can be shown: the size asked for, and the size of what is shown.
+    Smaller([u32; 2], [u32; 2]),
     /// The camera was written into the scene file, or could not be.
     Saved(Result<(), String>),
+    /// The last save was taken back, or could not be.
+    Unsaved(Result<(), String>),
 }
 
 /// What someone who looks asks for.
@@ -44,10 +48,14 @@ pub enum Command {
     ResetCamera,
     /// To write the camera into the scene file.
     SaveCamera,
+    /// To take the last save back.
+    UndoSave,
     /// Another view.
     View(View),
     /// The factor of the difference of [`View::Compare`].
     Gain(f32),
+    /// Whether pixels that are no light are marked.
+    Marks(bool),
 }
 
 /// What is known beside the picture; it goes to the page as JSON.
@@ -63,16 +71,26 @@ pub struct State {
     pub view: View,
     /// The factor of the difference of [`View::Compare`].
     pub gain: f32,
+    /// Whether pixels that are no light are marked.
+    pub marks: bool,
     /// The camera, as the section of a scene file.
     pub camera: String,
     /// Whether it is not that of the file.
     pub camera_moved: bool,
+    /// Whether a save of it can be taken back.
+    pub can_undo: bool,
     /// What is wrong now.
     pub problems: Vec<Diagnostic>,
     /// Whether a kernel is being compiled.
     pub compiling: bool,
     /// Seconds that the last one took.
     pub compile_seconds: Option<f64>,
+    /// How many commands have been followed.
+    pub heard: u64,
+    /// The number of the last frame.
+    pub frame: u64,
+    /// Whether there will be more frames without anything happening.
+    pub busy: bool,
     /// The last thing that was said, and how many were before it.
     pub notice: Option<Notice>,
 }
@@ -96,6 +114,8 @@ pub enum Event {
     Built(Box<Built>),
     /// Someone asks for something.
     Command(Command),
+    /// Someone came who looks.
+    Viewers,
     /// A driver loses its device.
     #[cfg(test)]
     Lose,

@@ -4,6 +4,7 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::faults::{Fault, Faults, faults, mark};
 use crate::film::{Film, mean};
 use crate::image::{Aov, Pixels, difference, encode};
 use crate::pack::{FirstHit, NOTHING};
@@ -97,6 +98,8 @@ pub enum Content {
 /// What is told about a frame beside its pictures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Header {
+    /// Counts the frames.
+    pub number: u64,
     /// Counts the changes of scene, shaders and camera: which of them the frame shows.
     pub revision: u64,
     /// What it shows.
@@ -107,6 +110,8 @@ pub struct Header {
     pub height: u32,
     /// Width and height of what is sent.
     pub sent: [u32; 2],
+    /// Width and height of what is sent at the end: less than the whole where that is too large to be shown.
+    pub finest: [u32; 2],
     /// Samples that every pixel has.
     pub samples: u32,
     /// Samples that it will have.
@@ -119,8 +124,21 @@ pub struct Header {
     pub latency: Option<f64>,
     /// What [`View::Compare`] found: pixels that differ in any bit, and the largest difference.
     pub differing: Option<(usize, f32)>,
+    /// Pixels that are no light, for each picture that can have them.
+    pub faults: Vec<(&'static str, Faults)>,
     /// Names and sizes in bytes of the pictures that follow.
     pub parts: Vec<(&'static str, usize)>,
+}
+
+/// How a frame is shown, beside what it is of.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// The factor of the difference of [`View::Compare`].
+    pub gain: f32,
+    /// Whether pixels that are no light are marked.
+    pub marks: bool,
+    /// Whether negative ones are light, as under filters with negative lobes.
+    pub negative: bool,
 }
 
 /// A picture that the viewers get, as PNG files and as numbers.
@@ -146,12 +164,20 @@ pub struct Names {
 }
 
 impl Frame {
-    /// Makes the pictures of `content`; the header's last two fields are found here. `gain` is the factor of the
-    /// difference of [`View::Compare`].
-    pub fn new(mut header: Header, content: Content, names: Names, gain: f32) -> Frame {
+    /// Makes the pictures of `content`; the header's last three fields are found here.
+    pub fn new(mut header: Header, content: Content, names: Names, look: Look) -> Frame {
         let [width, height] = header.sent;
+        let mut found = Vec::new();
+        let mut marked = |name, mut rgb: Vec<u8>, faults: Vec<Option<Fault>>| {
+            if look.marks {
+                mark(&mut rgb, &faults);
+            }
+            found.push((name, Faults::count(&faults, width)));
+            (name, rgb)
+        };
+        let light = |pixels: &Pixels| faults(&pixels.colors, look.negative, |color| *color);
         let pictures: Vec<(&'static str, Vec<u8>)> = match &content {
-            Content::Color(colors) => vec![("picture", display(colors))],
+            Content::Color(colors) => vec![marked("picture", display(colors), light(colors))],
             Content::Samples(counts, total) => {
                 vec![(
                     "picture",
@@ -161,17 +187,26 @@ impl Frame {
             Content::Hits(aov, hits) => {
                 let middle = hits.get((height / 2 * width + width / 2) as usize);
                 let middle_depth = middle.filter(|hit| hit.shape != NOTHING).map_or(1.0, |hit| hit.depth);
-                vec![("picture", bytes(hits, |hit| aov.color_of_hit(hit, middle_depth)))]
+                let rgb = bytes(hits, |hit| aov.color_of_hit(hit, middle_depth));
+                // Below zero are normals and texture coordinates by right.
+                let values = |hit: &FirstHit| match aov {
+                    Aov::Normal => hit.normal.into(),
+                    Aov::Depth => [hit.depth, 0.0, 0.0],
+                    Aov::Uv => [hit.uv.x, hit.uv.y, 0.0],
+                    _ => [0.0; 3],
+                };
+                vec![marked("picture", rgb, faults(hits, true, values))]
             }
             Content::Compare(gpu, cpu) => {
                 header.differing = difference(gpu, cpu, 0.0).map(|found| (found.unequal, found.largest));
                 vec![
-                    ("gpu", display(gpu)),
-                    ("cpu", display(cpu)),
-                    ("difference", amplified(gpu, cpu, gain)),
+                    marked("gpu", display(gpu), light(gpu)),
+                    marked("cpu", display(cpu), light(cpu)),
+                    ("difference", amplified(gpu, cpu, look.gain)),
                 ]
             }
         };
+        header.faults = found;
         let (parts, pictures): (Vec<_>, Vec<_>) = pictures
             .into_par_iter()
             .map(|(name, rgb)| {

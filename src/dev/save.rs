@@ -1,29 +1,64 @@
-//! Writing the camera into the scene file, whose comments and layout stay as they are.
+//! Writing the camera into the scene file, and taking it back. Only the numbers that differ are touched: comments, layout,
+//! line ends and a byte-order mark stay, byte for byte.
 
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 
-use toml_edit::{DocumentMut, Item, TableLike, Value};
+use toml_edit::{Document, Item, TableLike, Value};
 
 use super::camera::{Entry, entries};
 use crate::scene::{CameraDescription, Description};
 
-/// Puts a camera into the file, which is replaced in one step. Values that are as they were are not touched.
+/// What a file was before a save and is after it.
+#[derive(Debug)]
+pub struct Saved {
+    path: PathBuf,
+    before: String,
+    after: String,
+}
+
+impl Saved {
+    /// Whether a file's content is what was saved.
+    pub fn is(&self, content: &[u8]) -> bool {
+        self.after.as_bytes() == content
+    }
+
+    /// Gives the file the text that it had.
+    ///
+    /// # Errors
+    ///
+    /// What to tell the user: the file has been changed since, or cannot be read or written.
+    pub fn undo(&self) -> Result<(), String> {
+        let place = self.path.display();
+        let now = fs::read(&self.path).map_err(|error| format!("{place}: {error}"))?;
+        if !self.is(&now) {
+            return Err(format!(
+                "{place}: has been changed since the camera was saved, and stays as it is"
+            ));
+        }
+        replace(&self.path, self.before.as_bytes()).map_err(|error| format!("{place}: cannot be written: {error}"))
+    }
+}
+
+/// Puts a camera into the file, which is replaced in one step. Values that are as they were are not touched; `None` if
+/// all are.
 ///
 /// # Errors
 ///
 /// What to tell the user: the file cannot be read or written, or is no scene that this camera fits.
-pub fn save_camera(path: &Path, camera: &CameraDescription) -> Result<(), String> {
+pub fn save_camera(path: &Path, camera: &CameraDescription) -> Result<Option<Saved>, String> {
     let place = path.display();
     // A link stays one: what it leads to is replaced.
     let path = fs::canonicalize(path).map_err(|error| format!("{place}: {error}"))?;
-    let text = fs::read_to_string(&path).map_err(|error| format!("{place}: {error}"))?;
-    let new = with_camera(&text, &place.to_string(), camera)?;
-    if new == text {
-        return Ok(());
+    let before = fs::read_to_string(&path).map_err(|error| format!("{place}: {error}"))?;
+    let after = with_camera(&before, &place.to_string(), camera)?;
+    if after == before {
+        return Ok(None);
     }
-    replace(&path, new.as_bytes()).map_err(|error| format!("{place}: cannot be written: {error}"))
+    replace(&path, after.as_bytes()).map_err(|error| format!("{place}: cannot be written: {error}"))?;
+    Ok(Some(Saved { path, before, after }))
 }
 
 /// Replaces a file in one step: whoever reads it sees the old content or the new.
@@ -54,53 +89,85 @@ fn with_camera(text: &str, origin: &str, camera: &CameraDescription) -> Result<S
     if std::mem::discriminant(&described.camera) != std::mem::discriminant(camera) {
         return Err(format!("{origin}: the file has another type of camera by now"));
     }
-    let mut document: DocumentMut = text.parse().map_err(|error| format!("{origin}: {error}"))?;
-    let table: &mut dyn TableLike = document
-        .get_mut("camera")
-        .and_then(Item::as_table_like_mut)
+    let document = Document::parse(text).map_err(|error| format!("{origin}: {error}"))?;
+    let table: &dyn TableLike = document
+        .get("camera")
+        .and_then(Item::as_table_like)
         .ok_or_else(|| format!("{origin}: camera is no table"))?;
+    let mut changes = Vec::new();
     for ((key, old), (_, new)) in entries(&described.camera).into_iter().zip(entries(camera)) {
         if old != new {
-            set(table, key, new);
+            changes.extend(edits(text, table, key, new).ok_or_else(|| format!("{origin}: camera.{key} has no place"))?);
         }
     }
-    Ok(document.to_string())
+    // From the end: what comes before a change stays where it is.
+    changes.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
+    let mut text = text.to_string();
+    for (range, new) in changes {
+        text.replace_range(range, &new);
+    }
+    Ok(text)
 }
 
-fn set(table: &mut dyn TableLike, key: &str, entry: Entry) {
-    match (table.get_mut(key).and_then(Item::as_value_mut), entry) {
+/// What to put where in a text.
+type Edit = (Range<usize>, String);
+
+/// The edits that give a key of the camera a value; `None` if the text has no place for it.
+fn edits(text: &str, table: &dyn TableLike, key: &str, entry: Entry) -> Option<Vec<Edit>> {
+    let number_at = |old: &Value, new: f64| Some((!is(old, new)).then_some((old.span()?, written(new))));
+    let whole = match entry {
+        Entry::Number(x) => written(x),
+        Entry::Point(p) => format!("[{}]", p.to_array().map(written).join(", ")),
+    };
+    match (table.get(key).and_then(Item::as_value), entry) {
         (Some(Value::Array(array)), Entry::Point(point)) if array.len() == 3 => {
-            for (old, new) in array.iter_mut().zip(point.to_array()) {
-                put(old, number(new));
-            }
+            let pairs = array.iter().zip(point.to_array());
+            let edits: Option<Vec<Option<Edit>>> = pairs.map(|(old, new)| number_at(old, new)).collect();
+            Some(edits?.into_iter().flatten().collect())
         }
-        (Some(old), Entry::Number(x)) => put(old, number(x)),
-        (_, Entry::Number(x)) => drop(table.insert(key, Item::Value(number(x)))),
-        (_, Entry::Point(point)) => {
-            drop(table.insert(
-                key,
-                Item::Value(Value::Array(point.to_array().map(number).into_iter().collect())),
-            ));
-        }
+        (Some(old), Entry::Number(x)) => Some(number_at(old, x)?.into_iter().collect()),
+        (Some(old), Entry::Point(_)) => Some(vec![(old.span()?, whole)]),
+        (None, _) => Some(vec![added(text, table, key, &whole)?]),
     }
 }
 
-/// Changes a value but not what is written around it; one that is the same is not even written otherwise.
-fn put(old: &mut Value, new: Value) {
-    let as_float = |v: &Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
-    if as_float(old) != as_float(&new) {
-        let decor = old.decor().clone();
-        *old = new;
-        *old.decor_mut() = decor;
+/// A key that is not there yet, after the last one of its table.
+fn added(text: &str, table: &dyn TableLike, key: &str, value: &str) -> Option<Edit> {
+    let values = table.iter().filter_map(|(_, item)| item.as_value()?.span());
+    let last = values.map(|span| span.end).max()?;
+    let first_key = table.iter().find_map(|(key, _)| table.key(key)?.span())?;
+    let line_start = text[..first_key.start].rfind('\n').map_or(0, |i| i + 1);
+    let before_key = &text[line_start..first_key.start];
+    if before_key.contains('{') {
+        return Some((last..last, format!(", {key} = {value}")));
     }
+    // Its line begins as the first key's does: with blanks, or with `camera.`
+    let line_end = text[last..].find('\n').map_or(text.len(), |i| last + i);
+    let line_end = if text[..line_end].ends_with('\r') {
+        line_end - 1
+    } else {
+        line_end
+    };
+    let line_break = if text[line_end..].starts_with('\r') {
+        "\r\n"
+    } else {
+        "\n"
+    };
+    Some((line_end..line_end, format!("{line_break}{before_key}{key} = {value}")))
+}
+
+/// Whether a value is this number already, however it is written.
+fn is(value: &Value, number: f64) -> bool {
+    let known = value.as_float().or_else(|| value.as_integer().map(|i| i as f64));
+    known == Some(number)
 }
 
 /// Whole numbers without a point, as people write them.
-fn number(x: f64) -> Value {
+fn written(x: f64) -> String {
     if x.fract() == 0.0 && x.abs() < 1e15 {
-        Value::from(x as i64)
+        format!("{x:.0}")
     } else {
-        Value::from(x)
+        Value::from(x).to_string()
     }
 }
 
@@ -174,5 +241,45 @@ mod tests {
             2,
             "nothing is left behind"
         );
+    }
+
+    #[test]
+    fn line_ends_and_a_byte_order_mark_stay() {
+        let new = camera("position = [0, -2, 1.25]\nlook_at = [0.5, 0, 1]\nup = [0, 1, 0]\nfov = 45");
+        let unix = with_camera(SCENE, "s.toml", &new).unwrap();
+        let dos = |text: &str| format!("\u{feff}{}", text.replace('\n', "\r\n"));
+        assert_eq!(with_camera(&dos(SCENE), "s.toml", &new).unwrap(), dos(&unix));
+        // Even where both kinds are in one file.
+        let mixed = |text: &str| text.replacen("# degrees\n", "# degrees\r\n", 1);
+        assert_eq!(with_camera(&mixed(SCENE), "s.toml", &new).unwrap(), mixed(&unix));
+    }
+
+    #[test]
+    fn a_camera_of_dotted_keys_stays_one() {
+        let text = "image = { width = 4, height = 4 }\ncamera.position = [0, 1, 0]\ncamera.look_at = [0, 0, 0]\n\
+            camera.fov = 40 # wide";
+        let new = camera("position = [0, 1.5, 0]\nlook_at = [0, 0, 0]\nup = [1, 0, 0]\nfov = 40");
+        let saved = with_camera(text, "s.toml", &new).unwrap();
+        assert_eq!(saved, text.replace("1, 0]\n", "1.5, 0]\n") + "\ncamera.up = [1, 0, 0]");
+        assert_eq!(Description::parse(&saved, "s.toml").unwrap().camera, new);
+    }
+
+    #[test]
+    fn a_save_is_taken_back_unless_the_file_was_changed_since() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("s.toml");
+        let text = SCENE.replace('\n', "\r\n");
+        fs::write(&file, &text).unwrap();
+        let new = camera("position = [0, -2, 1.25]\nlook_at = [0, 0, 1]\nfov = 45");
+        let saved = save_camera(&file, &new).unwrap().unwrap();
+        assert!(saved.is(&fs::read(&file).unwrap()));
+        assert!(save_camera(&file, &new).unwrap().is_none(), "there is nothing to save");
+        saved.undo().unwrap();
+        assert_eq!(fs::read_to_string(&file).unwrap(), text);
+        assert!(saved.undo().unwrap_err().contains("has been changed since"));
+        let saved = save_camera(&file, &new).unwrap().unwrap();
+        fs::write(&file, "edited").unwrap();
+        assert!(saved.undo().unwrap_err().contains("has been changed since"));
+        assert_eq!(fs::read_to_string(&file).unwrap(), "edited");
     }
 }

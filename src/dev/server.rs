@@ -12,16 +12,23 @@ use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use hyper::server::conn::http1;
+use hyper_util::rt::TokioIo;
+use hyper_util::service::TowerToHyperService;
 use serde::{Deserialize, Serialize};
 use tokio::sync::{Semaphore, watch};
 
 use super::guard::Guard;
 use super::messages::{self, Command};
 use super::picture::Frame;
-use super::session::Session;
+use super::session::{Session, Viewers};
 
 /// So many may look at once.
 const VIEWERS: usize = 16;
+/// So many requests are answered at once; others wait.
+const REQUESTS: usize = 64;
+/// A request that is not made and answered within this time is given up.
+const REQUEST: Duration = Duration::from_secs(10);
 /// The largest message of a viewer, in bytes: a command is far smaller.
 const LARGEST_MESSAGE: usize = 4096;
 /// A viewer that takes nothing for so long is gone.
@@ -70,13 +77,34 @@ impl Listener {
             state: session.state.clone(),
             frames: session.frames.clone(),
             send: Arc::new(session.commands()),
-            viewers: Arc::new(Semaphore::new(VIEWERS)),
+            seats: Arc::new(Semaphore::new(VIEWERS)),
+            viewers: session.viewers(),
         };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         runtime.block_on(async {
             let listener = tokio::net::TcpListener::from_std(self.listener)?;
-            axum::serve(listener, routes(shared)).await
+            answer_all(&listener, routes(shared)).await
         })
+    }
+}
+
+/// Answers requests, each on a connection of its own and in bounded time; a viewer's connection then lives on elsewhere.
+async fn answer_all(listener: &tokio::net::TcpListener, routes: Router) -> io::Result<()> {
+    let requests = Arc::new(Semaphore::new(REQUESTS));
+    loop {
+        let place = requests.clone().acquire_owned().await.map_err(io::Error::other)?;
+        let Ok((stream, _)) = listener.accept().await else {
+            tokio::time::sleep(Duration::from_millis(50)).await; // too many files are open, or the peer has gone
+            continue;
+        };
+        let service = TowerToHyperService::new(routes.clone());
+        tokio::spawn(async move {
+            let mut http = http1::Builder::new();
+            let connection = http.keep_alive(false).serve_connection(TokioIo::new(stream), service);
+            // Whoever asked hears of a failure by the end of the connection.
+            let _answered = tokio::time::timeout(REQUEST, connection.with_upgrades()).await;
+            drop(place);
+        });
     }
 }
 
@@ -85,8 +113,9 @@ struct Shared {
     guard: Guard,
     state: watch::Receiver<Arc<messages::State>>,
     frames: watch::Receiver<Option<Arc<Frame>>>,
-    send: Arc<dyn Fn(Command) -> bool + Send + Sync>,
-    viewers: Arc<Semaphore>,
+    send: Arc<dyn Fn(Command) -> Option<u64> + Send + Sync>,
+    seats: Arc<Semaphore>,
+    viewers: Viewers,
 }
 
 fn routes(shared: Shared) -> Router {
@@ -129,14 +158,16 @@ async fn guarded(State(shared): State<Shared>, request: Request, next: Next) -> 
 }
 
 async fn socket(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Response {
-    let Ok(seat) = shared.viewers.clone().try_acquire_owned() else {
+    let Ok(seat) = shared.seats.clone().try_acquire_owned() else {
         return (StatusCode::SERVICE_UNAVAILABLE, "too many viewers").into_response();
     };
     let upgrade = upgrade
         .max_message_size(LARGEST_MESSAGE)
         .max_frame_size(LARGEST_MESSAGE);
     upgrade.on_upgrade(async move |socket| {
+        let looking = shared.viewers.enter();
         let _gone = view(socket, &shared).await; // how a viewer goes does not matter
+        drop(looking);
         drop(seat);
     })
 }
@@ -161,6 +192,8 @@ enum Tell<'a> {
         y: u32,
         values: Vec<(&'static str, String)>,
     },
+    /// The number of a command that was given; the state says when it has been followed.
+    Asked(u64),
     Refused(String),
 }
 
@@ -215,7 +248,8 @@ fn answer(asked: &str, shared: &Shared) -> Option<Tell<'static>> {
             Some(Tell::Pixel { x, y, values })
         }
         Ok(Ask::Command(command)) => {
-            (!(shared.send)(command)).then(|| Tell::Refused("busy: a command was dropped".to_string()))
+            let dropped = || Tell::Refused("busy: a command was dropped".to_string());
+            Some((shared.send)(command).map_or_else(dropped, Tell::Asked))
         }
         Err(error) => Some(Tell::Refused(format!("not understood: {error}"))),
     }

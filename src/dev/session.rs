@@ -1,8 +1,9 @@
 //! A session: the files of a scene, watched and rendered by a thread of their own.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
@@ -25,6 +26,8 @@ pub struct Settings {
     pub device: Choice,
     /// A PNG file that is replaced after each reload.
     pub out: Option<PathBuf>,
+    /// Whether nothing is rendered while nobody looks ([`Session::viewers`]) and there is no `out`.
+    pub only_for_viewers: bool,
     /// Is told what happens, for the terminal.
     pub report: Box<dyn Fn(Report) + Send>,
 }
@@ -35,12 +38,40 @@ const WAITING: usize = 256;
 /// A running session; it ends when this is dropped.
 pub struct Session {
     events: SyncSender<Event>,
+    /// How many commands were given.
+    asked: Arc<Mutex<u64>>,
     /// What is known.
     pub state: watch::Receiver<Arc<State>>,
     /// The newest picture, once there is one. Whoever is slow misses some.
     pub frames: watch::Receiver<Option<Arc<Frame>>>,
+    viewers: Viewers,
     watch: Option<Watch>,
     thread: Option<JoinHandle<()>>,
+}
+
+/// Counts those who look.
+#[derive(Clone)]
+pub struct Viewers {
+    looking: Arc<AtomicUsize>,
+    events: SyncSender<Event>,
+}
+
+/// Someone who looks, until this is dropped.
+pub struct Viewer(Viewers);
+
+impl Viewers {
+    /// One more looks.
+    pub fn enter(&self) -> Viewer {
+        self.looking.fetch_add(1, Ordering::SeqCst);
+        let _ = self.events.try_send(Event::Viewers); // a full inbox wakes the painter too
+        Viewer(self.clone())
+    }
+}
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        self.0.looking.fetch_sub(1, Ordering::SeqCst);
+    }
 }
 
 /// Why there is no session.
@@ -71,6 +102,7 @@ impl Session {
             sources,
             device: choice,
             out,
+            only_for_viewers,
             report,
         } = settings;
         std::fs::metadata(&sources.scene).map_err(|error| StartError::NoScene(sources.scene.clone(), error))?;
@@ -92,12 +124,28 @@ impl Session {
         })?;
         let (state_sender, state) = watch::channel(Arc::default());
         let (frame_sender, frames) = watch::channel(None);
-        let painter = Painter::new(sources, device, builder, out, report, state_sender, frame_sender);
+        let looking = Arc::new(AtomicUsize::new(0));
+        let wanted_by = (only_for_viewers && out.is_none()).then(|| looking.clone());
+        let painter = Painter::new(
+            sources,
+            device,
+            builder,
+            out,
+            wanted_by,
+            report,
+            state_sender,
+            frame_sender,
+        );
         let thread = std::thread::Builder::new()
             .name("render".to_string())
             .spawn(move || run(painter, inbox))?;
         Ok(Session {
+            viewers: Viewers {
+                looking,
+                events: events.clone(),
+            },
             events,
+            asked: Arc::default(),
             state,
             frames,
             watch: Some(watch),
@@ -107,13 +155,28 @@ impl Session {
 
     /// Asks for something.
     pub fn send(&self, command: Command) {
+        let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
+        *asked += 1;
         let _ = self.events.send(Event::Command(command)); // the thread lives as long as this
     }
 
-    /// A way to ask for things from other threads, without ever waiting: false if too much is asked for already.
-    pub fn commands(&self) -> impl Fn(Command) -> bool + Send + Sync + 'static {
-        let events = self.events.clone();
-        move |command| !matches!(events.try_send(Event::Command(command)), Err(TrySendError::Full(_)))
+    /// Counts those who look.
+    pub fn viewers(&self) -> Viewers {
+        self.viewers.clone()
+    }
+
+    /// A way to ask for things from other threads, without ever waiting: gives the number that [`State::heard`] reaches
+    /// when it is followed, or nothing if too much is asked for already.
+    pub fn commands(&self) -> impl Fn(Command) -> Option<u64> + Send + Sync + 'static {
+        let (events, asked) = (self.events.clone(), self.asked.clone());
+        move |command| {
+            let mut asked = asked.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Err(TrySendError::Full(_)) = events.try_send(Event::Command(command)) {
+                return None;
+            }
+            *asked += 1;
+            Some(*asked)
+        }
     }
 }
 
@@ -206,6 +269,7 @@ mod tests {
             },
             device: Choice::Auto,
             out: None,
+            only_for_viewers: false,
             report: Box::new(move |report| drop(told.send(report))),
         })
         .unwrap();
@@ -259,6 +323,7 @@ mod tests {
             sources,
             device: Choice::Auto,
             out: None,
+            only_for_viewers: false,
             report: Box::new(|_| ()),
         };
         let error = Session::start(settings).err().unwrap().to_string();

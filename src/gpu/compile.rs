@@ -3,13 +3,14 @@
 use std::borrow::Cow;
 
 use naga::back::{pipeline_constants::process_overrides, spv};
-use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
-use naga::{Module, WithSpan};
+use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationError, ValidationFlags, Validator};
+use naga::{GlobalVariable, Handle, Module, Span, WithSpan};
 
 use super::compose::{Kernel, ROUNDING, Source};
 use super::prune::prune;
 use super::rounding::{Rounding, round_in_software};
 use super::spirv;
+use super::wording;
 use crate::error::ShaderError;
 use crate::pack::Specialization;
 
@@ -21,8 +22,21 @@ pub struct Checked {
 
 /// Parses and validates a kernel.
 pub fn check(source: &Source) -> Result<Checked, ShaderError> {
-    let module = naga::front::wgsl::parse_str(&source.text).map_err(|error| ShaderError::parse(source, &error))?;
-    let info = validate(&module).map_err(|error| ShaderError::invalid(source, &error))?;
+    check_at(source).map_err(|(error, _)| error)
+}
+
+/// The same; an error comes with its place in the whole text, if it has one.
+pub fn check_at(source: &Source) -> Result<Checked, (ShaderError, Option<usize>)> {
+    let start = |span: Option<Span>| span.and_then(Span::to_range).map(|range| range.start);
+    let module = naga::front::wgsl::parse_str(&source.text).map_err(|error| {
+        let (span, message) = wording::parse_message(&error);
+        (ShaderError::at(source, span, message), start(span))
+    })?;
+    let info = validate(&module).map_err(|error| {
+        let span = wording::place(&source.text, &error);
+        let message = wording::message(&module, &source.text, error.as_inner());
+        (ShaderError::at(source, span, message), start(span))
+    })?;
     Ok(Checked { module, info })
 }
 
@@ -33,6 +47,18 @@ fn validate(module: &Module) -> Result<ModuleInfo, Box<WithSpan<ValidationError>
 }
 
 impl Checked {
+    /// The kernel as naga has it.
+    pub(super) fn module(&self) -> &Module {
+        &self.module
+    }
+
+    /// Whether an entry point writes a variable, itself or by what it calls.
+    pub(super) fn writes(&self, entry: &str, variable: Handle<GlobalVariable>) -> bool {
+        let position = self.module.entry_points.iter().position(|known| known.name == entry);
+        let usage = position.map(|i| self.info.get_entry_point(i)[variable]);
+        usage.is_some_and(|usage| usage.intersects(GlobalUse::WRITE | GlobalUse::ATOMIC))
+    }
+
     /// The kernel as SPIR-V for one specialisation, computed on the device exactly as it is written.
     pub fn exact_spirv(
         &self,

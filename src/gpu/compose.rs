@@ -1,5 +1,6 @@
 //! Kernels as text: each is the concatenation of a list of files, since WGSL's module scope has no order.
 
+use std::ops::Range;
 use std::{fs, io, path::Path};
 
 macro_rules! files {
@@ -107,6 +108,9 @@ pub enum Kernel {
 }
 
 impl Kernel {
+    /// Every kernel.
+    pub const ALL: [Kernel; 3] = [Kernel::Render, Kernel::Adaptive, Kernel::Aov];
+
     /// The entry point's name.
     pub fn entry_point(self) -> &'static str {
         match self {
@@ -116,7 +120,8 @@ impl Kernel {
         }
     }
 
-    fn file(self) -> &'static str {
+    /// The file that has it.
+    pub fn file(self) -> &'static str {
         match self {
             Kernel::Render => "kernels/render.wgsl",
             Kernel::Adaptive => "kernels/adaptive.wgsl",
@@ -153,6 +158,14 @@ impl Shaders {
         Ok(Shaders {
             files: BUILT_IN.iter().map(|(name, _)| read(name)).collect::<io::Result<_>>()?,
         })
+    }
+
+    /// The same with another text of a file.
+    #[cfg(test)]
+    pub(super) fn with(mut self, name: &str, text: String) -> Shaders {
+        self.files.retain(|(file, _)| file != name);
+        self.files.push((name.to_string(), text));
+        self
     }
 
     /// A kernel that reads the scene from buffers, or, if `baked` is the text of the functions that know the scene, has
@@ -217,6 +230,32 @@ impl Source {
         if !text.ends_with('\n') {
             self.text.push('\n');
         }
+    }
+
+    /// The text with a part of it replaced, and its lines where they were. What is replaced lies in one file.
+    pub fn replaced(&self, range: Range<usize>, with: &str) -> Source {
+        let lines = self.text[range.clone()].matches('\n').count();
+        let with = with.to_string() + &"\n".repeat(lines);
+        let moved = |start: usize| match start >= range.end {
+            true => start - range.len() + with.len(),
+            false => start,
+        };
+        Source {
+            text: [&self.text[..range.start], &with, &self.text[range.end..]].concat(),
+            parts: self
+                .parts
+                .iter()
+                .map(|part| Part {
+                    file: part.file.clone(),
+                    start: moved(part.start),
+                })
+                .collect(),
+        }
+    }
+
+    /// Where a file starts.
+    pub fn start_of(&self, file: &str) -> Option<usize> {
+        self.parts.iter().find(|part| part.file == file).map(|part| part.start)
     }
 
     /// The file that a byte of the text came from, its own text, and the byte's offset in it.

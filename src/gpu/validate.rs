@@ -1,23 +1,383 @@
-//! All kernels of a scene, checked without a device.
+//! All kernels of a scene, checked without a device, and all that is wrong with them at once.
+
+use rayon::prelude::*;
 
 use super::bake::bake_if_small;
-use super::compile::check;
-use super::compose::{Kernel, Shaders};
+use super::compile::{Checked, check_at};
+use super::compose::{Kernel, Shaders, Source};
+use super::functions::functions;
+use super::interface;
 use super::rounding::Rounding;
-use crate::error::ShaderError;
+use crate::error::{ShaderError, ShaderErrors};
 use crate::pack::Packed;
 
-/// Compiles every kernel for a scene, to SPIR-V, as far as that goes without a driver: with the scene in buffers and, if
-/// it is small enough, as constants.
-pub fn check_kernels(packed: &Packed, shaders: &Shaders) -> Result<(), ShaderError> {
-    let baked = bake_if_small(packed);
-    for kernel in [Kernel::Render, Kernel::Aov] {
-        for scene in [None, baked.as_deref()]
-            .into_iter()
-            .take(1 + usize::from(baked.is_some()))
-        {
-            check(&shaders.compose(kernel, scene))?.exact_spirv(kernel, &packed.specialization, Rounding::Device)?;
+/// So many mistakes of a kernel are looked for.
+const MOST: usize = 16;
+
+/// How the kernels that are checked know the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Forms {
+    /// In buffers.
+    Buffers,
+    /// In buffers and, if it is small enough, as constants.
+    All,
+}
+
+/// Compiles every kernel for a scene, to SPIR-V, as far as that goes without a driver, and compares its interface with
+/// what the program binds.
+///
+/// # Errors
+///
+/// All that is wrong, each mistake once however many kernels have it. Of a function the first one is found.
+pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result<(), ShaderErrors> {
+    let baked = (forms == Forms::All).then(|| bake_if_small(packed)).flatten();
+    let mut scenes = vec![None];
+    scenes.extend(baked.as_deref().map(Some));
+    let all: Vec<(Kernel, Option<&str>)> = scenes
+        .into_iter()
+        .flat_map(|scene| Kernel::ALL.map(|kernel| (kernel, scene)))
+        .collect();
+    let found: Vec<Vec<ShaderError>> = all
+        .into_par_iter()
+        .map(|(kernel, scene)| mistakes(kernel, shaders.compose(kernel, scene), packed))
+        .collect();
+    let mut errors: Vec<ShaderError> = Vec::new();
+    for error in found.into_iter().flatten() {
+        if !errors.contains(&error) {
+            errors.push(error);
         }
     }
-    Ok(())
+    if errors.is_empty() {
+        Ok(())
+    } else {
+        Err(ShaderErrors(errors))
+    }
+}
+
+fn mistakes(kernel: Kernel, source: Source, packed: &Packed) -> Vec<ShaderError> {
+    let (mut errors, rest) = mistakes_of_functions(source);
+    let Some((source, checked)) = rest else { return errors };
+    match interface::mistakes(kernel, &source, &checked, errors.is_empty()) {
+        Ok(more) => errors.extend(more),
+        Err(error) => errors.push(error),
+    }
+    if errors.is_empty() {
+        let compiled = checked.exact_spirv(kernel, &packed.specialization, Rounding::Device);
+        errors.extend(compiled.err());
+    }
+    errors
+}
+
+/// naga stops at the first mistake. A function that has one gets an empty body, and the search goes on: to whoever calls
+/// it it is the same. What is left at the end is a kernel that naga accepts, unless a mistake is in no function's body.
+fn mistakes_of_functions(mut source: Source) -> (Vec<ShaderError>, Option<(Source, Checked)>) {
+    let mut errors: Vec<ShaderError> = Vec::new();
+    loop {
+        let (mut error, at) = match check_at(&source) {
+            Ok(checked) => return (errors, Some((source, checked))),
+            Err(error) => error,
+        };
+        let texts = functions(&source.text);
+        let emptied = |i: usize| {
+            let function = &texts[i];
+            let body = match function.result {
+                "" => "{}".to_string(),
+                ty => format!("{{ var nothing: {ty}; return nothing; }}"),
+            };
+            source.replaced(function.body.clone(), &body)
+        };
+        let culprit = match at {
+            Some(at) => texts.iter().position(|text| (text.start..text.body.end).contains(&at)),
+            // naga does not say where: it is where the mistake goes with the body.
+            None => {
+                (0..texts.len()).find(|i| check_at(&emptied(*i)).err().map(|(error, _)| error).as_ref() != Some(&error))
+            }
+        };
+        if let (None, Some(i)) = (at, culprit) {
+            let function = &texts[i];
+            let message = format!("in `{}`: {}", function.name, error.message);
+            let head = function.start..function.start + "fn ".len() + function.name.len();
+            error = ShaderError::at(&source, Some(naga::Span::from(head)), message);
+        }
+        let again = errors.iter().any(|known| known.place == error.place);
+        if !again {
+            errors.push(error);
+        }
+        let Some(i) = culprit.filter(|_| !again && errors.len() < MOST) else {
+            return (errors, None);
+        };
+        source = emptied(i);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pack::pack;
+    use crate::scene::{Overrides, Scene};
+
+    const SCENE: &str = "
+        image = { width = 8, height = 8 }
+        camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }
+        materials.m = { type = 'phong', color = [0.5, 0.5, 0.5] }
+        shapes = [{ type = 'sphere', material = 'm', center = [0, 0, 0], radius = 1 }]
+    ";
+
+    /// What is said of the built-in shaders with parts of files replaced; an empty part is the file's end.
+    fn said(edits: &[(&str, &str, &str)]) -> Vec<String> {
+        let mut shaders = Shaders::built_in();
+        for (name, old, new) in edits {
+            let text = shaders.text(name);
+            assert!(text.contains(old), "{name} has no '{old}'");
+            let text = match *old {
+                "" => format!("{text}{new}\n"),
+                old => text.replacen(old, new, 1),
+            };
+            shaders = shaders.with(name, text);
+        }
+        let packed = pack(&Scene::parse(SCENE, "s.toml", &Overrides::default()).unwrap());
+        let errors = check_kernels(&packed, &shaders, Forms::Buffers).err();
+        errors.map_or(Vec::new(), |errors| errors.0.iter().map(ToString::to_string).collect())
+    }
+
+    #[track_caller]
+    fn says(edits: &[(&str, &str, &str)], wanted: &[&str]) {
+        let said = said(edits);
+        assert_eq!(said.len(), wanted.len(), "{said:#?}");
+        for wanted in wanted {
+            let (place, parts) = wanted.split_once(' ').unwrap();
+            let fits = |line: &&String| line.starts_with(place) && parts.split(" .. ").all(|part| line.contains(part));
+            assert!(said.iter().any(|line| fits(&line)), "{wanted}: {said:#?}");
+        }
+    }
+
+    const RENDER: &str = "kernels/render.wgsl";
+    const AOV: &str = "kernels/aov.wgsl";
+    const ADAPTIVE: &str = "kernels/adaptive.wgsl";
+
+    #[test]
+    fn the_built_in_shaders_are_right() {
+        assert_eq!(said(&[]), [""; 0]);
+    }
+
+    #[test]
+    fn every_kernel_is_checked_and_all_mistakes_are_told_once() {
+        says(
+            &[
+                (RENDER, "sample++", "sample+"),
+                (AOV, "pixel_first_hit(pixel)", "pixel_first_hit(pixels)"),
+                (ADAPTIVE, "= moments;", "= moments.xyz;"),
+                ("phong.wgsl", "", "fn one() -> f32 { return missing; }"),
+                ("phong.wgsl", "", "fn two() -> f32 { return vec2f(1.0); }"),
+                (
+                    "light.wgsl",
+                    "",
+                    "fn three(a: f32) -> bool { let b = a && true; return b; }",
+                ),
+            ],
+            &[
+                "kernels/render.wgsl: expected",
+                "kernels/aov.wgsl:12: `pixels`",
+                "kernels/adaptive.wgsl: in `adaptive`: `moments.xyz` of type `vec3<f32>` cannot be stored in .. `vec4<f32>`",
+                "phong.wgsl: `missing`",
+                "phong.wgsl: in `two`: `vec2f(1.0)` of type `vec2<f32>` is returned where `f32` is declared",
+                "light.wgsl: in `three`: Incompatible operands",
+            ],
+        );
+    }
+
+    #[test]
+    fn the_entry_point_must_be_what_the_program_calls() {
+        says(
+            &[(RENDER, "@workgroup_size(8, 8)", "@workgroup_size(4, 4)")],
+            &["kernels/render.wgsl: workgroup size of `render` is (4, 4) .. (8, 8)"],
+        );
+        says(
+            &[(RENDER, "@workgroup_size(8, 8)", "@workgroup_size(PLANES, 8)")],
+            &["kernels/render.wgsl: workgroup size of `render` is set by an override"],
+        );
+        says(
+            &[(AOV, "fn aov", "fn ova")],
+            &["kernels/aov.wgsl: must be called `aov`, not `ova`"],
+        );
+        let built_in = Shaders::built_in();
+        let text = built_in.text(AOV);
+        let start = text.find("@compute").unwrap();
+        says(
+            &[(AOV, &text[start..], "")],
+            &["kernels/aov.wgsl:1:1: there is no entry point: @compute @workgroup_size(8, 8) fn aov"],
+        );
+        says(
+            &[
+                (AOV, "@compute @workgroup_size(8, 8)", ""),
+                (AOV, "@builtin(global_invocation_id) ", ""),
+            ],
+            &["kernels/aov.wgsl: `aov` must be the entry point: @compute"],
+        );
+    }
+
+    #[test]
+    fn bindings_must_be_what_the_program_binds() {
+        let film = "@group(0) @binding(10) var<storage, read_write> film: array<vec4f>;";
+        says(
+            &[(RENDER, "@binding(10)", "@binding(40)")],
+            &["kernels/render.wgsl: `film` must be at @group(0) @binding(10)"],
+        );
+        says(
+            &[
+                (RENDER, film, ""),
+                (RENDER, "film[index] = sum;", ""),
+                (RENDER, "film[index]", "vec4f()"),
+            ],
+            &[
+                "kernels/render.wgsl:1:1: @group(0) @binding(10) .. `var<storage, read_write>` film: array<vec4<f32>> is missing",
+            ],
+        );
+        says(
+            &[
+                (RENDER, "array<vec4f>", "array<vec2f>"),
+                (
+                    RENDER,
+                    "var sum = film[index]",
+                    "var sum = vec4f(film[index], 0.0, 0.0)",
+                ),
+                (RENDER, "= sum;", "= sum.xy;"),
+            ],
+            &["kernels/render.wgsl: `film[]` is `vec2<f32>` and must be `vec4<f32>`"],
+        );
+        says(
+            &[("bindings.wgsl", "", "@group(0) @binding(30) var<uniform> more: vec4f;")],
+            &["bindings.wgsl: `more`: the program binds nothing at @group(0) @binding(30)"],
+        );
+        says(
+            &[("bindings.wgsl", "var<uniform> camera", "var<storage, read> camera")],
+            &["bindings.wgsl: `camera` is `var<storage, read>`; @group(0) @binding(1) must be `var<uniform>`"],
+        );
+        says(
+            &[("bindings.wgsl", "texels: array<u32>", "texels: array<u32, 16>")],
+            &["bindings.wgsl: `texels` is `array<u32, 16>` and must be `array<u32>`"],
+        );
+        // A buffer that is only read, and not needed, may go.
+        says(&[("bindings.wgsl", "", "// nothing")], &[]);
+    }
+
+    #[test]
+    fn records_must_be_laid_out_as_the_program_writes_them() {
+        says(
+            &[("layout.wgsl", "    right: vec3f,", "    more: f32, right: vec3f,")],
+            &["bindings.wgsl: `camera` is not laid out .. `camera.more` is `f32` and must be `vec3<f32>`"],
+        );
+        says(
+            &[
+                ("layout.wgsl", "    width: u32,", "    height: u32,"),
+                (
+                    "layout.wgsl",
+                    "    height: u32,\n    forward",
+                    "    width: u32,\n    forward",
+                ),
+            ],
+            &["bindings.wgsl: `camera.height` is at byte 28 and must be at byte 44"],
+        );
+        says(
+            &[("layout.wgsl", "    seed: u32,", "    seed: u32, more: vec4f,")],
+            &["bindings.wgsl: `camera.more` is not there"],
+        );
+    }
+
+    #[test]
+    fn constants_must_be_those_that_the_program_sets() {
+        says(
+            &[(
+                "specialization.wgsl",
+                "override NORMAL_MAPS: u32;",
+                "const NORMAL_MAPS = 0u;",
+            )],
+            &["specialization.wgsl: `override NORMAL_MAPS: u32;` is missing"],
+        );
+        says(
+            &[(
+                "specialization.wgsl",
+                "override NORMAL_MAPS",
+                "@id(7) override NORMAL_MAPS",
+            )],
+            &["specialization.wgsl: `NORMAL_MAPS` must be `override NORMAL_MAPS: u32;`"],
+        );
+        says(
+            &[("specialization.wgsl", "", "override MINE: f32;")],
+            &["specialization.wgsl: `MINE` has no value"],
+        );
+        says(&[("specialization.wgsl", "", "override MINE: f32 = 2.0;")], &[]);
+    }
+
+    #[test]
+    fn results_must_be_written() {
+        says(
+            &[(RENDER, "    sign(local);\n", "")],
+            &[
+                "kernels/render.wgsl: `render` never writes `receipt`, which the program reads: every pixel must end with `sign(local)`",
+            ],
+        );
+        says(
+            &[(AOV, "first_hits[place.y * work.film_size.x + place.x] =", "let hit =")],
+            &["kernels/aov.wgsl: `aov` never writes `first_hits`"],
+        );
+    }
+
+    /// Whatever naga calls things by, a person is not told numbers of what is in its tables.
+    #[test]
+    fn messages_name_what_is_in_the_source() {
+        let with = |body: &str| {
+            said(&[(
+                "phong.wgsl",
+                "",
+                &format!("fn wrong(a: f32, b: vec3f, n: u32) {{\n    {body}\n}}"),
+            )])
+        };
+        for (body, wanted) in [
+            ("if n { }", "the condition `n` of type `u32` must be `bool`"),
+            (
+                "let x = b + vec2f();",
+                "`b` of type `vec3<f32>` and `vec2f()` of type `vec2<f32>` do not go together",
+            ),
+            ("let x = !a;", "`a` of type `f32` cannot be the operand"),
+            (
+                "let x = wronged(a, a, n); }\nfn wronged(a: f32, b: vec3f, n: u32) -> f32 { return a;",
+                "`wronged`: argument 2, `a` of type `f32`, must be `vec3<f32>`",
+            ),
+            ("return a;", "`a` of type `f32` is returned where nothing is declared"),
+            (
+                "var x = film;",
+                "`x`: type `array<vec4<f32>>` cannot be that of a variable",
+            ),
+            (
+                "let x = select(a, a, n);",
+                "the condition of `select` must be `bool`, not `u32`",
+            ),
+            ("let x = vec3f(1.0, 2u, 3.0);", "value 2 has a type that does not fit"),
+            ("let x = n << 40u;", "a shift by more bits than `u32` has"),
+            ("let x = lights[a].area;", "Accessing with index `a`"),
+            ("materials[0].shininess = a;", "`materials[0].shininess`"),
+            ("break;", "outside of a `loop`"),
+            ("let x = all(b);", "`b`"),
+            ("let x = b == camera;", "`camera` of type `Camera` do not go together"),
+            ("let x = camera == camera;", "Incompatible operands"),
+        ] {
+            let said = with(body);
+            // `film` is in two kernels only: in the third it is another mistake.
+            let line = said
+                .iter()
+                .find(|line| line.contains(wanted))
+                .unwrap_or_else(|| panic!("{body}: {said:?}"));
+            let message = line.split_once(' ').unwrap().1;
+            assert!(line.starts_with("phong.wgsl:"), "{line}");
+            let numbered = message
+                .as_bytes()
+                .windows(2)
+                .any(|pair| pair[0] == b'[' && pair[1].is_ascii_digit());
+            assert!(
+                !(numbered && !message.contains("materials[0]")) && !message.contains("Some("),
+                "{line}"
+            );
+        }
+    }
 }

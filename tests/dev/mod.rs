@@ -1,6 +1,11 @@
 //! The development mode without a browser: whatever happens to the files, the picture is the one that `render` makes of
 //! what they say last, or the last good one with the error beside it.
 
+mod faults;
+mod kernels;
+mod large;
+mod measure;
+mod pauses;
 mod reload;
 mod responsive;
 mod running;

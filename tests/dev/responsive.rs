@@ -7,7 +7,7 @@ use wgray::dev::{Command, Move};
 use super::running::{Files, LONGEST, SCENE};
 
 /// A scene so heavy that nobody waits for all of it.
-fn heavy() -> String {
+pub fn heavy() -> String {
     let large = SCENE
         .replace("width = 40", "width = 1200")
         .replace("height = 30", "height = 900");

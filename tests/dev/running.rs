@@ -173,6 +173,7 @@ impl Running {
         let settings = Settings {
             sources,
             device: Choice::Auto,
+            only_for_viewers: out.is_some(), // a file needs the picture as a viewer does
             out,
             report: Box::new(|_| ()),
         };

@@ -143,6 +143,34 @@ fn the_server_answers_its_own_pages_only() {
 }
 
 #[test]
+fn half_a_request_is_given_up_and_keeps_nobody_out() {
+    let files = Files::new(SCENE);
+    let listener = Listener::open("127.0.0.1:0").unwrap();
+    let address = listener.address().unwrap();
+    // It serves as long as the program runs.
+    let session: &'static Running = Box::leak(Box::new(files.start()));
+    std::thread::spawn(move || listener.serve(&session.session).unwrap());
+    let halves = [
+        "",
+        "GET / HTTP/1.1\r\nHost: ",
+        &format!("POST / HTTP/1.1\r\nHost: {address}\r\nContent-Length: 9\r\n\r\nx"),
+    ];
+    let open: Vec<TcpStream> = (0..70)
+        .map(|i| {
+            let mut stream = TcpStream::connect(address).unwrap();
+            stream.set_read_timeout(Some(LONGEST)).unwrap();
+            stream.write_all(halves[i % 3].as_bytes()).unwrap();
+            stream
+        })
+        .collect();
+    assert_eq!(ask(address, &get("/", &address.to_string(), "")).0, "HTTP/1.1 200 OK");
+    for mut stream in open {
+        let end = stream.read_to_end(&mut Vec::new());
+        assert!(end.is_ok() || end.is_err_and(|error| error.kind() == std::io::ErrorKind::ConnectionReset));
+    }
+}
+
+#[test]
 fn what_cannot_be_listened_on_is_told() {
     let taken = Listener::open("127.0.0.1:0").unwrap();
     let place = taken.address().unwrap().to_string();

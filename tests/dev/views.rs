@@ -57,12 +57,40 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
     assert!(!notice.bad && notice.text.contains("scene.toml"), "{}", notice.text);
     std::thread::sleep(SETTLED);
     assert_eq!(running.revision(), revision, "nothing was rendered again");
-    // Whoever edits the file's camera sees that one.
-    running.session.send(Command::Move(Move::Orbit(0.4, 0.2)));
-    running.wait_done(revision);
-    files.edit("scene.toml", "fov = 40", "fov = 44");
+    // The save is taken back: the file's text is what it was, and the view stays.
+    assert!(running.state().can_undo);
+    running.session.send(Command::UndoSave);
+    running.wait("the file to be as it was", |running| {
+        (running.state().camera_moved && !running.state().can_undo).then_some(())
+    });
+    assert_eq!(files.read("scene.toml"), SCENE);
+    std::thread::sleep(SETTLED);
+    assert_eq!((running.colors(), running.state().camera_moved), (shown, true));
+    running.session.send(Command::UndoSave);
+    running.session.send(Command::SaveCamera);
+    running.wait("the camera to be the file's", |running| {
+        (!running.state().camera_moved).then_some(())
+    });
+    assert_eq!(files.read("scene.toml"), saved);
+}
+
+#[test]
+fn an_edit_of_the_file_changes_of_a_moved_camera_what_it_changes() {
+    let files = Files::new(SCENE);
+    let running = files.start();
     running.wait_rendered(&files);
-    assert!(!running.state().camera_moved);
+    running.session.send(Command::Move(Move::Orbit(0.4, 0.2)));
+    running.wait_done(running.revision());
+    let moved = running.state().camera.clone();
+    files.edit("scene.toml", "fov = 40", "fov = 44");
+    let wide = moved.replace("fov = 40", "fov = 44");
+    running.wait("the moved camera with another field", |running| {
+        (running.state().camera == wide).then_some(())
+    });
+    assert!(running.state().camera_moved);
+    files.edit("scene.toml", "position = [0, -4, 1]", "position = [0, -5, 1]");
+    running.wait_rendered(&files);
+    assert!(!running.state().camera_moved, "nothing of the move is left");
 }
 
 #[test]

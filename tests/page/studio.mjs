@@ -117,8 +117,8 @@ export class Studio {
   }
 
   // Starts the program; resolves once it says where the page is.
-  async start(port = 0) {
-    const args = ["dev", "scene.toml", "--shaders", "shaders", "--listen", `127.0.0.1:${port}`];
+  async start(port = 0, more = []) {
+    const args = ["dev", "scene.toml", "--shaders", "shaders", "--listen", `127.0.0.1:${port}`, ...more];
     this.program = spawn(PROGRAM, args, { cwd: this.folder, stdio: ["ignore", "inherit", "pipe"] });
     this.said = "";
     const found = new Promise((resolve, reject) => {
@@ -186,22 +186,11 @@ export async function finished(page, after = 0) {
   return handle.jsonValue();
 }
 
-// Waits until nothing on the page changes any more and the picture is finished.
-export async function settled(page) {
-  const now = () =>
-    page.evaluate(() => {
-      const { revision, done } = document.getElementById("panels").dataset;
-      return [revision, done, document.getElementById("camera-text").innerText].join();
-    });
-  const deadline = Date.now() + LONGEST;
-  let [last, alike] = ["", 0];
-  while (alike < 5) {
-    assert.ok(Date.now() < deadline, "the page does not settle");
-    await page.waitForTimeout(80);
-    const seen = await now();
-    alike = seen === last && seen.includes("true") ? alike + 1 : 0;
-    last = seen;
-  }
+// Waits until all that was done on the page, and so many commands of anybody, is on its screen, finished; returns how many
+// commands that is.
+export async function settled(page, commands = 0) {
+  await page.waitForFunction((commands) => window.isSettled(commands), commands);
+  return page.evaluate(() => Number(document.getElementById("panels").dataset.heard));
 }
 
 export function revision(page) {

@@ -10,10 +10,17 @@ let [received, drawn] = [0, 0]; // numbers of frames, so that a late one is not 
 let pixelAsked = null; // the pixel that an answer is waited for
 let pixelWanted = null;
 let noticesSeen = null;
+let numberShown = 0; // the number of the frame on the screen
+let [unanswered, asked] = [0, 0]; // commands that have no number yet, and the number of the last that has
 
 function ask(command) {
-  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
+  if (socket?.readyState !== WebSocket.OPEN) return;
+  if (!command.pixel) unanswered++;
+  socket.send(JSON.stringify(command));
 }
+
+// Whether the program has followed all that was asked for here.
+const isHeard = () => unanswered === 0 && state !== null && state.heard >= asked;
 
 const picture = new Picture([...document.querySelectorAll("#panels figure")], ask, readPixel, (fits, scale) => {
   const percent = `${Math.round(scale * 100)} %`;
@@ -27,6 +34,7 @@ function connect() {
   socket.onopen = () => {
     showLink("live", "live");
     [pixelAsked, noticesSeen] = [null, null];
+    [unanswered, asked, numberShown] = [0, 0, 0];
   };
   socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : showFrame(data));
   socket.onclose = () => {
@@ -38,7 +46,12 @@ function connect() {
 function hear(message) {
   if (message.state) showState(message.state);
   else if (message.pixel) showPixel(message.pixel);
-  else if (message.refused) showNotice(message.refused, true);
+  else if (message.asked || message.refused) {
+    unanswered--;
+    asked = message.asked ?? asked;
+    if (message.refused) showNotice(message.refused, true);
+    if (isHeard()) showChoices(state);
+  }
 }
 
 // A frame: the length of its header, the header as JSON, and the PNG files that it counts.
@@ -61,11 +74,18 @@ async function showFrame(data) {
   if (first && state) showProblems(state.problems);
   showProgress(header);
   readPixel(picture.cursor);
+  numberShown = header.number;
   // For whoever wants to know by script what is on the screen.
   Object.assign(element("panels").dataset, {
     revision: header.revision, view: header.view, samples: header.samples, done: header.done,
   });
 }
+
+// Whether all that was asked for here, and so many commands of anybody, is on the screen, and nothing more will come of
+// it. For whoever drives the page by script.
+window.isSettled = (commands) =>
+  isHeard() && state.heard >= commands && picture.isSettled() && !state.busy && state.frame > 0 &&
+  numberShown >= state.frame;
 
 function showProgress(header) {
   const { samples, total, done, speed, differing, view } = header;
@@ -74,6 +94,10 @@ function showProgress(header) {
   element("samples").textContent = counts ? `${samples} of ${total}` : "1 ray a pixel";
   element("speed").textContent = counts && speed ? withPrefix(speed) : "–";
   element("size").textContent = `${header.width} × ${header.height}`;
+  const [shownWidth, shownHeight] = header.finest;
+  element("smaller").parentElement.hidden = shownWidth === header.width && shownHeight === header.height;
+  element("smaller").textContent = `${shownWidth} × ${shownHeight}; wgray render makes the whole one`;
+  showFaults(header);
   if (header.latency !== null) element("latency").textContent = seconds(header.latency);
   const verdict = element("differing");
   if (differing) {
@@ -81,7 +105,8 @@ function showProgress(header) {
     const at = done ? "" : ` so far`;
     verdict.className = pixels ? "differ" : "same";
     verdict.textContent = pixels
-      ? `${pixels.toLocaleString("en")} ${pixels === 1 ? "pixel differs" : "pixels differ"}${at}, by ${largest?.toPrecision(3) ?? "no number"} at most`
+      ? `${pixels.toLocaleString("en")} ${pixels === 1 ? "pixel differs" : "pixels differ"}${at}, ${
+        largest === null ? "some by no finite number" : `by ${largest.toPrecision(3)} at most`}`
       : `0 pixels differ${at}: all bits are the same`;
   } else if (view === "compare") {
     verdict.className = "";
@@ -89,8 +114,23 @@ function showProgress(header) {
   }
 }
 
+// Pixels that are no light, "GPU: 3 pixels are NaN, 1 infinite"; rings lead to them.
+function showFaults({ faults, width, height, sent }) {
+  const names = { picture: "", gpu: "GPU: ", cpu: "CPU: " };
+  const told = faults.map(([part, found]) => {
+    const counts = ["nan", "infinite", "negative"].filter((kind) => found[kind]).map((kind) => {
+      return `${found[kind].toLocaleString("en")} ${kind === "nan" ? "NaN" : kind}`;
+    });
+    return counts.length ? `${names[part]}${counts.join(", ")}` : "";
+  }).filter(Boolean);
+  element("faults").hidden = !told.length;
+  const all = (width / sent[0]) * (height / sent[1]) > 1.5 ? "Pixels so far" : "Pixels";
+  element("fault-counts").textContent = told.length ? `${all} that are no light: ${told.join("; ")}` : "";
+}
+
 function showState(next) {
   state = next;
+  element("panels").dataset.heard = next.heard;
   document.title = `${next.problems.length ? "✗ " : ""}${next.scene} – wgray`;
   element("scene").textContent = next.scene;
   element("device").textContent = next.device;
@@ -101,16 +141,29 @@ function showState(next) {
   element("moved").hidden = !next.camera_moved;
   element("save").disabled = element("reset").disabled = !next.camera_moved;
   element("compare").hidden = next.view !== "compare";
-  element("gain").value = next.gain;
+  element("undo").hidden = !next.can_undo;
+  picture.marks = next.marks;
   element("gain-shown").textContent = `× ${next.gain}`;
-  for (const input of document.querySelectorAll("input[name=view]")) input.checked = input.value === next.view;
+  // What is older than a choice must not undo it.
+  if (isHeard()) showChoices(next);
   showProblems(next.problems);
   const { number = 0, text, bad } = next.notice ?? {};
   if (noticesSeen !== null && number > noticesSeen) showNotice(text, bad);
   noticesSeen = number;
 }
 
+function showChoices({ view, gain, marks }) {
+  for (const input of document.querySelectorAll("input[name=view]")) input.checked = input.value === view;
+  element("gain").value = gain;
+  element("marks").checked = marks;
+}
+
+let problemsShown = "";
 function showProblems(problems) {
+  // What is read or selected stays as it is.
+  const all = JSON.stringify([problems, Boolean(picture.header)]);
+  if (all === problemsShown) return;
+  problemsShown = all;
   const make = (tag, text) => Object.assign(document.createElement(tag), { textContent: text });
   const articles = problems.map((problem) => {
     const article = document.createElement("article");
@@ -194,6 +247,8 @@ const choose = (name, value) => {
 
 element("views").addEventListener("change", (event) => ask({ view: event.target.value }));
 element("gain").addEventListener("change", (event) => ask({ gain: Number(event.target.value) }));
+element("marks").addEventListener("change", (event) => ask({ marks: event.target.checked }));
+element("undo").addEventListener("click", () => ask("undo_save"));
 element("copy").addEventListener("click", copyCamera);
 element("save").addEventListener("click", () => ask("save_camera"));
 element("reset").addEventListener("click", () => ask("reset_camera"));

@@ -13,6 +13,7 @@ export class Picture {
     this.zoomed = zoomed;
     this.tool = () => "orbit";
     this.header = null;
+    this.marks = true; // whether pixels that are no light get rings
     // Screen pixels per picture pixel, or null to fit; the picture's point in the middle of a panel.
     this.scale = null;
     this.middle = [0, 0];
@@ -56,6 +57,11 @@ export class Picture {
     const half = [panel.canvas.clientWidth / 2, panel.canvas.clientHeight / 2];
     this.middle = fixed.map((v, i) => v - (at[i] - half[i]) / this.scale);
     this.#schedule();
+  }
+
+  // Whether what the user did has been asked for and drawn.
+  isSettled() {
+    return !this.scheduled;
   }
 
   // Reads the pixel beside the last one read.
@@ -110,6 +116,7 @@ export class Picture {
       context.imageSmoothingEnabled = sent[0] < width || (side < 4 && !Number.isInteger(side));
       context.imageSmoothingQuality = "high";
       context.drawImage(image, 0, 0, width * view.scale, height * view.scale);
+      if (this.marks && view.scale < 4) this.#ring(context, panel, view);
       if (this.cursor && view.scale >= 6) {
         context.lineWidth = 1;
         for (const [color, inset] of [["#000", 0], ["#fff", 1]]) {
@@ -122,6 +129,21 @@ export class Picture {
     }
     const shown = this.#visible();
     if (shown) this.zoomed(this.scale === null, this.#view(shown).scale);
+  }
+
+  // Rings around pixels that are no light: one among a million is not overlooked.
+  #ring(context, panel, view) {
+    const { width, height, sent, faults } = this.header;
+    const places = faults.find(([part]) => part === panel.part)?.[1].places ?? [];
+    for (const [x, y] of places) {
+      const [cx, cy] = [((x + 0.5) * width) / sent[0], ((y + 0.5) * height) / sent[1]];
+      for (const [color, lineWidth] of [["#000", 4], ["#fff", 2]]) {
+        Object.assign(context, { strokeStyle: color, lineWidth });
+        context.beginPath();
+        context.arc(cx * view.scale, cy * view.scale, 8, 0, 2 * Math.PI);
+        context.stroke();
+      }
+    }
   }
 
   #listen(panel) {

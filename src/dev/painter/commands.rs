@@ -21,9 +21,11 @@ impl Painter {
                 }
             }
             Command::SaveCamera => self.save_camera(),
+            Command::UndoSave => self.undo_save(),
             Command::View(view) => {
                 self.view = view;
                 if let Some(running) = &mut self.running {
+                    running.halted = false;
                     match guarded(|| running.canvas.change_view(view)) {
                         Ok(()) => self.changed((Instant::now(), false)), // the camera may have moved meanwhile
                         Err(error) => return self.fail(&error),
@@ -36,6 +38,12 @@ impl Painter {
             Command::Gain(gain) => {
                 self.gain = gain.clamp(1.0, 1e9);
                 if self.view == View::Compare && self.running.is_some() {
+                    self.show();
+                }
+            }
+            Command::Marks(marks) => {
+                self.marks = marks;
+                if self.running.is_some() {
                     self.show();
                 }
             }
@@ -54,20 +62,46 @@ impl Painter {
 
     fn camera_moved(&mut self) {
         self.camera_waits = true;
+        if let Some(running) = &mut self.running {
+            running.halted = false;
+        }
         self.since.get_or_insert((Instant::now(), false));
     }
 
     fn save_camera(&mut self) {
         let Some(loaded) = &self.loaded else { return };
         let camera = self.camera.as_ref().unwrap_or(&loaded.camera);
-        let result = save_camera(&self.sources.scene, camera);
-        let (text, bad) = match &result {
-            Ok(()) => (format!("camera saved into {}", self.sources.scene.display()), false),
+        let result = save_camera(&self.sources.scene, camera).map(|saved| {
+            self.saved = saved.or(self.saved.take());
+        });
+        self.notice(&result, format!("camera saved into {}", self.sources.scene.display()));
+        (self.report)(Report::Saved(result));
+    }
+
+    /// Takes the last save back; the camera stays where it is.
+    fn undo_save(&mut self) {
+        let (Some(saved), Some(loaded)) = (self.saved.take(), &self.loaded) else {
+            return;
+        };
+        let result = saved.undo();
+        if result.is_ok() {
+            self.camera.get_or_insert_with(|| loaded.camera.clone());
+            self.taken_back = true;
+        }
+        self.notice(
+            &result,
+            format!("{} is as it was before the save", self.sources.scene.display()),
+        );
+        (self.report)(Report::Unsaved(result));
+    }
+
+    fn notice(&mut self, result: &Result<(), String>, good: String) {
+        let number = self.state.notice.as_ref().map_or(0, |notice| notice.number) + 1;
+        let (text, bad) = match result {
+            Ok(()) => (good, false),
             Err(error) => (error.clone(), true),
         };
-        let number = self.state.notice.as_ref().map_or(0, |notice| notice.number) + 1;
         self.state.notice = Some(Notice { number, text, bad });
-        (self.report)(Report::Saved(result));
     }
 
     /// The camera that is looked through, for a scene.

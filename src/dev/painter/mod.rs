@@ -1,24 +1,26 @@
 //! What a session does with what happens: decides what is rendered, compiled, shown and told.
 
 mod commands;
+mod kernels;
 mod show;
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
 use self::show::Problems;
-use super::build::{Builder, Built, Request, guarded};
+use super::build::{Builder, Request, guarded};
+use super::camera::merged;
 use super::canvas::Canvas;
-use super::diagnostic::Diagnostic;
 use super::messages::{Event, Report, State};
 use super::picture::{Frame, View};
-use super::source::{Constants, Loaded, Snapshot, Sources, constants};
-use crate::error::{RenderError, ShaderError};
+use super::save::Saved;
+use super::source::{Constants, Loaded, Snapshot, Sources, Stamp, constants};
+use crate::gpu::Device;
 use crate::gpu::compose::Shaders;
-use crate::gpu::{Device, Gpu};
 use crate::scene::CameraDescription;
 
 /// Pictures of more samples are shown no more often than this, and a tenth of the time is spent on them at most.
@@ -33,6 +35,8 @@ pub struct Painter {
     sources: Sources,
     builder: Builder,
     out: Option<PathBuf>,
+    /// How many look, if nothing is rendered while nobody does.
+    looking: Option<Arc<AtomicUsize>>,
     /// The picture that the file was last written for.
     written: Option<u64>,
     report: Box<dyn Fn(Report) + Send>,
@@ -44,10 +48,12 @@ pub struct Painter {
     loaded: Option<Arc<Loaded>>,
     /// The newest shaders that could be read.
     shaders: Option<Arc<Shaders>>,
-    /// The last shaders that could be rendered with.
+    /// The last shaders that made a picture.
     good: Option<Arc<Shaders>>,
     /// Shaders that were refused for these constants.
     refused: Vec<(Arc<Shaders>, Constants)>,
+    /// The last that were refused because the driver cut them short: in another scene it may not.
+    cut: Option<(Arc<Shaders>, Constants)>,
     device: Option<Device>,
     running: Option<Running>,
     pending: Option<Pending>,
@@ -59,9 +65,20 @@ pub struct Painter {
     camera: Option<CameraDescription>,
     /// Whether it moved since the picture was begun.
     camera_waits: bool,
+    /// The last save of a camera, while it can be taken back.
+    saved: Option<Saved>,
+    /// Whether it was, and the file has not been read again.
+    taken_back: bool,
     view: View,
     gain: f32,
+    marks: bool,
+    /// The sizes that were told last, asked for and shown, of a picture that is too large.
+    smaller: Option<([u32; 2], [u32; 2])>,
 
+    /// Counts the commands that were followed.
+    heard: u64,
+    /// Counts the frames.
+    frames: u64,
     /// Counts the pictures.
     revision: u64,
     /// When the change was noticed that the picture does not show yet, and whether a file was saved.
@@ -78,6 +95,8 @@ pub struct Painter {
 
 struct Running {
     canvas: Canvas,
+    /// Whether the driver cuts it short: it rests until something changes.
+    halted: bool,
     shaders: Arc<Shaders>,
     constants: Constants,
 }
@@ -95,6 +114,7 @@ impl Painter {
         device: Device,
         builder: Builder,
         out: Option<PathBuf>,
+        looking: Option<Arc<AtomicUsize>>,
         report: Box<dyn Fn(Report) + Send>,
         state_sender: watch::Sender<Arc<State>>,
         frame_sender: watch::Sender<Option<Arc<Frame>>>,
@@ -110,6 +130,7 @@ impl Painter {
             sources,
             builder,
             out,
+            looking,
             written: None,
             report,
             state_sender,
@@ -119,6 +140,7 @@ impl Painter {
             shaders: None,
             good: None,
             refused: Vec::new(),
+            cut: None,
             device: Some(device),
             running: None,
             pending: None,
@@ -127,8 +149,14 @@ impl Painter {
             problems: Problems::default(),
             camera: None,
             camera_waits: false,
+            saved: None,
+            taken_back: false,
             view: View::default(),
             gain: GAIN,
+            marks: true,
+            smaller: None,
+            heard: 0,
+            frames: 0,
             revision: 0,
             since: None,
             latency: None,
@@ -144,7 +172,14 @@ impl Painter {
         match event {
             Event::Files(snapshot, noticed) => self.take_files(*snapshot, noticed),
             Event::Built(built) => self.take_built(*built),
-            Event::Command(command) => self.take_command(command),
+            Event::Command(command) => {
+                self.take_command(command);
+                self.heard += 1;
+            }
+            Event::Viewers => {
+                // Nobody has waited for the picture until now.
+                self.since = self.since.map(|(_, saved)| (Instant::now(), saved));
+            }
             #[cfg(test)]
             Event::Lose => self.device.iter().for_each(Device::destroy),
             Event::Stop => {}
@@ -153,11 +188,22 @@ impl Painter {
     }
 
     fn take_files(&mut self, snapshot: Snapshot, noticed: Instant) {
+        if let Some((_, Stamp::Content(content))) = snapshot.files.first()
+            && self.saved.as_ref().is_some_and(|saved| !saved.is(content))
+        {
+            self.saved = None; // nothing of the save is there to be taken back
+        }
         match snapshot.scene {
             Ok(loaded) => {
                 self.problems.scene = None;
-                if self.loaded.as_ref().is_some_and(|old| old.camera != loaded.camera) {
-                    self.camera = None; // whoever changes the file's camera wants to see it
+                // Whoever changes the file's camera wants to see it; what a save has written and is taken back was on screen.
+                if let (Some(camera), Some(old), false) = (&self.camera, &self.loaded, self.taken_back) {
+                    self.camera = merged(camera, &old.camera, &loaded.camera);
+                }
+                self.taken_back = false;
+                if self.loaded.as_ref().is_some_and(|old| old.packed != loaded.packed) {
+                    let cut = self.cut.take();
+                    self.refused.retain(|known| Some(known) != cut.as_ref());
                 }
                 self.loaded = Some(loaded);
             }
@@ -191,7 +237,7 @@ impl Painter {
     fn settle(&mut self, since: (Instant, bool)) {
         let Some((loaded, shaders)) = self.wanted() else { return };
         if self.shaders.as_ref() == Some(&shaders) {
-            self.problems.shader = None;
+            self.problems.shader.clear();
         }
         let constants = constants(&loaded.packed);
         let fits = |known: &Arc<Shaders>, of| *known == shaders && constants == of;
@@ -237,6 +283,7 @@ impl Painter {
             self.since = None;
             return;
         }
+        running.halted = false;
         match guarded(|| running.canvas.update(&packed, view)) {
             Ok(true) => self.begun(since),
             Ok(false) => {} // it fits, so this cannot be
@@ -247,6 +294,7 @@ impl Painter {
     /// A picture has been begun, by the camera as it is now.
     fn begun(&mut self, since: (Instant, bool)) {
         self.camera_waits = false;
+        self.tell_size();
         self.changed(since);
     }
 
@@ -256,99 +304,23 @@ impl Painter {
         self.since.get_or_insert(since);
     }
 
-    fn take_built(&mut self, built: Built) {
-        let pending = match self.pending.take() {
-            Some(pending) if pending.id == built.id => pending,
-            other => {
-                self.pending = other; // the result is late: files were saved while it was made
-                let _ = guarded(|| {
-                    drop(built.result);
-                    Ok(())
-                });
-                return;
-            }
-        };
-        if let Some(error) = &built.refused {
-            self.refuse(&pending, Some(error));
-        }
-        match built.result {
-            Ok((gpu, shaders)) => {
-                self.state.compile_seconds = Some(built.took.as_secs_f64());
-                self.compiled = self.state.compile_seconds;
-                self.run(*gpu, shaders, pending.constants);
-            }
-            Err(RenderError::Shader(error)) => {
-                self.refuse(&pending, Some(&error));
-                self.since = None;
-                self.settle((Instant::now(), true)); // the scene may have changed meanwhile: the running kernel shows that
-            }
-            Err(error) => {
-                let (view, running) = (self.view, &mut self.running);
-                let lives = |running: &mut Running| guarded(|| running.canvas.content(view)).is_ok();
-                if running.as_mut().is_some_and(lives) {
-                    // The driver refuses what naga does not; the device is well.
-                    self.refuse(&pending, None);
-                    self.problems.device = Some((&error).into());
-                    self.since = None;
-                    self.settle((Instant::now(), true));
-                } else {
-                    self.fail(&error);
-                }
-            }
-        }
-    }
-
-    /// Starts to render with a kernel.
-    fn run(&mut self, mut gpu: Gpu, shaders: Arc<Shaders>, constants: Constants) {
-        let Some(loaded) = self.loaded.clone() else { return };
-        let info = &gpu.device().info;
-        self.state.device = format!("{}, {}", info.name, info.driver);
-        self.device = Some(gpu.device().clone());
-        let (packed, view) = (self.packed(&loaded), self.view);
-        self.stop_running();
-        let canvas = guarded(|| {
-            gpu.update(&packed)?; // the scene may have changed since it was uploaded
-            Canvas::new(gpu, packed, view)
-        });
-        match canvas {
-            Ok(canvas) => {
-                self.good = Some(shaders.clone());
-                self.running = Some(Running {
-                    canvas,
-                    shaders,
-                    constants,
-                });
-                self.problems.device = None;
-                self.begun((Instant::now(), true));
-            }
-            Err(error) => self.fail(&error),
-        }
-    }
-
-    /// Remembers that shaders are wrong for a scene like this, so that they are not tried again.
-    fn refuse(&mut self, pending: &Pending, error: Option<&ShaderError>) {
-        self.refused.push((pending.shaders.clone(), pending.constants));
-        self.problems.shader = error.map(|error| self.of_shader(error));
-    }
-
-    /// A shader's error, with the path by which the user knows the file.
-    fn of_shader(&self, error: &ShaderError) -> Diagnostic {
-        let mut problem = Diagnostic::from(error);
-        if let (Some(folder), Some(place)) = (&self.sources.shaders, &mut problem.place)
-            && place.contains(".wgsl:")
-        {
-            *place = folder.join(&*place).display().to_string();
-        }
-        problem
-    }
-
     /// Whether [`work`](Self::work) has anything to do.
     pub fn has_work(&self) -> bool {
-        self.running.as_ref().is_some_and(|running| {
-            let more = !running.canvas.is_done(self.view);
-            // While a kernel is compiled the processor is left to the compiler, but for the camera.
-            self.camera_waits || (more && (self.pending.is_none() || running.canvas.is_new()))
-        })
+        if self
+            .looking
+            .as_ref()
+            .is_some_and(|looking| looking.load(Ordering::SeqCst) == 0)
+        {
+            return false;
+        }
+        self.running
+            .as_ref()
+            .filter(|running| !running.halted)
+            .is_some_and(|running| {
+                let more = !running.canvas.is_done(self.view);
+                // While a kernel is compiled the processor is left to the compiler, but for the camera.
+                self.camera_waits || (more && (self.pending.is_none() || running.canvas.is_new()))
+            })
     }
 
     /// Does one call's worth of work.
@@ -374,28 +346,5 @@ impl Painter {
             }
             Err(error) => self.fail(&error),
         }
-    }
-
-    /// The device refused something, or is lost: another one is opened, a few times.
-    fn fail(&mut self, error: &RenderError) {
-        self.stop_running();
-        self.problems.device = Some(error.into());
-        self.device = None;
-        self.pending = None;
-        self.refused.clear(); // another device may take them
-        self.failures += 1;
-        if let Some((loaded, shaders)) = self.wanted().filter(|_| self.failures <= ATTEMPTS) {
-            self.request(&loaded, shaders);
-        }
-        self.tell();
-    }
-
-    /// Gives up the running kernel. What a lost device holds may not be given back without a panic.
-    fn stop_running(&mut self) {
-        let running = self.running.take();
-        let _ = guarded(|| {
-            drop(running);
-            Ok(())
-        });
     }
 }

@@ -8,7 +8,7 @@ use crate::dev::build::guarded;
 use crate::dev::camera::text;
 use crate::dev::diagnostic::Diagnostic;
 use crate::dev::messages::Report;
-use crate::dev::picture::{Content, Frame, Header, Names, View, png_of};
+use crate::dev::picture::{Content, Frame, Header, Look, Names, View, png_of};
 use crate::dev::save::replace;
 
 /// What is wrong, by where it comes from.
@@ -16,16 +16,17 @@ use crate::dev::save::replace;
 pub struct Problems {
     pub scene: Option<Diagnostic>,
     pub files: Option<Diagnostic>,
-    pub shader: Option<Diagnostic>,
+    pub shader: Vec<Diagnostic>,
+    /// The picture cannot be rendered whole.
+    pub cut: Option<Diagnostic>,
     pub device: Option<Diagnostic>,
     pub out: Option<Diagnostic>,
 }
 
 impl Problems {
     fn all(&self) -> impl Iterator<Item = &Diagnostic> {
-        [&self.files, &self.shader, &self.scene, &self.device, &self.out]
-            .into_iter()
-            .flatten()
+        let others = [&self.cut, &self.scene, &self.device, &self.out].into_iter().flatten();
+        self.files.iter().chain(&self.shader).chain(others)
     }
 }
 
@@ -47,7 +48,8 @@ impl Painter {
             Err(error) => return self.fail(&error),
         };
         let ([width, height], (samples, total), speed) = (canvas.size(), canvas.samples(), canvas.speed());
-        let whole = sent == [width, height] && samples > 0;
+        let finest = canvas.finest_size();
+        let whole = sent == finest && samples > 0;
         if let (Content::Color(colors), true) = (&content, whole) {
             self.write_out(|| png_of(colors), done);
         }
@@ -55,12 +57,15 @@ impl Painter {
         self.latency = since
             .map(|(noticed, _)| noticed.elapsed().as_secs_f64())
             .or(self.latency);
+        self.frames += 1;
         let header = Header {
+            number: self.frames,
             revision: self.revision,
             view,
             width,
             height,
             sent,
+            finest,
             samples,
             total,
             done,
@@ -72,11 +77,21 @@ impl Painter {
             shapes: loaded.scene.shapes.len() as u32,
             materials: loaded.materials.clone(),
         });
-        let frame = Frame::new(header, content, names.unwrap_or_default(), self.gain);
+        let bins = self.loaded.iter().flat_map(|loaded| &loaded.packed.filter_table);
+        let look = Look {
+            gain: self.gain,
+            marks: self.marks,
+            negative: bins.into_iter().any(|bin| bin.z < 0.0),
+        };
+        let frame = Frame::new(header, content, names.unwrap_or_default(), look);
         self.frame_sender.send_replace(Some(Arc::new(frame)));
         self.last_frame = Instant::now();
         self.frame_cost = start.elapsed();
         self.failures = 0;
+        self.problems.cut = None;
+        if let Some(running) = self.running.as_ref().filter(|_| done || whole) {
+            self.good = Some(running.shaders.clone());
+        }
         if let Some((noticed, saved)) = since {
             self.first_frame = saved.then_some(self.last_frame);
             if saved {
@@ -106,6 +121,21 @@ impl Painter {
         }
     }
 
+    /// Says in the terminal that the picture is too large to be shown whole; once for each size.
+    pub(super) fn tell_size(&mut self) {
+        let sizes = self
+            .running
+            .as_ref()
+            .map(|running| (running.canvas.size(), running.canvas.finest_size()));
+        let smaller = sizes.filter(|(asked, shown)| asked != shown);
+        if self.smaller != smaller {
+            self.smaller = smaller;
+            if let Some((asked, shown)) = smaller {
+                (self.report)(Report::Smaller(asked, shown));
+            }
+        }
+    }
+
     /// Tells everybody the state, where it has changed.
     pub(super) fn tell(&mut self) {
         let camera = self
@@ -121,9 +151,12 @@ impl Painter {
         }
         self.state.camera = camera.map(text).unwrap_or_default();
         self.state.camera_moved = self.camera.is_some();
+        (self.state.heard, self.state.frame) = (self.heard, self.frames);
+        self.state.busy = self.camera_waits || self.pending.is_some() || (self.running.is_some() && !self.is_done());
+        self.state.can_undo = self.saved.is_some();
         self.state.problems = problems;
         self.state.compiling = self.pending.is_some();
-        (self.state.view, self.state.gain) = (self.view, self.gain);
+        (self.state.view, self.state.gain, self.state.marks) = (self.view, self.gain, self.marks);
         if **self.state_sender.borrow() != self.state {
             self.state_sender.send_replace(Arc::new(self.state.clone()));
         }

@@ -1,0 +1,136 @@
+//! Pixels that are no light: NaN, infinite or negative. A display shows them like black or white; here they are counted
+//! and marked.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// What is wrong with a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// A value is no number.
+    Nan,
+    /// One is infinite.
+    Infinite,
+    /// One is below zero.
+    Negative,
+}
+
+impl Fault {
+    /// What is wrong with values; the worst if it is several things.
+    pub fn of(values: &[f32]) -> Option<Fault> {
+        let faults = [
+            (Fault::Nan, values.iter().any(|v| v.is_nan())),
+            (Fault::Infinite, values.iter().any(|v| v.is_infinite())),
+            (Fault::Negative, values.iter().any(|v| *v < 0.0)),
+        ];
+        faults.into_iter().find(|(_, found)| *found).map(|(fault, _)| fault)
+    }
+
+    /// The colour of its mark, which nobody takes for light.
+    pub fn color(self) -> [u8; 3] {
+        match self {
+            Fault::Nan => [255, 0, 255],
+            Fault::Infinite => [0, 255, 255],
+            Fault::Negative => [0, 255, 0],
+        }
+    }
+}
+
+/// A picture is cut into so many parts along each side; of each one place is told.
+const PARTS: usize = 8;
+
+/// How many pixels of a picture are wrong.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Faults {
+    /// Pixels with a value that is no number.
+    pub nan: usize,
+    /// Others with an infinite one.
+    pub infinite: usize,
+    /// Others with a negative one.
+    pub negative: usize,
+    /// The places of some of them, one in each part of the picture that has any.
+    pub places: Vec<[u32; 2]>,
+}
+
+impl Faults {
+    /// Those of a picture of this width.
+    pub fn count(faults: &[Option<Fault>], width: u32) -> Faults {
+        let width = width as usize;
+        let height = faults.len().div_ceil(width.max(1));
+        let mut counted = Faults::default();
+        let mut told = [false; PARTS * PARTS];
+        for (i, fault) in faults.iter().enumerate() {
+            match fault {
+                None => continue,
+                Some(Fault::Nan) => counted.nan += 1,
+                Some(Fault::Infinite) => counted.infinite += 1,
+                Some(Fault::Negative) => counted.negative += 1,
+            }
+            let (x, y) = (i % width, i / width);
+            let part = &mut told[y * PARTS / height * PARTS + x * PARTS / width];
+            if !std::mem::replace(part, true) {
+                counted.places.push([x as u32, y as u32]);
+            }
+        }
+        counted
+    }
+}
+
+/// What is wrong with each pixel. Where filters have negative lobes, `negative` values are light too.
+pub fn faults<T: Sync, const N: usize>(
+    pixels: &[T],
+    negative: bool,
+    values: impl Fn(&T) -> [f32; N] + Sync,
+) -> Vec<Option<Fault>> {
+    let fault = |pixel: &T| Fault::of(&values(pixel)).filter(|fault| !(negative && *fault == Fault::Negative));
+    pixels.par_iter().with_min_len(1024).map(fault).collect()
+}
+
+/// Paints the marks over the bytes of a picture.
+pub fn mark(rgb: &mut [u8], faults: &[Option<Fault>]) {
+    for (pixel, fault) in rgb.chunks_exact_mut(3).zip(faults) {
+        if let Some(fault) = fault {
+            pixel.copy_from_slice(&fault.color());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_of_a_pixel_counts() {
+        let (nan, inf) = (f32::NAN, f32::INFINITY);
+        for (values, fault) in [
+            ([0.0, -0.0, f32::MAX], None),
+            ([0.0, 1.0, -1e-45], Some(Fault::Negative)),
+            ([-1.0, inf, 0.0], Some(Fault::Infinite)),
+            ([-inf, 0.0, 0.0], Some(Fault::Infinite)),
+            ([-inf, 0.0, nan], Some(Fault::Nan)),
+        ] {
+            assert_eq!(Fault::of(&values), fault, "{values:?}");
+        }
+    }
+
+    #[test]
+    fn faults_are_counted_and_marked() {
+        let pixels = [[0.5; 3], [f32::NAN; 3], [f32::INFINITY; 3], [-1.0; 3]];
+        let found = faults(&pixels, false, |color| *color);
+        let counted = Faults::count(&found, 2);
+        assert_eq!((counted.nan, counted.infinite, counted.negative), (1, 1, 1));
+        assert_eq!(counted.places, [[1, 0], [0, 1], [1, 1]]);
+        let mut rgb = [7; 12];
+        mark(&mut rgb, &found);
+        assert_eq!(rgb, [7, 7, 7, 255, 0, 255, 0, 255, 255, 0, 255, 0]);
+        let allowed = faults(&pixels, true, |color| *color);
+        assert_eq!(Faults::count(&allowed, 4).negative, 0);
+        let mut many = [Some(Fault::Negative); 1000];
+        let counted = Faults::count(&many, 10);
+        assert_eq!((counted.negative, counted.places.len()), (1000, PARTS * PARTS));
+        many[10..].fill(None);
+        many[999] = Some(Fault::Nan);
+        let counted = Faults::count(&many, 10);
+        assert!(counted.places.contains(&[9, 99]), "one that is alone is not left out");
+    }
+}

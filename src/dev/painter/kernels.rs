@@ -1,0 +1,170 @@
+//! What comes of a kernel: it is run, or refused, cut short or lost, and another takes its place.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::{ATTEMPTS, Painter, Running};
+use crate::dev::build::{Built, guarded};
+use crate::dev::canvas::Canvas;
+use crate::dev::diagnostic::Diagnostic;
+use crate::dev::source::Constants;
+use crate::error::{RenderError, ShaderError};
+use crate::gpu::Gpu;
+use crate::gpu::compose::Shaders;
+
+impl Painter {
+    pub(super) fn take_built(&mut self, built: Built) {
+        let pending = match self.pending.take() {
+            Some(pending) if pending.id == built.id => pending,
+            other => {
+                self.pending = other; // the result is late: files were saved while it was made
+                let _ = guarded(|| {
+                    drop(built.result);
+                    Ok(())
+                });
+                return;
+            }
+        };
+        if let Some(errors) = &built.refused {
+            let problems = errors.0.iter().map(|error| self.of_shader(error)).collect();
+            self.refuse((pending.shaders.clone(), pending.constants), problems);
+        }
+        match built.result {
+            Some(Ok((gpu, shaders))) => {
+                self.state.compile_seconds = Some(built.took.as_secs_f64());
+                self.compiled = self.state.compile_seconds;
+                self.run(*gpu, shaders, pending.constants);
+            }
+            None => {
+                self.since = None;
+                self.settle((Instant::now(), true)); // the scene may have changed meanwhile: the running kernel shows that
+            }
+            Some(Err(error @ (RenderError::CutShort { .. } | RenderError::Shader(_)))) => {
+                let tried = match built.refused {
+                    Some(_) => self.good.clone().unwrap_or(pending.shaders),
+                    None => pending.shaders,
+                };
+                self.refuse_cut((tried, pending.constants), &error);
+            }
+            Some(Err(error)) => {
+                let (view, running) = (self.view, &mut self.running);
+                let lives = |running: &mut Running| guarded(|| running.canvas.content(view)).is_ok();
+                if running.as_mut().is_some_and(lives) {
+                    // The driver refuses what naga does not; the device is well.
+                    self.refuse((pending.shaders, pending.constants), Vec::new());
+                    self.problems.device = Some((&error).into());
+                    self.since = None;
+                    self.settle((Instant::now(), true));
+                } else {
+                    self.fail(&error);
+                }
+            }
+        }
+    }
+
+    /// Starts to render with a kernel.
+    fn run(&mut self, mut gpu: Gpu, shaders: Arc<Shaders>, constants: Constants) {
+        let Some(loaded) = self.loaded.clone() else { return };
+        let info = &gpu.device().info;
+        self.state.device = format!("{}, {}", info.name, info.driver);
+        self.device = Some(gpu.device().clone());
+        let (packed, view) = (self.packed(&loaded), self.view);
+        self.stop_running();
+        let canvas = guarded(|| {
+            gpu.update(&packed)?; // the scene may have changed since it was uploaded
+            Canvas::new(gpu, packed, view)
+        });
+        match canvas {
+            Ok(canvas) => {
+                self.running = Some(Running {
+                    canvas,
+                    halted: false,
+                    shaders,
+                    constants,
+                });
+                self.problems.device = None;
+                self.begun((Instant::now(), true));
+            }
+            Err(error) => self.fail(&error),
+        }
+    }
+
+    /// Remembers that shaders are wrong for a scene like this, so that they are not tried again.
+    fn refuse(&mut self, shaders: (Arc<Shaders>, Constants), problems: Vec<Diagnostic>) {
+        self.refused.push(shaders);
+        self.problems.shader = problems;
+    }
+
+    /// What a driver does not render whole is not tried again, until the scene or the shaders are others.
+    fn refuse_cut(&mut self, shaders: (Arc<Shaders>, Constants), error: &RenderError) {
+        let problem = self.of_render(error);
+        self.cut = Some(shaders.clone());
+        self.refuse(shaders, vec![problem]);
+        self.since = None;
+        self.settle((Instant::now(), true));
+    }
+
+    /// A picture that the kernel cannot make, with what can be done.
+    fn of_render(&self, error: &RenderError) -> Diagnostic {
+        match error {
+            RenderError::Shader(error) => self.of_shader(error),
+            error => {
+                let edited = self
+                    .shaders
+                    .as_ref()
+                    .is_some_and(|shaders| **shaders != Shaders::built_in());
+                let way_out = match edited {
+                    true => "; shorten the loops, and end each kernel with `sign(local)` for every pixel",
+                    false => "",
+                };
+                Diagnostic::plain(if edited { "shader" } else { "scene" }, format!("{error}{way_out}"))
+            }
+        }
+    }
+
+    /// A shader's error, with the path by which the user knows the file.
+    fn of_shader(&self, error: &ShaderError) -> Diagnostic {
+        let mut problem = Diagnostic::from(error);
+        if let (Some(folder), Some(place)) = (&self.sources.shaders, &mut problem.place)
+            && place.contains(".wgsl:")
+        {
+            *place = folder.join(&*place).display().to_string();
+        }
+        problem
+    }
+
+    /// The device refused something, or is lost: another one is opened, a few times. Not so if it cuts the kernel short:
+    /// then the last good shaders go on, or where there are none others the picture rests.
+    pub(super) fn fail(&mut self, error: &RenderError) {
+        if let (RenderError::CutShort { .. } | RenderError::Shader(_), Some(running)) = (error, &mut self.running) {
+            if self.good.as_ref().is_some_and(|good| *good != running.shaders) {
+                let shaders = (running.shaders.clone(), running.constants);
+                self.stop_running();
+                self.refuse_cut(shaders, error);
+            } else {
+                running.halted = true;
+                self.problems.cut = Some(self.of_render(error));
+            }
+            return self.tell();
+        }
+        self.stop_running();
+        self.problems.device = Some(error.into());
+        self.device = None;
+        self.pending = None;
+        self.refused.clear(); // another device may take them
+        self.failures += 1;
+        if let Some((loaded, shaders)) = self.wanted().filter(|_| self.failures <= ATTEMPTS) {
+            self.request(&loaded, shaders);
+        }
+        self.tell();
+    }
+
+    /// Gives up the running kernel. What a lost device holds may not be given back without a panic.
+    pub(super) fn stop_running(&mut self) {
+        let running = self.running.take();
+        let _ = guarded(|| {
+            drop(running);
+            Ok(())
+        });
+    }
+}

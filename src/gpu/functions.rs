@@ -1,0 +1,117 @@
+//! Where the functions of a WGSL text are, found without a parser: the text may be wrong.
+
+use std::ops::Range;
+
+/// A function of a text, by bytes.
+pub struct FunctionText<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Where `fn` is.
+    pub start: usize,
+    /// The type that it returns, as it is written; empty if it returns nothing.
+    pub result: &'a str,
+    /// Its body with both braces.
+    pub body: Range<usize>,
+}
+
+/// The functions up to the first whose braces do not match.
+pub fn functions(text: &str) -> Vec<FunctionText<'_>> {
+    let plain = without_comments(text);
+    let mut found = Vec::new();
+    let mut at = 0;
+    while let Some(start) = next_word(&plain, at, "fn") {
+        let name = text[start + 2..].trim_start();
+        let name = &name[..name
+            .find(|c: char| !c.is_alphanumeric() && c != '_')
+            .unwrap_or(name.len())];
+        let Some(open) = plain[start..].find('{').map(|i| start + i) else {
+            break;
+        };
+        let Some(close) = closing(&plain, open) else { break };
+        let head = &plain[start..open];
+        let result = head.rfind("->").map_or("", |arrow| &text[start + arrow + 2..open]);
+        // Attributes of a result come before its type.
+        let result = result.rsplit(')').next().unwrap_or_default().trim();
+        found.push(FunctionText {
+            name,
+            start,
+            result,
+            body: open..close + 1,
+        });
+        at = close + 1;
+    }
+    found
+}
+
+/// The same bytes with blanks in place of comments.
+fn without_comments(text: &str) -> String {
+    let mut plain = text.as_bytes().to_vec();
+    let mut i = 0;
+    while i < plain.len() {
+        let rest = &text.as_bytes()[i..];
+        let length = if rest.starts_with(b"//") {
+            rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len())
+        } else if rest.starts_with(b"/*") {
+            let end = rest.windows(2).skip(2).position(|pair| pair == b"*/");
+            end.map_or(rest.len(), |end| end + 4)
+        } else {
+            i += 1;
+            continue;
+        };
+        for byte in &mut plain[i..i + length] {
+            if *byte != b'\n' {
+                *byte = b' ';
+            }
+        }
+        i += length;
+    }
+    String::from_utf8(plain).unwrap_or_default() // whole characters were replaced
+}
+
+/// Where a word is next, with no letter or digit beside it.
+fn next_word(text: &str, from: usize, word: &str) -> Option<usize> {
+    let part_of_name = |c: char| c.is_alphanumeric() || c == '_';
+    text[from..]
+        .match_indices(word)
+        .map(|(i, _)| from + i)
+        .find(|&i| !text[..i].ends_with(part_of_name) && !text[i + word.len()..].starts_with(part_of_name))
+}
+
+/// The brace that closes the one at a place.
+fn closing(text: &str, open: usize) -> Option<usize> {
+    let mut depth = 0usize;
+    for (i, byte) in text.bytes().enumerate().skip(open) {
+        match byte {
+            b'{' => depth += 1,
+            b'}' if depth == 1 => return Some(i),
+            b'}' => depth -= 1,
+            _ => {}
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn functions_are_found_whatever_is_in_comments() {
+        let text = "// fn no() {\nfn one(a: f32) -> vec3f { if a > 1.0 { /* } */ } return v; }\n\
+            @compute @workgroup_size(8) /* fn */ fn two(){}\nfn ä() -> @builtin(position) vec4f { } fn open() { {";
+        let found = functions(text);
+        let seen: Vec<_> = found
+            .iter()
+            .map(|f| (f.name, f.result, &text[f.body.clone()]))
+            .collect();
+        assert_eq!(
+            seen,
+            [
+                ("one", "vec3f", "{ if a > 1.0 { /* } */ } return v; }"),
+                ("two", "", "{}"),
+                ("ä", "vec4f", "{ }")
+            ]
+        );
+        assert!(found.iter().all(|f| text[f.start..].starts_with("fn ")));
+    }
+}

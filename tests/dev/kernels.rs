@@ -1,0 +1,127 @@
+//! Kernels that are not used now are checked too, and what a driver cuts short is told.
+
+use wgray::dev::{Command, Move, View};
+
+use super::running::{Files, KERNEL, RADIANCE, Running, SCENE};
+
+const AOV: &str = "shaders/kernels/aov.wgsl";
+const ADAPTIVE: &str = "shaders/kernels/adaptive.wgsl";
+
+fn problems(running: &Running) -> Vec<String> {
+    let state = running.state();
+    let place = |place: &Option<String>| place.clone().unwrap_or_default();
+    state
+        .problems
+        .iter()
+        .map(|problem| format!("{}: {}", place(&problem.place), problem.message))
+        .collect()
+}
+
+#[test]
+fn mistakes_in_kernels_that_are_not_used_are_told_at_once() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let good = running.colors();
+    files.edit(AOV, "fn aov", "fn avo");
+    files.edit(ADAPTIVE, "= moments;", "= moments.xyz;");
+    files.edit(KERNEL, "@workgroup_size(8, 8)", "@workgroup_size(4, 4)");
+    let told = running.wait("all problems", |running| {
+        Some(problems(running)).filter(|all| all.len() == 3)
+    });
+    for (file, words) in [
+        (AOV, "must be called `aov`"),
+        (ADAPTIVE, "`moments.xyz`"),
+        (KERNEL, "(4, 4)"),
+    ] {
+        let path = files.path(file).display().to_string();
+        assert!(
+            told.iter().any(|told| told.starts_with(&path) && told.contains(words)),
+            "{file}: {told:?}"
+        );
+    }
+    assert_eq!(running.colors(), good);
+    // The session goes on with the last good shaders, that kernel's among them.
+    let revision = running.revision();
+    running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
+    running.wait_done(revision);
+    running.session.send(Command::View(View::Normal));
+    running.wait("the normals", |running| {
+        running
+            .frame()
+            .filter(|frame| frame.header.view == View::Normal && frame.header.done)
+    });
+    assert_eq!(problems(&running).len(), 3);
+    running.session.send(Command::View(View::Color));
+    running.session.send(Command::ResetCamera);
+    files.edit(AOV, "fn avo", "fn aov");
+    files.edit(ADAPTIVE, "= moments.xyz;", "= moments;");
+    files.edit(KERNEL, "(4, 4)", "(8, 8)");
+    running.wait_rendered(&files);
+}
+
+/// Adds a million rounds to a shader, which no compiler can leave out; they change nothing.
+fn long_loop(files: &Files, file: &str, before: &str) {
+    let rounds = "var rounds = 0u;
+    for (var i = 0u; i < 1000000u + 0u * work.origin.x; i++) { rounds += (rounds ^ i) & work.proof.y; }
+    if rounds == 0xffffffffu { return; }\n    ";
+    files.edit(file, before, &format!("{rounds}{before}"));
+}
+
+#[test]
+fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
+    let small = SCENE
+        .replace("width = 40", "width = 8")
+        .replace("height = 30", "height = 8");
+    let files = Files::new(&small);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let good = running.colors();
+    let red = files.rendered();
+    assert_eq!(good, red);
+    long_loop(&files, KERNEL, "var sum = film[index];");
+    files.edit(KERNEL, RADIANCE, &format!("({RADIANCE} * vec4f(vec3f(0.5), 1.0))"));
+    let halved = |running: &Running| {
+        let colors = running.colors().colors;
+        let pairs = colors.iter().flatten().zip(good.colors.iter().flatten());
+        pairs.into_iter().all(|(new, old)| *new == old * 0.5)
+    };
+    let cut = running.wait("a problem or the whole picture", |running| {
+        let told = problems(running)
+            .iter()
+            .any(|told| told.contains("ends long loops early"));
+        let whole = running.frame().is_some_and(|frame| frame.header.done) && halved(running);
+        (told || whole).then_some(told)
+    });
+    if cut {
+        assert_eq!(running.state().problems[0].kind, "shader");
+        assert_eq!(running.colors(), good, "the last good picture stays");
+        let revision = running.revision();
+        running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
+        running.wait_done(revision);
+        running.session.send(Command::ResetCamera);
+        assert!(!problems(&running).is_empty());
+    }
+    files.write(
+        KERNEL,
+        wgray::gpu::compose::Shaders::built_in().text("kernels/render.wgsl"),
+    );
+    running.wait_rendered(&files);
+
+    // In a kernel of another view: that view is told, the picture is there.
+    long_loop(&files, AOV, "let pixel = work.origin");
+    running.wait_well();
+    running.session.send(Command::View(View::Normal));
+    running.wait("a problem or the normals", |running| {
+        let told = problems(running)
+            .iter()
+            .any(|told| told.contains("ends long loops early"));
+        let frame = running.frame()?;
+        (told || frame.header.view == View::Normal && frame.header.done).then_some(())
+    });
+    running.session.send(Command::View(View::Color));
+    running.wait_rendered(&files);
+    files.tint(0.25);
+    files.write(AOV, wgray::gpu::compose::Shaders::built_in().text("kernels/aov.wgsl"));
+    running.wait_rendered(&files);
+}

@@ -1,0 +1,43 @@
+//! Pictures that are too large to be shown are shown smaller.
+
+use wgray::dev::{Command, View};
+
+use super::running::{Files, SCENE};
+
+#[test]
+fn a_picture_that_is_too_large_is_shown_smaller() {
+    let cheap = SCENE.replace("count = 4 }", "count = 1 }");
+    for (size, longest) in [((3000, 3000), 3000), ((65_536, 1), 16_384), ((1, 65_536), 16_384)] {
+        let files = Files::new(&cheap);
+        let mut sources = files.sources();
+        sources.overrides.size = Some(size);
+        let running = super::running::Running::start(sources, None);
+        let frame = running.wait_done(0);
+        let header = &frame.header;
+        assert_eq!([header.width, header.height], [size.0, size.1]);
+        assert_eq!(header.sent, header.finest);
+        assert!(header.finest.into_iter().all(|side| side <= longest), "{header:?}");
+        assert!(
+            u64::from(header.finest[0]) * u64::from(header.finest[1]) <= 1 << 24,
+            "{header:?}"
+        );
+        assert!(frame.pixel(size.0 - 1, size.1 - 1).is_some() && frame.pixel(size.0, 0).is_none());
+        let colors = running.colors();
+        assert_eq!([colors.width, colors.height], header.finest);
+        // It is the picture of that size.
+        if size == (3000, 3000) {
+            let [width, height] = header.finest;
+            let smaller = cheap.replace("width = 40", &format!("width = {width}"));
+            let wanted = Files::new(&smaller.replace("height = 30", &format!("height = {height}"))).rendered();
+            assert!(colors == wanted, "{width} x {height}");
+        }
+        running.session.send(Command::View(View::Normal));
+        let frame = running.wait("the normals", |running| {
+            running
+                .frame()
+                .filter(|frame| frame.header.view == View::Normal && frame.header.done)
+        });
+        assert_eq!(frame.header.sent, frame.header.finest);
+        assert_eq!(running.state().problems, []);
+    }
+}
