@@ -30,7 +30,7 @@ fn blocks(scene: &Scene, primitive: &Primitive) -> bool {
         return true;
     }
     let normal = primitive.z.as_dvec3().normalize();
-    let center = primitive.center.as_dvec3();
+    let center = primitive.anchor.as_dvec3();
     let mut range = Range {
         normal,
         center,

@@ -21,6 +21,13 @@ use crate::scene::{self, Geometry, Parallelogram, Pattern, PixelFilter, PixelFil
 /// How far shadow rays to a directional light go: beyond any scene, yet small enough to be squared.
 const DISTANT: f32 = 1e10;
 
+/// Rays start at least so far above a surface, relative to the largest coordinate, 32 units of rounding: what the
+/// surface's own arithmetic and a neighbour's lose together (`docs/decisions/shadow-rays.md`).
+const LEAST_EPSILON: f64 = 32.0 / 16_777_216.0;
+
+/// Shadow rays end at least so far before a light's sample, as a part of the way: a light may lie on a surface.
+const BEFORE_LIGHT: f64 = 1e-5;
+
 /// A scene as both backends read it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Packed {
@@ -134,7 +141,7 @@ pub fn pack(scene: &Scene) -> Packed {
         camera: pack_camera(&scene.camera, scene.width, scene.height, scene.render.seed),
         environment: Environment {
             ambient: scene.render.ambient.as_vec3(),
-            shadow_epsilon: scene.render.shadow_epsilon as f32,
+            shadow_epsilon: scene.render.shadow_epsilon.max(LEAST_EPSILON) as f32,
             background: scene.render.background.as_vec3(),
             light_weight: 1.0 / light_samples.count as f32,
         },
@@ -212,7 +219,7 @@ fn exponent_bits(described: &[scene::Material], packed: &[Material]) -> u32 {
 }
 
 fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
-    let reach = (1.0 - shadow_epsilon) as f32;
+    let reach = (1.0 - shadow_epsilon.max(BEFORE_LIGHT)) as f32;
     let unit = Light {
         finite: 1.0,
         reach,
@@ -291,11 +298,19 @@ fn parallelogram(kind: u32, p: &Parallelogram, material: u32, shape: u32) -> Pri
     )
 }
 
-/// The primitive whose local space is mapped to the world by `columns` and then `center`.
+/// The primitive whose local space is mapped to the world by `columns` and then `center`. An ellipsoid's anchor is the
+/// point of it on the way from its centre to the origin.
 pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
-    let rows = columns.inverse().transpose();
+    let to_local = columns.inverse();
+    let rows = to_local.transpose();
+    let (mut anchor, mut middle) = (center.as_vec3(), DVec3::ZERO);
+    if kind == ELLIPSOID {
+        let outwards = (to_local * -center).normalize_or(DVec3::X);
+        anchor = (center + columns * outwards).as_vec3();
+        middle = to_local * (center - anchor.as_dvec3());
+    }
     Primitive {
-        center: center.as_vec3(),
+        anchor,
         material,
         x: rows.x_axis.as_vec3(),
         shape,
@@ -303,5 +318,7 @@ pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32,
         kind,
         z: rows.z_axis.as_vec3(),
         determinant: rows.determinant() as f32,
+        middle: middle.as_vec3(),
+        level: (middle.length_squared() - 1.0) as f32,
     }
 }

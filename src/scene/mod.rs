@@ -83,7 +83,7 @@ pub struct Render {
     pub ambient: DVec3,
     /// Radiance of rays that leave the scene.
     pub background: DVec3,
-    /// Offset of shadow rays, relative to the largest coordinate of their start.
+    /// How far above a surface rays start at least, relative to the largest coordinate there.
     pub shadow_epsilon: f64,
     /// Whether glass casts shadows.
     pub shadows: Shadows,

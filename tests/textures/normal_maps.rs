@@ -56,7 +56,7 @@ fn normal(scene: &Packed, primitive: usize, origin: Vec3, target: Vec3) -> Vec3 
         origin,
         direction: (target - origin).normalize(),
     };
-    let surface = surface_at(q, ray, (target - origin).length(), 1e-5);
+    let surface = surface_at(q, 0, ray, (target - origin).length(), 1e-5);
     let look = appearance(
         scene,
         q,
@@ -137,7 +137,7 @@ fn a_flat_map_changes_nothing() {
             origin,
             direction: (target - origin).normalize(),
         };
-        let plain = surface_at(q, ray, (target - origin).length(), 1e-5).normal;
+        let plain = surface_at(q, 0, ray, (target - origin).length(), 1e-5).normal;
         assert!(near(normal(&flat, 1, origin, target), plain));
     }
 }
@@ -150,7 +150,7 @@ fn mirrors_use_no_normal_that_would_lead_into_them() {
         origin: Vec3::new(5.0, 0.0, 1.0),
         direction: Vec3::new(-5.0, 0.0, -1.0).normalize(),
     };
-    let surface = surface_at(q, grazing, 26f32.sqrt(), 1e-5);
+    let surface = surface_at(q, 0, grazing, 26f32.sqrt(), 1e-5);
     let bent = normal(&map, 0, grazing.origin, Vec3::ZERO);
     assert_eq!(usable_normal(surface, bent), bent);
     let away = Vec3::new(-bent.x, 0.0, bent.z);
