@@ -21,27 +21,26 @@ fn primitive_normal(q: Primitive, local: vec3f) -> vec3f {
     return normalize(primitive_gradient(q, local));
 }
 
-// The point of a primitive next to one that is off it by rounding: a step of Newton's method.
-fn projected(q: Primitive, p: vec3f) -> vec3f {
-    let from_anchor = vector_to_local(q, p - q.anchor);
-    let height = select(from_anchor.z, 0.5 * ellipsoid_level(q, from_anchor), q.kind == ELLIPSOID);
-    let gradient = primitive_gradient(q, from_anchor - q.middle);
-    return p - gradient * (height / dot(gradient, gradient));
-}
-
 fn largest(v: vec3f) -> f32 {
     return max(max(abs(v.x), abs(v.y)), abs(v.z));
 }
 
-// Where a ray meets primitive i, which is q. The position is off the surface by a few units in the last place of its
-// coordinates and of its distance from the anchor; rays start `epsilon` times these above it.
+// Where a ray meets primitive i, which is q. A step of Newton's method takes the point back onto the primitive, so that it
+// is off it by the rounding of its coordinates and of its way from the anchor alone; rays start `epsilon` times the
+// largest of these above it.
 fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
-    let position = projected(q, ray.origin + ray.direction * t);
-    let outward = primitive_normal(q, point_to_local(q, position));
+    let met = ray.origin + ray.direction * t;
+    let way = met - q.anchor;
+    let from_anchor = vector_to_local(q, way);
+    let gradient = primitive_gradient(q, from_anchor - q.middle);
+    let inverse_slope = 1.0 / sqrt(dot(gradient, gradient));
+    let outward = gradient * inverse_slope;
+    let height = select(from_anchor.z, 0.5 * ellipsoid_level(q, from_anchor), q.kind == ELLIPSOID);
+    let position = met - outward * (height * inverse_slope);
     let inside = dot(outward, ray.direction) > 0.0;
     let side = select(1.0, -1.0, inside);
     let normal = outward * side;
-    let size = max(largest(position), largest(position - q.anchor));
+    let size = max(largest(position), largest(way));
     let start = position + normal * (epsilon * size);
     let round = q.kind == ELLIPSOID;
     let above = select(i, NOTHING, round & inside);

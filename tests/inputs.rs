@@ -121,8 +121,8 @@ impl Situation {
         let kind = random.below(4);
         // an ellipsoid's anchor is on it, or near
         let (mut middle, mut level) = (DVec3::ZERO, -1.0);
-        if kind == ELLIPSOID {
-            middle = vector(random).normalize() * random.pick(&[1.0, 1.0, 1.1]);
+        if kind == ELLIPSOID && random.once_in(2) {
+            middle = -local_point(random).normalize_or(DVec3::Z) * random.pick(&[1.0, 1.0, 1.1]);
             level = middle.length_squared() - 1.0;
         }
         let local = local_point(random);
@@ -331,7 +331,7 @@ impl Situation {
             "reach" => random.pick(&[self.light.reach, 1.0 - 1e-5, 1e10, 1.0]),
             "cosine" | "cosine_i" | "cosine_t" | "random" | "line_width" => random.unit() as f32,
             "eta" | "anisotropy" => random.magnitude(-1.0, 1.0) as f32,
-            "epsilon" => random.pick(&[1e-5, 1e-4, 0.0]),
+            "epsilon" => random.pick(&[2e-6, 1e-4, 0.0]),
             _ => {
                 let (unit, sign) = (random.unit(), random.pick(&[1.0, -1.0]));
                 random.pick(&[

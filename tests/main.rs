@@ -9,6 +9,7 @@ mod cli;
 mod culling;
 #[cfg(feature = "dev")]
 mod dev;
+mod grounds;
 mod inputs;
 mod kernel;
 mod layout;

@@ -32,7 +32,9 @@ use wgray::cpu::sampling::{
 use wgray::cpu::sequence::{halton_sample, radical_inverse_3, scramble, shuffled_index, sobol_reversed, sobol_sample};
 use wgray::cpu::shadow::{Block, Cone, block_sample, blocks, cone_to_light, may_block, shadow_bits};
 use wgray::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
-use wgray::cpu::surface::{Surface, first_hit, largest, primitive_gradient, primitive_normal, primitive_uv, projected, surface_at};
+use wgray::cpu::surface::{
+    Surface, first_hit, largest, primitive_gradient, primitive_normal, primitive_uv, surface_at,
+};
 use wgray::cpu::tangent::{Tangents, local_tangents, mapped_normal, vector_to_world};
 use wgray::cpu::texel::{gaussian_weight, level_size, near_coordinate, srgb_to_linear, unpacked_color, wrapped_index};
 use wgray::cpu::triangle::{intersect_triangle, triangle_blocks};
@@ -129,7 +131,6 @@ probes! {
     camera_ray(camera: &Camera, at: Vec2) -> Ray;
     primitive_gradient(q: &Primitive, local: Vec3) -> Vec3;
     primitive_normal(q: &Primitive, local: Vec3) -> Vec3;
-    projected(q: &Primitive, p: Vec3) -> Vec3;
     largest(v: Vec3) -> f32;
     surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface;
     primitive_uv(q: &Primitive, local: Vec3) -> Vec2;

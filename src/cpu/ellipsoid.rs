@@ -131,7 +131,10 @@ mod tests {
     #[test]
     fn what_is_behind_or_beyond_the_limit_is_no_hit() {
         let q = unit_sphere();
-        assert_eq!(intersect_ellipsoid(&q, false, ray([3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), FAR), FAR);
+        assert_eq!(
+            intersect_ellipsoid(&q, false, ray([3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), FAR),
+            FAR
+        );
         assert_eq!(
             intersect_ellipsoid(&q, false, ray([3.0, 0.0, 0.0], [-1.0, 0.0, 0.0]), 1.5),
             1.5

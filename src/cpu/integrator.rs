@@ -26,7 +26,13 @@ pub fn radiance(scene: &Packed, camera_path: Path, pixel: UVec2, sample: u32) ->
     let bounces = scene.specialization.bounces;
     let mut path = camera_path;
     if bounces == 0 {
-        return radiance_from(scene, closest_hit(scene, path.ray, NOTHING, NOTHING), path, pixel, sample);
+        return radiance_from(
+            scene,
+            closest_hit(scene, path.ray, NOTHING, NOTHING),
+            path,
+            pixel,
+            sample,
+        );
     }
     let mut sum = Vec3::ZERO;
     let mut pending = [path; SPLITS as usize];

@@ -31,7 +31,11 @@ pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light,
     let mut bits = 0;
     for i in 0..block.count {
         let d = segment(to, block_sample(block, i));
-        bits |= if blocks(kind, o, d, start, light.reach) { 1 << i } else { 0 };
+        bits |= if blocks(kind, o, d, start, light.reach) {
+            1 << i
+        } else {
+            0
+        };
     }
     bits
 }

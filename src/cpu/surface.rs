@@ -30,28 +30,27 @@ pub fn primitive_normal(q: &Primitive, local: Vec3) -> Vec3 {
     normalize(primitive_gradient(q, local))
 }
 
-pub fn projected(q: &Primitive, p: Vec3) -> Vec3 {
-    let from_anchor = vector_to_local(q, p - q.anchor);
-    let height = if q.kind == ELLIPSOID {
-        0.5 * ellipsoid_level(q, from_anchor)
-    } else {
-        from_anchor.z
-    };
-    let gradient = primitive_gradient(q, from_anchor - q.middle);
-    p - gradient * (height / dot(gradient, gradient))
-}
-
 pub fn largest(v: Vec3) -> f32 {
     max(max(v.x.abs(), v.y.abs()), v.z.abs())
 }
 
 pub fn surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
-    let position = projected(q, ray.origin + ray.direction * t);
-    let outward = primitive_normal(q, point_to_local(q, position));
+    let met = ray.origin + ray.direction * t;
+    let way = met - q.anchor;
+    let from_anchor = vector_to_local(q, way);
+    let gradient = primitive_gradient(q, from_anchor - q.middle);
+    let inverse_slope = 1.0 / dot(gradient, gradient).sqrt();
+    let outward = gradient * inverse_slope;
+    let height = if q.kind == ELLIPSOID {
+        0.5 * ellipsoid_level(q, from_anchor)
+    } else {
+        from_anchor.z
+    };
+    let position = met - outward * (height * inverse_slope);
     let inside = dot(outward, ray.direction) > 0.0;
     let side = if inside { -1.0 } else { 1.0 };
     let normal = outward * side;
-    let size = max(largest(position), largest(position - q.anchor));
+    let size = max(largest(position), largest(way));
     let round = q.kind == ELLIPSOID;
     Surface {
         position,

@@ -6,6 +6,7 @@ mod bounds;
 mod constants;
 pub mod filter;
 mod layout;
+mod origin;
 mod pyramid;
 mod specialization;
 
@@ -31,6 +32,8 @@ const BEFORE_LIGHT: f64 = 1e-5;
 /// A scene as both backends read it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Packed {
+    /// Where coordinates are counted from: a point of the scene file's space.
+    pub origin: DVec3,
     /// The camera.
     pub camera: Camera,
     /// What belongs to the scene as a whole.
@@ -67,6 +70,8 @@ impl Packed {
 
 /// Packs a scene.
 pub fn pack(scene: &Scene) -> Packed {
+    let origin = origin::origin(&scene.camera);
+    let scene = &*origin::seen_from(scene, origin);
     let appearances = Appearances::of(scene);
     let mut materials = appearances.materials.clone();
     let exponent_bits = exponent_bits(&scene.materials, &materials);
@@ -138,7 +143,8 @@ pub fn pack(scene: &Scene) -> Packed {
     };
     let primitives: Vec<Primitive> = order.into_iter().map(|(primitive, _)| primitive).collect();
     Packed {
-        camera: pack_camera(&scene.camera, scene.width, scene.height, scene.render.seed),
+        origin,
+        camera: pack_camera(&scene.camera, origin, scene.width, scene.height, scene.render.seed),
         environment: Environment {
             ambient: scene.render.ambient.as_vec3(),
             shadow_epsilon: scene.render.shadow_epsilon.max(LEAST_EPSILON) as f32,
@@ -183,15 +189,15 @@ fn side(samples: Samples) -> u32 {
     }
 }
 
-/// A camera for a picture of `width` x `height` pixels.
-pub fn pack_camera(camera: &scene::Camera, width: u32, height: u32, seed: u32) -> Camera {
+/// A camera for a picture of `width` x `height` pixels, by coordinates from `origin`.
+pub fn pack_camera(camera: &scene::Camera, origin: DVec3, width: u32, height: u32, seed: u32) -> Camera {
     let aspect = f64::from(width) / f64::from(height);
     let (projection, half_height) = match camera.projection {
         Projection::Perspective { fov } => (PERSPECTIVE, (fov / 2.0).tan()),
         Projection::Orthographic { height } => (ORTHOGRAPHIC, height / 2.0),
     };
     Camera {
-        position: camera.position.as_vec3(),
+        position: (camera.position - origin).as_vec3(),
         projection,
         right: (camera.right * half_height * aspect).as_vec3(),
         width,

@@ -48,6 +48,8 @@ pub struct Scene {
 pub struct Camera {
     /// The centre of projection; for an orthographic camera the middle of the image plane.
     pub position: DVec3,
+    /// What is in the middle of the picture.
+    pub look_at: DVec3,
     /// Unit vector to the right in the picture.
     pub right: DVec3,
     /// Unit vector upwards in the picture.
