@@ -36,15 +36,13 @@ fn intersect_ellipsoid(q: Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
     return select(limit, t, (discriminant >= 0.0) & (t > 0.0) & (t < limit));
 }
 
-// Whether its surface cuts the segment o + s d, s in (0, reach), of local space; `start` is |o|^2 - 1, exactly 0 if the
-// segment starts on the surface. It does if the ends lie on different sides; or if both are outside, the nearest point to
-// the centre is between them, and the line comes within the sphere. What starts on the surface and goes inwards starts
-// inside.
+// Whether its surface cuts the segment o + s d, s in (0, reach), of local space; `start` is |o|^2 - 1. It does if the ends
+// lie on different sides; or if both are outside, the nearest point to the centre is between them, and the line comes
+// within the sphere.
 fn ellipsoid_blocks(o: vec3f, d: vec3f, start: f32, reach: f32) -> bool {
     let a = dot(d, d);
     let b = dot(o, d);
     let end = start + reach * (2.0 * b + reach * a);
-    let inside = (start < 0.0) | ((start == 0.0) & (b < 0.0));
     let passes = (b < 0.0) & (-b < reach * a) & (ellipsoid_discriminant(o, d, start) >= 0.0);
-    return (inside & (end > 0.0)) | ((start > 0.0) & ((end < 0.0) | passes));
+    return ((start < 0.0) & (end > 0.0)) | ((start > 0.0) & ((end < 0.0) | passes));
 }

@@ -11,11 +11,12 @@ struct Block {
 }
 
 // Bit i is set where the primitive hides sample i of the block from p. `kind` is the primitive's, known when compiled;
-// `wall` says that p is on the primitive, and the light on its inner side.
+// `wall` says that p is on an ellipsoid seen from inside: as little inside of it as can be, so that rays inwards are hidden
+// if they end outside.
 fn shadow_bits(kind: u32, q: Primitive, p: vec3f, wall: bool, light: Light, block: Block) -> u32 {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
-    let start = select(ellipsoid_level(q, from_anchor), 0.0, wall);
+    let start = select(ellipsoid_level(q, from_anchor), -1e-30, wall);
     let to = segments_to_local(q, segments_to_light(light, p));
     var bits = 0u;
     for (var i = 0u; i < block.count; i++) {

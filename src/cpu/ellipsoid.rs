@@ -46,9 +46,8 @@ pub fn ellipsoid_blocks(o: Vec3, d: Vec3, start: f32, reach: f32) -> bool {
     let a = dot(d, d);
     let b = dot(o, d);
     let end = start + reach * (2.0 * b + reach * a);
-    let inside = (start < 0.0) | ((start == 0.0) & (b < 0.0));
     let passes = (b < 0.0) & (-b < reach * a) & (ellipsoid_discriminant(o, d, start) >= 0.0);
-    (inside & (end > 0.0)) | ((start > 0.0) & ((end < 0.0) | passes))
+    ((start < 0.0) & (end > 0.0)) | ((start > 0.0) & ((end < 0.0) | passes))
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ pub struct Block {
 pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light, block: Block) -> u32 {
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
-    let start = if wall { 0.0 } else { ellipsoid_level(q, from_anchor) };
+    let start = if wall { -1e-30 } else { ellipsoid_level(q, from_anchor) };
     let to = segments_to_local(q, segments_to_light(light, p));
     let mut bits = 0;
     for i in 0..block.count {
