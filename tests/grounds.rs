@@ -183,6 +183,35 @@ fn neighbours_hide_no_light_at_shared_edges() {
         let square = floor(corners[0], corners[1], corners[2]) + &floor(corners[0], corners[2], corners[3]);
         let d = setting.scene([0.0, -0.01, 5.0], [0.0, 0.0, 0.0], [-6.0, 5.5, 2.0], &(below + &square));
         assert_eq!(wrong(&d), 0, "a square of triangles, size {}", setting.size);
+        // a box of rectangles on a floor of one, and a tetrahedron beside it
+        let face = |center: [f64; 3], side: f64, normal: [f64; 3], tangent: [f64; 3]| {
+            format!(
+                "[[shapes]]\ntype = 'rectangle'\nmaterial = 'dull'\ncenter = {}\nsize = [{side:?}, {side:?}]\n\
+                 normal = {normal:?}\ntangent = {tangent:?}\n",
+                p(center),
+                side = side * setting.size
+            )
+        };
+        let (c, s) = (0.8, 0.6);
+        let box_faces = face([0.0, 0.0, 1.0], 1.0, [0.0, 0.0, 1.0], [c, s, 0.0])
+            + &face([0.5 * c, 0.5 * s, 0.5], 1.0, [c, s, 0.0], [0.0, 0.0, 1.0])
+            + &face([-0.5 * s, 0.5 * c, 0.5], 1.0, [-s, c, 0.0], [0.0, 0.0, 1.0])
+            + &face([-0.5 * c, -0.5 * s, 0.5], 1.0, [-c, -s, 0.0], [0.0, 0.0, 1.0])
+            + &face([0.5 * s, -0.5 * c, 0.5], 1.0, [s, -c, 0.0], [0.0, 0.0, 1.0])
+            + &face([0.0, 0.0, 0.0], 9.0, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
+        let corners = [[1.0, -1.5, 0.0], [1.7, -1.3, 0.0], [1.2, -0.8, 0.0], [1.3, -1.2, 0.9]].map(p);
+        let solid = format!(
+            "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'dull'\nvertices = [{}]\n",
+            corners.join(", ")
+        );
+        let d = setting.scene(ABOVE, [0.2, 0.0, 0.4], [-3.0, -2.0, 3.0], &(box_faces + &solid));
+        let found = wrong(&d);
+        assert!(
+            found <= 2,
+            "a box, size {}, offset {}: {found} pixels",
+            setting.size,
+            setting.offset
+        );
     }
 }
 

@@ -61,7 +61,7 @@ mod tests {
     fn the_origin_is_no_farther_from_what_is_seen_than_the_camera() {
         for (position, look_at) in [
             ([2000.0, 1997.0, 2001.3], [2000.0, 2000.0, 2001.0]),
-            ([-1e9, 1e9, 0.0], [-1e9, 1e9, 1e-3]),
+            ([-1e9, 1e9, 0.0], [-1e9 + 1e-3, 1e9, 1e-3]),
             ([5.0, 7.0, 0.1], [-40.0, 7.0, 0.0]),
         ] {
             let camera = camera(position, look_at);
