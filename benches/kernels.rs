@@ -82,7 +82,7 @@ fn twins(criterion: &mut Criterion) {
         direction: Vec3::new(0.1, 0.98, -0.2).normalize(),
     };
     let light = &scene.lights[0];
-    let surface = surface_at(rectangle, ray, 3.0, 1e-5);
+    let surface = surface_at(rectangle, 0, ray, 3.0, 1e-5);
     let block = Block {
         pattern: GRID,
         side: 4,
@@ -102,14 +102,14 @@ fn twins(criterion: &mut Criterion) {
         b.iter(|| intersect_triangle(triangle, black_box(ray), FAR))
     });
     group.bench_function("intersect_ellipsoid", |b| {
-        b.iter(|| intersect_ellipsoid(ellipsoid, black_box(ray), FAR))
+        b.iter(|| intersect_ellipsoid(ellipsoid, false, black_box(ray), FAR))
     });
     group.bench_function("may_block", |b| b.iter(|| may_block(&black_box(bound), &cone)));
     group.bench_function("shadow_bits of 16 samples, triangle", |b| {
-        b.iter(|| shadow_bits(TRIANGLE, triangle, black_box(surface.start), light, block))
+        b.iter(|| shadow_bits(TRIANGLE, triangle, black_box(surface.start), false, light, block))
     });
     group.bench_function("shadow_bits of 16 samples, ellipsoid", |b| {
-        b.iter(|| shadow_bits(ELLIPSOID, ellipsoid, black_box(surface.start), light, block))
+        b.iter(|| shadow_bits(ELLIPSOID, ellipsoid, black_box(surface.start), false, light, block))
     });
     group.bench_function("phong_block of 16 samples", |b| {
         let to = segments_to_light(light, surface.start);

@@ -1,33 +1,48 @@
 // The ellipsoid: the unit sphere of local space.
 
-// The distance of the nearest hit in (0, limit), else `limit`. The discriminant comes from the vector between the
-// centre and the ray's nearest point, which keeps its digits far away; the nearer root avoids cancellation: Haines,
-// Guenther and Akenine-Moeller, "Precision Improvements for Ray/Sphere Intersection", Ray Tracing Gems, 2019, ch. 7.
-fn intersect_ellipsoid(q: Primitive, ray: Ray, limit: f32) -> f32 {
-    let o = point_to_local(q, ray.origin);
+// |l|^2 - 1 of a point's local position l: below 0 inside. `from_anchor` is (x, y, z) (p - anchor), which is short where
+// the point is near the anchor; 1 does not come into it, so that it keeps its digits.
+fn ellipsoid_level(q: Primitive, from_anchor: vec3f) -> f32 {
+    return dot(from_anchor, from_anchor - q.middle * 2.0) + q.level;
+}
+
+// a times the discriminant of |o + s d|^2 = 1, for a = d.d, b = o.d and start = |o|^2 - 1: (o.d)^2 - a (|o|^2 - 1), or
+// a - |o x d|^2, which is the same (Lagrange's identity). The first keeps its digits near the surface, the second far
+// from it.
+fn ellipsoid_discriminant(o: vec3f, d: vec3f, start: f32) -> f32 {
+    let a = dot(d, d);
+    let b = dot(o, d);
+    let moment = cross(o, d);
+    return select(a - dot(moment, moment), b * b - a * start, start < 1.0);
+}
+
+// The distance of the nearest hit in (0, limit), else `limit`. `wall` says that the ray starts on the surface and goes
+// through the inside: then the other end of the chord is the hit. The nearer root avoids cancellation: Haines, Guenther
+// and Akenine-Moeller, "Precision Improvements for Ray/Sphere Intersection", Ray Tracing Gems, 2019, ch. 7.
+fn intersect_ellipsoid(q: Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
+    let from_anchor = vector_to_local(q, ray.origin - q.anchor);
+    let o = from_anchor - q.middle;
     let d = vector_to_local(q, ray.direction);
     let a = dot(d, d);
     let b = dot(o, d);
-    let nearest = o - d * (b / a);
-    let discriminant = 1.0 - dot(nearest, nearest);
-    let root = sqrt(a * max(discriminant, 0.0));
+    let start = select(ellipsoid_level(q, from_anchor), 0.0, wall);
+    let discriminant = ellipsoid_discriminant(o, d, start);
+    let root = sqrt(max(discriminant, 0.0));
     let sum = select(-b - root, root - b, b < 0.0);
-    let t0 = (dot(o, o) - 1.0) / sum;
+    let t0 = start / sum;
     let t1 = sum / a;
     let near = min(t0, t1);
     let t = select(max(t0, t1), near, near > 0.0);
     return select(limit, t, (discriminant >= 0.0) & (t > 0.0) & (t < limit));
 }
 
-// Whether its surface cuts the segment o + s d, s in (0, reach), of local space. It does if the ends lie on different
-// sides; or if both are outside, the nearest point to the centre is between them, and the line comes within the
-// sphere: |o x d|^2 <= |d|^2 (Lagrange's identity for the discriminant, without its cancellation).
-fn ellipsoid_blocks(o: vec3f, d: vec3f, reach: f32) -> bool {
+// Whether its surface cuts the segment o + s d, s in (0, reach), of local space; `start` is |o|^2 - 1. It does if the ends
+// lie on different sides; or if both are outside, the nearest point to the centre is between them, and the line comes
+// within the sphere.
+fn ellipsoid_blocks(o: vec3f, d: vec3f, start: f32, reach: f32) -> bool {
     let a = dot(d, d);
     let b = dot(o, d);
-    let start = dot(o, o) - 1.0;
     let end = start + reach * (2.0 * b + reach * a);
-    let moment = cross(o, d);
-    let passes = (b < 0.0) & (-b < reach * a) & (dot(moment, moment) <= a);
+    let passes = (b < 0.0) & (-b < reach * a) & (ellipsoid_discriminant(o, d, start) >= 0.0);
     return ((start < 0.0) & (end > 0.0)) | ((start > 0.0) & ((end < 0.0) | passes));
 }

@@ -6,7 +6,7 @@
 fn radiance(camera_path: Path, pixel: vec2u, sample: u32) -> vec3f {
     var path = camera_path;
     if BOUNCES == 0u {
-        return radiance_from(closest_hit(path.ray), path, pixel, sample);
+        return radiance_from(closest_hit(path.ray, NOTHING, NOTHING), path, pixel, sample);
     }
     var sum = vec3f(0.0);
     var pending: array<Path, SPLITS>;
@@ -14,7 +14,7 @@ fn radiance(camera_path: Path, pixel: vec2u, sample: u32) -> vec3f {
     for (var leaf = 0u; leaf < LEAVES; leaf++) {
         var hit = Hit(FAR, NOTHING);
         while path.depth <= BOUNCES {
-            hit = closest_hit(path.ray);
+            hit = closest_hit(path.ray, path.left, path.wall);
             if !is_specular(hit) {
                 break;
             }
@@ -50,7 +50,7 @@ fn is_specular(hit: Hit) -> bool {
 
 fn scatter(hit: Hit, path: Path, pixel: vec2u, sample: u32) -> Scattered {
     let q = load_primitive(hit.primitive);
-    var surface = surface_at(q, path.ray, hit.t, environment.shadow_epsilon);
+    var surface = surface_at(q, hit.primitive, path.ray, hit.t, environment.shadow_epsilon);
     let at = arrival_of(q, path, hit.t, surface);
     let look = appearance(q, load_material(q.material), surface, at, SPECULAR_LOOKUPS);
     let material = look.material;
@@ -80,7 +80,7 @@ fn radiance_from(hit: Hit, path: Path, pixel: vec2u, sample: u32) -> vec3f {
     if plain.kind == EMITTER {
         return plain.ambient;
     }
-    var surface = surface_at(q, path.ray, hit.t, environment.shadow_epsilon);
+    var surface = surface_at(q, hit.primitive, path.ray, hit.t, environment.shadow_epsilon);
     let look = appearance(q, plain, surface, arrival_of(q, path, hit.t, surface), LOOKUPS);
     let material = look.material;
     surface.normal = look.normal;
@@ -101,12 +101,12 @@ fn radiance_from(hit: Hit, path: Path, pixel: vec2u, sample: u32) -> vec3f {
 // Phong's lobes, summed over all samples of a light.
 fn lobes_of_light(surface: Surface, material: Material, light: Light, pattern: u32, side: u32, count: u32,
                   pixel: vec2u, sample: u32) -> Lobes {
-    let to = segments_to_light(light, surface.start);
+    let to = segments_to_light(light, surface.position);
     let key = sample_key(pixel, camera.seed, 1u + light.number);
     var lobes = Lobes(0.0, 0.0);
     for (var first = 0u; first < count; first += BLOCK) {
         let block = Block(pattern, side, first, select(BLOCK, count - first, count - first < BLOCK), sample, key);
-        let hidden = hidden_samples(surface.start, light, block);
+        let hidden = hidden_samples(surface, light, block);
         lobes = phong_block(surface, material, to, block, hidden, EXPONENT_BITS, lobes);
     }
     return lobes;
@@ -132,7 +132,7 @@ fn camera_path(place: vec2f) -> Path {
     if DIFFERENTIALS == 1u {
         differential = camera_differential(camera, place, 1.0 / sqrt(f32(PIXEL_SAMPLES)));
     }
-    return Path(camera_ray(camera, place), differential, vec3f(1.0), 0u, 0u);
+    return Path(camera_ray(camera, place), differential, vec3f(1.0), 0u, 0u, NOTHING, NOTHING);
 }
 
 // A uniform position as one that is distributed like the filter, from the pixel's corner, and its weight.
@@ -172,7 +172,7 @@ fn is_done(sum: vec4f, moments: vec4f, sample: u32) -> bool {
 // What the ray through a pixel's centre meets.
 fn pixel_first_hit(pixel: vec2u) -> FirstHit {
     let ray = camera_ray(camera, vec2f(pixel) + 0.5);
-    let hit = closest_hit(ray);
+    let hit = closest_hit(ray, NOTHING, NOTHING);
     if hit.primitive == NOTHING {
         return FirstHit(vec3f(0.0), 0.0, vec2f(0.0), NOTHING, NOTHING);
     }

@@ -16,15 +16,16 @@ struct Camera {
 // What belongs to the scene as a whole.
 struct Environment {
     ambient: vec3f,
-    shadow_epsilon: f32,   // relative to the largest coordinate
+    shadow_epsilon: f32,   // how far above a surface rays start, relative to the largest coordinate
     background: vec3f,
     light_weight: f32,     // 1 / (samples of an area light)
 }
 
-// Any primitive: local = (x, y, z) (p - center), by the rows of the inverse linear map. In local space it is the
-// canonical shape of its kind.
+// Any primitive: local = (x, y, z) (p - anchor) - middle, by the rows of the inverse linear map. In local space it is the
+// canonical shape of its kind. An ellipsoid's anchor is on its surface, near the origin, so that the points there keep
+// their digits however large it is; of the others it is the centre, and `middle` is 0.
 struct Primitive {
-    center: vec3f,
+    anchor: vec3f,
     material: u32,
     x: vec3f,
     shape: u32,            // the number of its shape in the scene file
@@ -32,6 +33,8 @@ struct Primitive {
     kind: u32,             // RECTANGLE, TRIANGLE, ELLIPSOID or PLANE
     z: vec3f,
     determinant: f32,      // of the three rows
+    middle: vec3f,         // an ellipsoid's centre, by the same rows: (x, y, z) (centre - anchor)
+    level: f32,            // |middle|^2 - 1, which is how far the anchor is off the ellipsoid
 }
 
 // A sphere around a primitive that can cast a shadow.

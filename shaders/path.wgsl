@@ -6,6 +6,8 @@ struct Path {
     throughput: vec3f,     // factor of the light that comes along the ray
     depth: u32,            // bounces so far
     branch: u32,           // bit i is set if this is the reflection at the split of bounce i
+    left: u32,             // the primitive that the ray starts on and cannot meet again, else NOTHING
+    wall: u32,             // the ellipsoid that it starts on and goes through
 }
 
 // What becomes of a path at a mirror or at glass.
@@ -51,7 +53,7 @@ fn reflected_path(path: Path, surface: Surface, at: Arrival, throughput: vec3f) 
     let d = path.ray.direction;
     let ray = Ray(surface.start, reflected_direction(d, surface.normal));
     let differential = reflected_differential(at, d, surface.normal);
-    return Path(ray, differential, throughput, path.depth + 1u, path.branch);
+    return Path(ray, differential, throughput, path.depth + 1u, path.branch, surface.above, surface.below);
 }
 
 fn refracted_path(path: Path, surface: Surface, at: Arrival, throughput: vec3f, eta: f32, cosine_i: f32,
@@ -60,5 +62,5 @@ fn refracted_path(path: Path, surface: Surface, at: Arrival, throughput: vec3f, 
     let below = surface.position - (surface.start - surface.position);
     let ray = Ray(below, refracted_direction(d, surface.normal, eta, cosine_i, cosine_t));
     let differential = refracted_differential(at, d, surface.normal, eta, cosine_t);
-    return Path(ray, differential, throughput, path.depth + 1u, path.branch);
+    return Path(ray, differential, throughput, path.depth + 1u, path.branch, surface.below, surface.above);
 }

@@ -13,7 +13,7 @@ struct Hit {
 }
 
 fn point_to_local(q: Primitive, p: vec3f) -> vec3f {
-    return vector_to_local(q, p - q.center);
+    return vector_to_local(q, p - q.anchor) - q.middle;
 }
 
 fn vector_to_local(q: Primitive, v: vec3f) -> vec3f {
@@ -22,7 +22,7 @@ fn vector_to_local(q: Primitive, v: vec3f) -> vec3f {
 
 // Where the ray meets the plane z = 0 of a flat primitive; not finite if it does not.
 fn plane_distance(q: Primitive, ray: Ray) -> f32 {
-    return dot(q.z, q.center - ray.origin) / dot(q.z, ray.direction);
+    return dot(q.z, q.anchor - ray.origin) / dot(q.z, ray.direction);
 }
 
 // Whether the segment o + s d, s in (0, reach), of local space crosses the plane z = 0.
@@ -37,7 +37,8 @@ fn scaled_crossing(o: vec3f, d: vec3f) -> vec2f {
     return vec2f(o.x * a + s * d.x, o.y * a + s * d.y);
 }
 
-// The hit, or the one at t of primitive i if that is nearer.
-fn closer(hit: Hit, t: f32, i: u32) -> Hit {
-    return Hit(min(t, hit.t), select(hit.primitive, i, t < hit.t));
+// The hit, or the one at t of primitive i if that is nearer and not the one that the ray has left.
+fn closer(hit: Hit, t: f32, i: u32, left: u32) -> Hit {
+    let nearer = (t < hit.t) & (i != left);
+    return Hit(select(hit.t, t, nearer), select(hit.primitive, i, nearer));
 }

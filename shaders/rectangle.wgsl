@@ -3,7 +3,7 @@
 // The distance of the hit if it lies in (0, limit), else `limit`.
 fn intersect_rectangle(q: Primitive, ray: Ray, limit: f32) -> f32 {
     let t = plane_distance(q, ray);
-    let p = ray.origin + ray.direction * t - q.center;
+    let p = ray.origin + ray.direction * t - q.anchor;
     let inside = (abs(dot(q.x, p)) <= 1.0) & (abs(dot(q.y, p)) <= 1.0);
     return select(limit, t, (t > 0.0) & (t < limit) & inside);
 }

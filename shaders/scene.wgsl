@@ -21,21 +21,22 @@ fn load_texture(i: u32) -> Texture {
     return textures[i];
 }
 
-// The nearest primitive that a ray meets, by one loop for each kind of primitive.
-fn closest_hit(ray: Ray) -> Hit {
+// The nearest primitive that a ray meets, by one loop for each kind of primitive; not the one that it has left. It may
+// start on the wall of an ellipsoid, inside of it.
+fn closest_hit(ray: Ray, left: u32, wall: u32) -> Hit {
     var hit = Hit(FAR, NOTHING);
     var i = 0u;
     for (; i < RECTANGLES; i++) {
-        hit = closer(hit, intersect_rectangle(primitives[i], ray, hit.t), i);
+        hit = closer(hit, intersect_rectangle(primitives[i], ray, hit.t), i, left);
     }
     for (; i < RECTANGLES + TRIANGLES; i++) {
-        hit = closer(hit, intersect_triangle(primitives[i], ray, hit.t), i);
+        hit = closer(hit, intersect_triangle(primitives[i], ray, hit.t), i, left);
     }
     for (; i < RECTANGLES + TRIANGLES + ELLIPSOIDS; i++) {
-        hit = closer(hit, intersect_ellipsoid(primitives[i], ray, hit.t), i);
+        hit = closer(hit, intersect_ellipsoid(primitives[i], i == wall, ray, hit.t), i, left);
     }
     for (; i < RECTANGLES + TRIANGLES + ELLIPSOIDS + PLANES; i++) {
-        hit = closer(hit, intersect_plane(primitives[i], ray, hit.t), i);
+        hit = closer(hit, intersect_plane(primitives[i], ray, hit.t), i, left);
     }
     return hit;
 }

@@ -10,14 +10,18 @@ struct Block {
     key: vec2u,
 }
 
-// Bit i is set where the primitive hides sample i of the block from p. `kind` is the primitive's, known when compiled.
-fn shadow_bits(kind: u32, q: Primitive, p: vec3f, light: Light, block: Block) -> u32 {
-    let o = point_to_local(q, p);
+// Bit i is set where the primitive hides sample i of the block from p. `kind` is the primitive's, known when compiled;
+// `wall` says that p is on an ellipsoid seen from inside: as little inside of it as can be, so that rays inwards are hidden
+// if they end outside.
+fn shadow_bits(kind: u32, q: Primitive, p: vec3f, wall: bool, light: Light, block: Block) -> u32 {
+    let from_anchor = vector_to_local(q, p - q.anchor);
+    let o = from_anchor - q.middle;
+    let start = select(ellipsoid_level(q, from_anchor), -1e-30, wall);
     let to = segments_to_local(q, segments_to_light(light, p));
     var bits = 0u;
     for (var i = 0u; i < block.count; i++) {
         let d = segment(to, block_sample(block, i));
-        bits |= select(0u, 1u << i, blocks(kind, o, d, light.reach));
+        bits |= select(0u, 1u << i, blocks(kind, o, d, start, light.reach));
     }
     return bits;
 }
@@ -26,7 +30,7 @@ fn block_sample(block: Block, i: u32) -> vec2f {
     return sample_square(block.pattern, block.side, block.first + i, block.group, block.key);
 }
 
-fn blocks(kind: u32, o: vec3f, d: vec3f, reach: f32) -> bool {
+fn blocks(kind: u32, o: vec3f, d: vec3f, start: f32, reach: f32) -> bool {
     if kind == RECTANGLE {
         return rectangle_blocks(o, d, reach);
     }
@@ -34,7 +38,7 @@ fn blocks(kind: u32, o: vec3f, d: vec3f, reach: f32) -> bool {
         return triangle_blocks(o, d, reach);
     }
     if kind == ELLIPSOID {
-        return ellipsoid_blocks(o, d, reach);
+        return ellipsoid_blocks(o, d, start, reach);
     }
     return plane_blocks(o, d, reach);
 }

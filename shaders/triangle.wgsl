@@ -4,7 +4,7 @@
 // The distance of the hit if it lies in (0, limit), else `limit`.
 fn intersect_triangle(q: Primitive, ray: Ray, limit: f32) -> f32 {
     let t = plane_distance(q, ray);
-    let p = ray.origin + ray.direction * t - q.center;
+    let p = ray.origin + ray.direction * t - q.anchor;
     let x = dot(q.x, p);
     let y = dot(q.y, p);
     let inside = (x >= 0.0) & (y >= 0.0) & (x + y <= 1.0);

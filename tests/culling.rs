@@ -48,7 +48,7 @@ fn left_out(scenes: &[Packed], bound: impl Fn(Sphere) -> Sphere) -> (usize, usiz
             for (q, sphere) in scene.primitives.iter().zip(&scene.bounds) {
                 if !may_block(&bound(*sphere), &cone) {
                     left_out += 1;
-                    wrong += usize::from(shadow_bits(q.kind, q, p, light, block) != 0);
+                    wrong += usize::from(shadow_bits(q.kind, q, p, false, light, block) != 0);
                 }
             }
         }

@@ -12,7 +12,7 @@ use wgray::cpu::phong::Lobes;
 use wgray::cpu::ray::{Hit, Ray};
 use wgray::cpu::shadow::{Block, cone_to_light};
 use wgray::cpu::surface::Surface;
-use wgray::pack::{Camera, FAR, Light, Material, NOTHING, Primitive, Sphere, Texture};
+use wgray::pack::{Camera, ELLIPSOID, FAR, Light, Material, NOTHING, Primitive, Sphere, Texture};
 
 use crate::kernel::{Function, scalars};
 use crate::random::Random;
@@ -118,6 +118,13 @@ impl Situation {
             columns = DMat3::from_diagonal(DVec3::splat(scale)); // parallel to the axes, as scenes often are
         }
         let rows = columns.inverse().transpose();
+        let kind = random.below(4);
+        // an ellipsoid's anchor is on it, or near
+        let (mut middle, mut level) = (DVec3::ZERO, -1.0);
+        if kind == ELLIPSOID && random.once_in(2) {
+            middle = -local_point(random).normalize_or(DVec3::Z) * random.pick(&[1.0, 1.0, 1.1]);
+            level = middle.length_squared() - 1.0;
+        }
         let local = local_point(random);
         let away = vector(random) * random.pick(&[0.3, 1.0, 3.0, 300.0]);
         let local_start = if random.once_in(8) {
@@ -125,17 +132,19 @@ impl Situation {
         } else {
             local + away
         };
-        let target = center + columns * local;
-        let start = center + columns * local_start;
+        let target = center + columns * (local + middle);
+        let start = center + columns * (local_start + middle);
         let primitive = Primitive {
-            center: center.as_vec3(),
+            anchor: center.as_vec3(),
             material: random.below(4),
             x: rows.x_axis.as_vec3(),
             shape: random.below(4),
             y: rows.y_axis.as_vec3(),
-            kind: random.below(4),
+            kind,
             z: rows.z_axis.as_vec3(),
             determinant: rows.determinant() as f32,
+            middle: middle.as_vec3(),
+            level: level as f32,
         };
         let directional = random.once_in(4);
         let size = scale * random.pick(&[0.0, 0.3, 3.0]);
@@ -236,7 +245,7 @@ impl Situation {
             _ => self.direction,
         };
         let origin = if random.once_in(8) {
-            self.primitive.center.as_dvec3()
+            self.primitive.anchor.as_dvec3()
         } else {
             self.start
         };
@@ -260,6 +269,9 @@ impl Situation {
             wo,
             start: position + normal * 1e-5,
             side: random.pick(&[1.0, -1.0]),
+            facing: random.pick(&[normal, vector(random).normalize().as_vec3()]),
+            above: random.pick(&[NOTHING, 3]),
+            below: random.pick(&[NOTHING, 3]),
         }
     }
 
@@ -270,6 +282,8 @@ impl Situation {
             throughput: color(random),
             depth: random.below(10),
             branch: random.below(4),
+            left: random.pick(&[NOTHING, 3]),
+            wall: random.pick(&[NOTHING, 3]),
         }
     }
 
@@ -302,6 +316,7 @@ impl Situation {
             "d" => (self.local - self.local_start) * random.pick(&[0.5, 1.0, 1.0 + 1e-5, 2.0, -1.0]),
             "local" => self.local,
             "p" => random.pick(&[self.start, self.target]),
+            "from_anchor" => self.local + self.primitive.middle.as_dvec3(),
             "to" | "direction" => self.direction,
             _ => vector(random) * random.magnitude(-2.0, 2.0),
         };
@@ -312,10 +327,11 @@ impl Situation {
         match name {
             "limit" => random.pick(&[FAR, FAR, self.t() as f32, (2.0 * self.t()) as f32]),
             "t" => random.pick(&[self.t() as f32, FAR]),
+            "start" => (self.local_start.length_squared() - 1.0) as f32,
             "reach" => random.pick(&[self.light.reach, 1.0 - 1e-5, 1e10, 1.0]),
             "cosine" | "cosine_i" | "cosine_t" | "random" | "line_width" => random.unit() as f32,
             "eta" | "anisotropy" => random.magnitude(-1.0, 1.0) as f32,
-            "epsilon" => random.pick(&[1e-5, 1e-4, 0.0]),
+            "epsilon" => random.pick(&[2e-6, 1e-4, 0.0]),
             _ => {
                 let (unit, sign) = (random.unit(), random.pick(&[1.0, -1.0]));
                 random.pick(&[

@@ -10,6 +10,7 @@ mod cost;
 mod culling;
 #[cfg(feature = "dev")]
 mod dev;
+mod grounds;
 mod inputs;
 mod kernel;
 mod layout;

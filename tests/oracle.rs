@@ -196,11 +196,13 @@ impl<'a> Oracle<'a> {
         let point = origin + direction * meeting.t;
         let facing = meeting.normal.dot(direction) < 0.0;
         let normal = if facing { meeting.normal } else { -meeting.normal };
-        // "how far above the surface a shadow ray starts, relative to the largest coordinate there"
-        let offset = normal * (render.shadow_epsilon * point.abs().max_element().max(meeting.t));
+        // "how far above the surface rays start at least, relative to the largest coordinate there": 1e-9 is enough in f64
+        let offset = normal * (render.shadow_epsilon.max(1e-9) * point.abs().max_element().max(meeting.t));
         let follow = |origin: DVec3, direction: DVec3| self.radiance((origin, direction), bounces + 1);
         match &self.scene.materials[material] {
-            MaterialDescription::Phong(phong) => self.direct(phong, &meeting, normal, point + offset, -direction),
+            MaterialDescription::Phong(phong) => {
+                self.direct(phong, &meeting, normal, point, point + offset, -direction)
+            }
             _ if bounces == render.max_depth => render.background,
             MaterialDescription::Mirror(mirror) => {
                 assert!(mirror.normal_map.is_none(), "the oracle knows no normal maps");
@@ -231,7 +233,15 @@ impl<'a> Oracle<'a> {
     }
 
     /// What a surface reflects of the lights, and of ambient light; `above` is where its shadow rays start.
-    fn direct(&self, phong: &PhongDescription, meeting: &Meeting, normal: DVec3, above: DVec3, viewer: DVec3) -> DVec3 {
+    fn direct(
+        &self,
+        phong: &PhongDescription,
+        meeting: &Meeting,
+        normal: DVec3,
+        point: DVec3,
+        above: DVec3,
+        viewer: DVec3,
+    ) -> DVec3 {
         assert!(phong.normal_map.is_none(), "the oracle knows no normal maps");
         let factor = |own: &Option<ColorDescription>| {
             let color = own.as_ref().or(phong.color.as_ref()).expect("a checked material");
@@ -240,7 +250,7 @@ impl<'a> Oracle<'a> {
         let (diffuse, specular) = (factor(&phong.diffuse), factor(&phong.specular));
         let mut sum = self.scene.render.ambient * factor(&phong.ambient);
         for light in &self.scene.lights {
-            let samples = self.samples(light, above);
+            let samples = self.samples(light, point);
             for (to_light, distance) in &samples {
                 let reflected = self.reflected(diffuse, specular, phong.shininess, normal, viewer, *to_light);
                 if self.flaw == Flaw::NoShadows || !self.hidden(above, *to_light, *distance) {
@@ -328,7 +338,7 @@ impl<'a> Oracle<'a> {
 
     /// Whether a shape, not a light, is between a point and a light.
     fn hidden(&self, from: DVec3, direction: DVec3, distance: f64) -> bool {
-        let end = distance * (1.0 - self.scene.render.shadow_epsilon);
+        let end = distance * (1.0 - self.scene.render.shadow_epsilon.max(1e-5));
         let transparent = self.scene.render.shadows == Shadows::Transparent;
         let glass = |name: &String| matches!(self.scene.materials[name], MaterialDescription::Glass(_));
         let blocks = |solid: &&Solid| {

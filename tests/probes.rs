@@ -8,7 +8,7 @@ use wgray::cpu::differential::{
     Arrival, Derivative, Differential, arrival, normal_derivative, reflected_derivative, reflected_differential,
     refracted_derivative, refracted_differential, transferred,
 };
-use wgray::cpu::ellipsoid::{ellipsoid_blocks, intersect_ellipsoid};
+use wgray::cpu::ellipsoid::{ellipsoid_blocks, ellipsoid_discriminant, ellipsoid_level, intersect_ellipsoid};
 use wgray::cpu::filter::{filter_bin, filter_offset};
 use wgray::cpu::footprint::{
     Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint, uv_derivative,
@@ -32,12 +32,14 @@ use wgray::cpu::sampling::{
 use wgray::cpu::sequence::{halton_sample, radical_inverse_3, scramble, shuffled_index, sobol_reversed, sobol_sample};
 use wgray::cpu::shadow::{Block, Cone, block_sample, blocks, cone_to_light, may_block, shadow_bits};
 use wgray::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
-use wgray::cpu::surface::{Surface, first_hit, primitive_normal, primitive_uv, surface_at};
+use wgray::cpu::surface::{
+    Surface, first_hit, largest, primitive_gradient, primitive_normal, primitive_uv, surface_at,
+};
 use wgray::cpu::tangent::{Tangents, local_tangents, mapped_normal, vector_to_world};
 use wgray::cpu::texel::{gaussian_weight, level_size, near_coordinate, srgb_to_linear, unpacked_color, wrapped_index};
 use wgray::cpu::triangle::{intersect_triangle, triangle_blocks};
 use wgray::gpu::Device;
-use wgray::pack::{Camera, FirstHit, Light, Material, Primitive, Sphere, Texture};
+use wgray::pack::{Camera, FirstHit, Light, Material, NOTHING, Primitive, Sphere, Texture};
 
 use crate::adapter::{self, allowed, judge};
 use crate::inputs::inputs;
@@ -115,26 +117,30 @@ probes! {
     plane_distance(q: &Primitive, ray: Ray) -> f32;
     crosses_plane(o: Vec3, d: Vec3, reach: f32) -> bool;
     scaled_crossing(o: Vec3, d: Vec3) -> Vec2;
-    closer(hit: Hit, t: f32, i: u32) -> Hit;
+    closer(hit: Hit, t: f32, i: u32, left: u32) -> Hit;
     intersect_rectangle(q: &Primitive, ray: Ray, limit: f32) -> f32;
     rectangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
     intersect_triangle(q: &Primitive, ray: Ray, limit: f32) -> f32;
     triangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
-    intersect_ellipsoid(q: &Primitive, ray: Ray, limit: f32) -> f32;
-    ellipsoid_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
+    ellipsoid_level(q: &Primitive, from_anchor: Vec3) -> f32;
+    ellipsoid_discriminant(o: Vec3, d: Vec3, start: f32) -> f32;
+    intersect_ellipsoid(q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32;
+    ellipsoid_blocks(o: Vec3, d: Vec3, start: f32, reach: f32) -> bool;
     intersect_plane(q: &Primitive, ray: Ray, limit: f32) -> f32;
     plane_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
     camera_ray(camera: &Camera, at: Vec2) -> Ray;
+    primitive_gradient(q: &Primitive, local: Vec3) -> Vec3;
     primitive_normal(q: &Primitive, local: Vec3) -> Vec3;
-    surface_at(q: &Primitive, ray: Ray, t: f32, epsilon: f32) -> Surface;
+    largest(v: Vec3) -> f32;
+    surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface;
     primitive_uv(q: &Primitive, local: Vec3) -> Vec2;
     first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit;
     segments_to_light(light: &Light, p: Vec3) -> Segments;
     segments_to_local(q: &Primitive, to: Segments) -> Segments;
     segment(to: Segments, at: Vec2) -> Vec3;
-    shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: Block) -> u32;
+    shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light, block: Block) -> u32;
     block_sample(block: Block, i: u32) -> Vec2;
-    blocks(kind: u32, o: Vec3, d: Vec3, reach: f32) -> bool;
+    blocks(kind: u32, o: Vec3, d: Vec3, start: f32, reach: f32) -> bool;
     cone_to_light(light: &Light, p: Vec3) -> Cone;
     may_block(sphere: &Sphere, cone: &Cone) -> bool;
     phong_lobes(surface: Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes;
@@ -399,7 +405,7 @@ fn nan_does_not_spread_where_it_must_not() {
     assert_eq!(min(f32::NAN, 1.0), 1.0);
     assert_eq!(power(f32::NAN, 2.0), 0.0);
     let hit = Hit { t: 5.0, primitive: 3 };
-    assert_eq!(closer(hit, f32::NAN, 4), hit);
+    assert_eq!(closer(hit, f32::NAN, 4, NOTHING), hit);
     let source = shared_source();
     let module = parse(&source);
     let random = Random::new(7);

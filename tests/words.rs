@@ -87,14 +87,14 @@ macro_rules! records {
 records! {
     Ray { origin, direction }
     Hit { t, primitive }
-    Surface { position, normal, wo, start, side }
+    Surface { position, normal, wo, start, side, facing, above, below }
     Derivative { position, direction }
     Differential { x, y }
     Arrival { x, y, normal_x, normal_y }
     Footprint { uv, dx, dy }
     Ellipse { m, major, minor }
     Tangents { u, v }
-    Path { ray, differential, throughput, depth, branch }
+    Path { ray, differential, throughput, depth, branch, left, wall }
     Scattered { onward, other, splits }
     Segments { towards, u, v }
     Lobes { diffuse, specular }

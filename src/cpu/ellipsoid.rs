@@ -3,19 +3,35 @@
 use glam::Vec3;
 
 use super::math::{cross, dot, max, min};
-use super::ray::{Ray, point_to_local, vector_to_local};
+use super::ray::{Ray, vector_to_local};
 use crate::pack::Primitive;
 
-pub fn intersect_ellipsoid(q: &Primitive, ray: Ray, limit: f32) -> f32 {
-    let o = point_to_local(q, ray.origin);
+pub fn ellipsoid_level(q: &Primitive, from_anchor: Vec3) -> f32 {
+    dot(from_anchor, from_anchor - q.middle * 2.0) + q.level
+}
+
+pub fn ellipsoid_discriminant(o: Vec3, d: Vec3, start: f32) -> f32 {
+    let a = dot(d, d);
+    let b = dot(o, d);
+    let moment = cross(o, d);
+    if start < 1.0 {
+        b * b - a * start
+    } else {
+        a - dot(moment, moment)
+    }
+}
+
+pub fn intersect_ellipsoid(q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
+    let from_anchor = vector_to_local(q, ray.origin - q.anchor);
+    let o = from_anchor - q.middle;
     let d = vector_to_local(q, ray.direction);
     let a = dot(d, d);
     let b = dot(o, d);
-    let nearest = o - d * (b / a);
-    let discriminant = 1.0 - dot(nearest, nearest);
-    let root = (a * max(discriminant, 0.0)).sqrt();
+    let start = if wall { 0.0 } else { ellipsoid_level(q, from_anchor) };
+    let discriminant = ellipsoid_discriminant(o, d, start);
+    let root = max(discriminant, 0.0).sqrt();
     let sum = if b < 0.0 { root - b } else { -b - root };
-    let t0 = (dot(o, o) - 1.0) / sum;
+    let t0 = start / sum;
     let t1 = sum / a;
     let near = min(t0, t1);
     let t = if near > 0.0 { near } else { max(t0, t1) };
@@ -26,13 +42,11 @@ pub fn intersect_ellipsoid(q: &Primitive, ray: Ray, limit: f32) -> f32 {
     }
 }
 
-pub fn ellipsoid_blocks(o: Vec3, d: Vec3, reach: f32) -> bool {
+pub fn ellipsoid_blocks(o: Vec3, d: Vec3, start: f32, reach: f32) -> bool {
     let a = dot(d, d);
     let b = dot(o, d);
-    let start = dot(o, o) - 1.0;
     let end = start + reach * (2.0 * b + reach * a);
-    let moment = cross(o, d);
-    let passes = (b < 0.0) & (-b < reach * a) & (dot(moment, moment) <= a);
+    let passes = (b < 0.0) & (-b < reach * a) & (ellipsoid_discriminant(o, d, start) >= 0.0);
     ((start < 0.0) & (end > 0.0)) | ((start > 0.0) & ((end < 0.0) | passes))
 }
 
@@ -44,6 +58,7 @@ mod tests {
 
     use super::*;
     use crate::cpu::math::normalize;
+    use crate::cpu::ray::point_to_local;
     use crate::cpu::surface::primitive_normal;
     use crate::pack::{ELLIPSOID, FAR, primitive};
 
@@ -66,7 +81,7 @@ mod tests {
     fn the_unit_sphere_is_hit_at_45_degrees() {
         let q = unit_sphere();
         let ray = ray([-3.0, 0.0, FRAC_1_SQRT_2], [1.0, 0.0, 0.0]);
-        let t = intersect_ellipsoid(&q, ray, FAR);
+        let t = intersect_ellipsoid(&q, false, ray, FAR);
         assert!((t - (3.0 - FRAC_1_SQRT_2)).abs() < 1e-6, "{t}");
         let normal = primitive_normal(&q, point_to_local(&q, ray.origin + ray.direction * t));
         assert!(
@@ -85,7 +100,7 @@ mod tests {
         for target in [[0.5, 0.4, 0.4], [0.6, 0.3, 0.55], [0.3, 0.5, 0.2], [0.65, 0.5, 0.6]] {
             let origin = Vec3::new(0.0, -3.0, 1.3);
             let ray = ray(origin.into(), (Vec3::from(target) - origin).into());
-            let t = intersect_ellipsoid(&q, ray, FAR);
+            let t = intersect_ellipsoid(&q, false, ray, FAR);
             assert!(t < FAR, "{target:?} is inside, and missed");
             let p = ray.origin + ray.direction * t;
             assert!(quadric(p.as_dvec3()).abs() < 1e-5, "{}", quadric(p.as_dvec3()));
@@ -99,15 +114,15 @@ mod tests {
 
     #[test]
     fn from_inside_the_far_side_is_hit() {
-        let t = intersect_ellipsoid(&unit_sphere(), ray([0.25, 0.0, 0.0], [1.0, 0.0, 0.0]), FAR);
+        let t = intersect_ellipsoid(&unit_sphere(), false, ray([0.25, 0.0, 0.0], [1.0, 0.0, 0.0]), FAR);
         assert_eq!(t, 0.75);
-        let t = intersect_ellipsoid(&unit_sphere(), ray([0.25, 0.0, 0.0], [-1.0, 0.0, 0.0]), FAR);
+        let t = intersect_ellipsoid(&unit_sphere(), false, ray([0.25, 0.0, 0.0], [-1.0, 0.0, 0.0]), FAR);
         assert_eq!(t, 1.25);
     }
 
     #[test]
     fn a_grazing_ray_decides_by_the_last_digits() {
-        let at = |z: f32| intersect_ellipsoid(&unit_sphere(), ray([-1000.0, 0.0, z], [1.0, 0.0, 0.0]), FAR);
+        let at = |z: f32| intersect_ellipsoid(&unit_sphere(), false, ray([-1000.0, 0.0, z], [1.0, 0.0, 0.0]), FAR);
         assert!((at(0.999_999) - 1000.0).abs() < 0.01, "{}", at(0.999_999));
         assert_eq!(at(1.000_001), FAR);
     }
@@ -115,20 +130,26 @@ mod tests {
     #[test]
     fn what_is_behind_or_beyond_the_limit_is_no_hit() {
         let q = unit_sphere();
-        assert_eq!(intersect_ellipsoid(&q, ray([3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), FAR), FAR);
         assert_eq!(
-            intersect_ellipsoid(&q, ray([3.0, 0.0, 0.0], [-1.0, 0.0, 0.0]), 1.5),
+            intersect_ellipsoid(&q, false, ray([3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), FAR),
+            FAR
+        );
+        assert_eq!(
+            intersect_ellipsoid(&q, false, ray([3.0, 0.0, 0.0], [-1.0, 0.0, 0.0]), 1.5),
             1.5
         );
         assert_eq!(
-            intersect_ellipsoid(&q, ray([3.0, 0.0, 0.0], [-1.0, 0.0, 0.0]), 2.5),
+            intersect_ellipsoid(&q, false, ray([3.0, 0.0, 0.0], [-1.0, 0.0, 0.0]), 2.5),
             2.0
         );
     }
 
     #[test]
     fn segments_are_blocked_by_the_surface_they_cut() {
-        let blocks = |o: [f32; 3], d: [f32; 3], reach| ellipsoid_blocks(o.into(), d.into(), reach);
+        let blocks = |o: [f32; 3], d: [f32; 3], reach| {
+            let o = Vec3::from(o);
+            ellipsoid_blocks(o, d.into(), dot(o, o) - 1.0, reach)
+        };
         assert!(blocks([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 1.0), "through");
         assert!(blocks([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.5), "into");
         assert!(blocks([0.0, 0.0, 0.0], [4.0, 0.0, 0.0], 1.0), "out of");

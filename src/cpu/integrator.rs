@@ -26,7 +26,13 @@ pub fn radiance(scene: &Packed, camera_path: Path, pixel: UVec2, sample: u32) ->
     let bounces = scene.specialization.bounces;
     let mut path = camera_path;
     if bounces == 0 {
-        return radiance_from(scene, closest_hit(scene, path.ray), path, pixel, sample);
+        return radiance_from(
+            scene,
+            closest_hit(scene, path.ray, NOTHING, NOTHING),
+            path,
+            pixel,
+            sample,
+        );
     }
     let mut sum = Vec3::ZERO;
     let mut pending = [path; SPLITS as usize];
@@ -37,7 +43,7 @@ pub fn radiance(scene: &Packed, camera_path: Path, pixel: UVec2, sample: u32) ->
             primitive: NOTHING,
         };
         while path.depth <= bounces {
-            hit = closest_hit(scene, path.ray);
+            hit = closest_hit(scene, path.ray, path.left, path.wall);
             if !is_specular(scene, hit) {
                 break;
             }
@@ -72,7 +78,7 @@ pub fn is_specular(scene: &Packed, hit: Hit) -> bool {
 
 pub fn scatter(scene: &Packed, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Scattered {
     let q = &scene.primitives[hit.primitive as usize];
-    let mut surface = surface_at(q, path.ray, hit.t, scene.environment.shadow_epsilon);
+    let mut surface = surface_at(q, hit.primitive, path.ray, hit.t, scene.environment.shadow_epsilon);
     let at = arrival_of(scene, q, path, hit.t, surface);
     let lookups = scene.specialization.specular_lookups;
     let look = appearance(scene, q, &scene.materials[q.material as usize], surface, at, lookups);
@@ -103,7 +109,7 @@ pub fn radiance_from(scene: &Packed, hit: Hit, path: Path, pixel: UVec2, sample:
     if plain.kind == EMITTER {
         return plain.ambient;
     }
-    let mut surface = surface_at(q, path.ray, hit.t, scene.environment.shadow_epsilon);
+    let mut surface = surface_at(q, hit.primitive, path.ray, hit.t, scene.environment.shadow_epsilon);
     let at = arrival_of(scene, q, path, hit.t, surface);
     let look = appearance(scene, q, plain, surface, at, s.lookups);
     let material = &look.material;
@@ -134,7 +140,7 @@ pub fn lobes_of_light(
     pixel: UVec2,
     sample: u32,
 ) -> Lobes {
-    let to = segments_to_light(light, surface.start);
+    let to = segments_to_light(light, surface.position);
     let key = sample_key(pixel, scene.camera.seed, 1 + light.number);
     let mut lobes = Lobes {
         diffuse: 0.0,
@@ -150,7 +156,7 @@ pub fn lobes_of_light(
             group: sample,
             key,
         };
-        let hidden = hidden_samples(scene, surface.start, light, block);
+        let hidden = hidden_samples(scene, surface, light, block);
         lobes = phong_block(
             surface,
             material,
@@ -192,6 +198,8 @@ pub fn camera_path(scene: &Packed, place: Vec2) -> Path {
         throughput: Vec3::ONE,
         depth: 0,
         branch: 0,
+        left: NOTHING,
+        wall: NOTHING,
     }
 }
 
@@ -230,7 +238,7 @@ pub fn is_done(scene: &Packed, sum: Vec4, moments: Vec4, sample: u32) -> bool {
 
 pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {
     let ray = camera_ray(&scene.camera, pixel.as_vec2() + 0.5);
-    let hit = closest_hit(scene, ray);
+    let hit = closest_hit(scene, ray, NOTHING, NOTHING);
     if hit.primitive == NOTHING {
         return FirstHit {
             shape: NOTHING,

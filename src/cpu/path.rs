@@ -16,6 +16,8 @@ pub struct Path {
     pub throughput: Vec3,
     pub depth: u32,
     pub branch: u32,
+    pub left: u32,
+    pub wall: u32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,6 +95,8 @@ pub fn reflected_path(path: Path, surface: Surface, at: Arrival, throughput: Vec
         throughput,
         depth: path.depth + 1,
         branch: path.branch,
+        left: surface.above,
+        wall: surface.below,
     }
 }
 
@@ -118,5 +122,7 @@ pub fn refracted_path(
         throughput,
         depth: path.depth + 1,
         branch: path.branch,
+        left: surface.below,
+        wall: surface.above,
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::math::{dot, min};
+use super::math::dot;
 use crate::pack::Primitive;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +18,7 @@ pub struct Hit {
 }
 
 pub fn point_to_local(q: &Primitive, p: Vec3) -> Vec3 {
-    vector_to_local(q, p - q.center)
+    vector_to_local(q, p - q.anchor) - q.middle
 }
 
 pub fn vector_to_local(q: &Primitive, v: Vec3) -> Vec3 {
@@ -26,7 +26,7 @@ pub fn vector_to_local(q: &Primitive, v: Vec3) -> Vec3 {
 }
 
 pub fn plane_distance(q: &Primitive, ray: Ray) -> f32 {
-    dot(q.z, q.center - ray.origin) / dot(q.z, ray.direction)
+    dot(q.z, q.anchor - ray.origin) / dot(q.z, ray.direction)
 }
 
 pub fn crosses_plane(o: Vec3, d: Vec3, reach: f32) -> bool {
@@ -39,9 +39,10 @@ pub fn scaled_crossing(o: Vec3, d: Vec3) -> Vec2 {
     Vec2::new(o.x * a + s * d.x, o.y * a + s * d.y)
 }
 
-pub fn closer(hit: Hit, t: f32, i: u32) -> Hit {
+pub fn closer(hit: Hit, t: f32, i: u32, left: u32) -> Hit {
+    let nearer = (t < hit.t) & (i != left);
     Hit {
-        t: min(t, hit.t),
-        primitive: if t < hit.t { i } else { hit.primitive },
+        t: if nearer { t } else { hit.t },
+        primitive: if nearer { i } else { hit.primitive },
     }
 }

@@ -8,7 +8,7 @@ use crate::pack::Primitive;
 
 pub fn intersect_rectangle(q: &Primitive, ray: Ray, limit: f32) -> f32 {
     let t = plane_distance(q, ray);
-    let p = ray.origin + ray.direction * t - q.center;
+    let p = ray.origin + ray.direction * t - q.anchor;
     let inside = (dot(q.x, p).abs() <= 1.0) & (dot(q.y, p).abs() <= 1.0);
     if (t > 0.0) & (t < limit) & inside { t } else { limit }
 }

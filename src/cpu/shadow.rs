@@ -2,11 +2,11 @@
 
 use glam::{UVec2, Vec2, Vec3};
 
-use super::ellipsoid::ellipsoid_blocks;
+use super::ellipsoid::{ellipsoid_blocks, ellipsoid_level};
 use super::light::{Segments, segment, segments_to_light, segments_to_local};
 use super::math::dot;
 use super::plane::plane_blocks;
-use super::ray::point_to_local;
+use super::ray::vector_to_local;
 use super::rectangle::rectangle_blocks;
 use super::sampling::sample_square;
 use super::triangle::triangle_blocks;
@@ -23,13 +23,19 @@ pub struct Block {
 }
 
 #[inline(always)] // compiled for each kind
-pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, light: &Light, block: Block) -> u32 {
-    let o = point_to_local(q, p);
+pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light, block: Block) -> u32 {
+    let from_anchor = vector_to_local(q, p - q.anchor);
+    let o = from_anchor - q.middle;
+    let start = if wall { -1e-30 } else { ellipsoid_level(q, from_anchor) };
     let to = segments_to_local(q, segments_to_light(light, p));
     let mut bits = 0;
     for i in 0..block.count {
         let d = segment(to, block_sample(block, i));
-        bits |= if blocks(kind, o, d, light.reach) { 1 << i } else { 0 };
+        bits |= if blocks(kind, o, d, start, light.reach) {
+            1 << i
+        } else {
+            0
+        };
     }
     bits
 }
@@ -39,7 +45,7 @@ pub fn block_sample(block: Block, i: u32) -> Vec2 {
 }
 
 #[inline(always)] // compiled for each kind
-pub fn blocks(kind: u32, o: Vec3, d: Vec3, reach: f32) -> bool {
+pub fn blocks(kind: u32, o: Vec3, d: Vec3, start: f32, reach: f32) -> bool {
     if kind == RECTANGLE {
         return rectangle_blocks(o, d, reach);
     }
@@ -47,7 +53,7 @@ pub fn blocks(kind: u32, o: Vec3, d: Vec3, reach: f32) -> bool {
         return triangle_blocks(o, d, reach);
     }
     if kind == ELLIPSOID {
-        return ellipsoid_blocks(o, d, reach);
+        return ellipsoid_blocks(o, d, start, reach);
     }
     plane_blocks(o, d, reach)
 }

@@ -4,9 +4,10 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::{Vec2, Vec3};
 
+use super::ellipsoid::ellipsoid_level;
 use super::math::{atan2, dot, max, normalize, positive_zero};
-use super::ray::{Ray, point_to_local};
-use crate::pack::{ELLIPSOID, FirstHit, Primitive, RECTANGLE};
+use super::ray::{Ray, point_to_local, vector_to_local};
+use crate::pack::{ELLIPSOID, FirstHit, NOTHING, Primitive, RECTANGLE};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
@@ -15,25 +16,51 @@ pub struct Surface {
     pub wo: Vec3,
     pub start: Vec3,
     pub side: f32,
+    pub facing: Vec3,
+    pub above: u32,
+    pub below: u32,
+}
+
+pub fn primitive_gradient(q: &Primitive, local: Vec3) -> Vec3 {
+    let round = q.x * local.x + q.y * local.y + q.z * local.z;
+    if q.kind == ELLIPSOID { round } else { q.z }
 }
 
 pub fn primitive_normal(q: &Primitive, local: Vec3) -> Vec3 {
-    let round = q.x * local.x + q.y * local.y + q.z * local.z;
-    normalize(if q.kind == ELLIPSOID { round } else { q.z })
+    normalize(primitive_gradient(q, local))
 }
 
-pub fn surface_at(q: &Primitive, ray: Ray, t: f32, epsilon: f32) -> Surface {
-    let position = ray.origin + ray.direction * t;
-    let outward = primitive_normal(q, point_to_local(q, position));
-    let side = if dot(outward, ray.direction) > 0.0 { -1.0 } else { 1.0 };
+pub fn largest(v: Vec3) -> f32 {
+    max(max(v.x.abs(), v.y.abs()), v.z.abs())
+}
+
+pub fn surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
+    let met = ray.origin + ray.direction * t;
+    let way = met - q.anchor;
+    let from_anchor = vector_to_local(q, way);
+    let gradient = primitive_gradient(q, from_anchor - q.middle);
+    let inverse_slope = 1.0 / dot(gradient, gradient).sqrt();
+    let outward = gradient * inverse_slope;
+    let height = if q.kind == ELLIPSOID {
+        0.5 * ellipsoid_level(q, from_anchor)
+    } else {
+        from_anchor.z
+    };
+    let position = met - outward * (height * inverse_slope);
+    let inside = dot(outward, ray.direction) > 0.0;
+    let side = if inside { -1.0 } else { 1.0 };
     let normal = outward * side;
-    let size = max(max(position.x.abs(), position.y.abs()), max(position.z.abs(), t));
+    let size = max(largest(position), largest(way));
+    let round = q.kind == ELLIPSOID;
     Surface {
         position,
         normal,
         wo: -ray.direction,
         start: position + normal * (epsilon * size),
         side,
+        facing: normal,
+        above: if round & inside { NOTHING } else { i },
+        below: if round & !inside { NOTHING } else { i },
     }
 }
 

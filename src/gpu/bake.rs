@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::pack::{BLOCK, Light, Material, Packed, Primitive, Specialization, Sphere, Texture};
+use crate::pack::{BLOCK, ELLIPSOID, Light, Material, Packed, Primitive, Specialization, Sphere, Texture};
 
 /// Larger scenes are read from buffers: compiling grows with every primitive.
 pub const MOST_PRIMITIVES: usize = 64;
@@ -29,15 +29,19 @@ pub fn bake(packed: &Packed) -> String {
     let records: Vec<String> = packed.primitives.iter().map(primitive).collect();
     write_function(
         &mut out,
-        "closest_hit(ray: Ray) -> Hit",
+        "closest_hit(ray: Ray, left: u32, wall: u32) -> Hit",
         "var hit = Hit(FAR, NOTHING);",
         "hit",
         |body| {
             for (i, (p, record)) in packed.primitives.iter().zip(&records).enumerate() {
                 let kind = KINDS[p.kind as usize];
+                let wall = match p.kind {
+                    ELLIPSOID => format!("{i}u == wall, "),
+                    _ => String::new(),
+                };
                 let _ = writeln!(
                     body,
-                    "    hit = closer(hit, intersect_{kind}({record}, ray, hit.t), {i}u);"
+                    "    hit = closer(hit, intersect_{kind}({record}, {wall}ray, hit.t), {i}u, left);"
                 );
             }
         },
@@ -141,15 +145,17 @@ fn vector(v: Vec3) -> String {
 
 fn primitive(p: &Primitive) -> String {
     format!(
-        "Primitive({}, {}u, {}, {}u, {}, {}u, {}, {:?}f)",
-        vector(p.center),
+        "Primitive({}, {}u, {}, {}u, {}, {}u, {}, {:?}f, {}, {:?}f)",
+        vector(p.anchor),
         p.material,
         vector(p.x),
         p.shape,
         vector(p.y),
         p.kind,
         vector(p.z),
-        p.determinant
+        p.determinant,
+        vector(p.middle),
+        p.level
     )
 }
 

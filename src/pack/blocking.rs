@@ -61,7 +61,7 @@ impl<'a> Things<'a> {
         }
         let mut range = Range {
             normal: primitive.z.as_dvec3().normalize(),
-            center: primitive.center.as_dvec3(),
+            center: primitive.anchor.as_dvec3(),
             below: false,
             above: false,
         };

@@ -12,7 +12,7 @@ pub fn sphere(primitive: &Primitive) -> Sphere {
     let [x, y, z] = [primitive.x, primitive.y, primitive.z].map(Vec3::as_dvec3);
     let axes = DMat3::from_cols(x, y, z).transpose().inverse();
     let (a, b) = (axes.x_axis, axes.y_axis);
-    let center = primitive.center.as_dvec3();
+    let center = primitive.anchor.as_dvec3() + axes * primitive.middle.as_dvec3();
     let (center, radius) = match primitive.kind {
         RECTANGLE => (center, (a + b).length().max((a - b).length())),
         TRIANGLE => {

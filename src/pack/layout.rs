@@ -34,7 +34,7 @@ pub struct Camera {
 pub struct Environment {
     /// Ambient light.
     pub ambient: Vec3,
-    /// Offset of shadow rays, relative to the largest coordinate.
+    /// How far above a surface rays start, relative to the largest coordinate.
     pub shadow_epsilon: f32,
     /// Radiance of rays that leave the scene.
     pub background: Vec3,
@@ -42,12 +42,12 @@ pub struct Environment {
     pub light_weight: f32,
 }
 
-/// Any primitive: local = (x, y, z) (p - center), by the rows of the inverse linear map.
+/// Any primitive: local = (x, y, z) (p - anchor) - middle, by the rows of the inverse linear map.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Primitive {
-    /// Origin of local space.
-    pub center: Vec3,
+    /// A point of an ellipsoid near the origin; of any other primitive the origin of local space.
+    pub anchor: Vec3,
     /// Index of its material.
     pub material: u32,
     /// First row.
@@ -62,6 +62,10 @@ pub struct Primitive {
     pub z: Vec3,
     /// Determinant of the three rows.
     pub determinant: f32,
+    /// From the anchor to an ellipsoid's centre, by the three rows; else 0.
+    pub middle: Vec3,
+    /// |middle|² - 1, of an ellipsoid.
+    pub level: f32,
 }
 
 /// A sphere around a primitive that can cast a shadow.

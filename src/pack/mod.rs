@@ -7,6 +7,7 @@ mod constants;
 mod extent_tree;
 pub mod filter;
 mod layout;
+mod origin;
 mod pyramid;
 mod specialization;
 
@@ -22,9 +23,18 @@ use crate::scene::{self, Geometry, Parallelogram, Pattern, PixelFilter, PixelFil
 /// How far shadow rays to a directional light go: beyond any scene, yet small enough to be squared.
 const DISTANT: f32 = 1e10;
 
+/// Rays start at least so far above a surface, relative to the largest coordinate, 32 units of rounding: what the
+/// surface's own arithmetic and a neighbour's lose together (`docs/decisions/shadow-rays.md`).
+const LEAST_EPSILON: f64 = 32.0 / 16_777_216.0;
+
+/// Shadow rays end at least so far before a light's sample, as a part of the way: a light may lie on a surface.
+const BEFORE_LIGHT: f64 = 1e-5;
+
 /// A scene as both backends read it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Packed {
+    /// Where coordinates are counted from: a point of the scene file's space.
+    pub origin: DVec3,
     /// The camera.
     pub camera: Camera,
     /// What belongs to the scene as a whole.
@@ -61,6 +71,8 @@ impl Packed {
 
 /// Packs a scene.
 pub fn pack(scene: &Scene) -> Packed {
+    let origin = origin::origin(&scene.camera);
+    let scene = &*origin::seen_from(scene, origin);
     let appearances = Appearances::of(scene);
     let mut materials = appearances.materials.clone();
     let exponent_bits = exponent_bits(&scene.materials, &materials);
@@ -132,10 +144,11 @@ pub fn pack(scene: &Scene) -> Packed {
     };
     let primitives: Vec<Primitive> = order.into_iter().map(|(primitive, _)| primitive).collect();
     Packed {
-        camera: pack_camera(&scene.camera, scene.width, scene.height, scene.render.seed),
+        origin,
+        camera: pack_camera(&scene.camera, origin, scene.width, scene.height, scene.render.seed),
         environment: Environment {
             ambient: scene.render.ambient.as_vec3(),
-            shadow_epsilon: scene.render.shadow_epsilon as f32,
+            shadow_epsilon: scene.render.shadow_epsilon.max(LEAST_EPSILON) as f32,
             background: scene.render.background.as_vec3(),
             light_weight: 1.0 / light_samples.count as f32,
         },
@@ -177,15 +190,15 @@ fn side(samples: Samples) -> u32 {
     }
 }
 
-/// A camera for a picture of `width` x `height` pixels.
-pub fn pack_camera(camera: &scene::Camera, width: u32, height: u32, seed: u32) -> Camera {
+/// A camera for a picture of `width` x `height` pixels, by coordinates from `origin`.
+pub fn pack_camera(camera: &scene::Camera, origin: DVec3, width: u32, height: u32, seed: u32) -> Camera {
     let aspect = f64::from(width) / f64::from(height);
     let (projection, half_height) = match camera.projection {
         Projection::Perspective { fov } => (PERSPECTIVE, (fov / 2.0).tan()),
         Projection::Orthographic { height } => (ORTHOGRAPHIC, height / 2.0),
     };
     Camera {
-        position: camera.position.as_vec3(),
+        position: (camera.position - origin).as_vec3(),
         projection,
         right: (camera.right * half_height * aspect).as_vec3(),
         width,
@@ -213,7 +226,7 @@ fn exponent_bits(described: &[scene::Material], packed: &[Material]) -> u32 {
 }
 
 fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
-    let reach = (1.0 - shadow_epsilon) as f32;
+    let reach = (1.0 - shadow_epsilon.max(BEFORE_LIGHT)) as f32;
     let unit = Light {
         finite: 1.0,
         reach,
@@ -292,11 +305,19 @@ fn parallelogram(kind: u32, p: &Parallelogram, material: u32, shape: u32) -> Pri
     )
 }
 
-/// The primitive whose local space is mapped to the world by `columns` and then `center`.
+/// The primitive whose local space is mapped to the world by `columns` and then `center`. An ellipsoid's anchor is the
+/// point of it on the way from its centre to the origin.
 pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
-    let rows = columns.inverse().transpose();
+    let to_local = columns.inverse();
+    let rows = to_local.transpose();
+    let (mut anchor, mut middle) = (center.as_vec3(), DVec3::ZERO);
+    if kind == ELLIPSOID {
+        let outwards = (to_local * -center).normalize_or(DVec3::X);
+        anchor = (center + columns * outwards).as_vec3();
+        middle = to_local * (center - anchor.as_dvec3());
+    }
     Primitive {
-        center: center.as_vec3(),
+        anchor,
         material,
         x: rows.x_axis.as_vec3(),
         shape,
@@ -304,5 +325,7 @@ pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32,
         kind,
         z: rows.z_axis.as_vec3(),
         determinant: rows.determinant() as f32,
+        middle: middle.as_vec3(),
+        level: (middle.length_squared() - 1.0) as f32,
     }
 }

@@ -54,6 +54,8 @@ pub struct Scene {
 pub struct Camera {
     /// The centre of projection; for an orthographic camera the middle of the image plane.
     pub position: DVec3,
+    /// What is in the middle of the picture.
+    pub look_at: DVec3,
     /// Unit vector to the right in the picture.
     pub right: DVec3,
     /// Unit vector upwards in the picture.
@@ -89,7 +91,7 @@ pub struct Render {
     pub ambient: DVec3,
     /// Radiance of rays that leave the scene.
     pub background: DVec3,
-    /// Offset of shadow rays, relative to the largest coordinate of their start.
+    /// How far above a surface rays start at least, relative to the largest coordinate there.
     pub shadow_epsilon: f64,
     /// Whether glass casts shadows.
     pub shadows: Shadows,

@@ -11,7 +11,7 @@ use wgray::cpu::path::Path;
 use wgray::cpu::ray::point_to_local;
 use wgray::cpu::surface::{Surface, surface_at};
 use wgray::cpu::traverse::closest_hit;
-use wgray::pack::{Packed, Primitive};
+use wgray::pack::{NOTHING, Packed, Primitive};
 
 use super::scene;
 
@@ -134,15 +134,17 @@ fn arrive(scene: &Packed, at: Vec2) -> Option<(Primitive, Surface, Arrival, u32)
         throughput: Vec3::ONE,
         depth: 0,
         branch: 0,
+        left: NOTHING,
+        wall: NOTHING,
     };
     loop {
-        let hit = closest_hit(scene, path.ray);
+        let hit = closest_hit(scene, path.ray, path.left, path.wall);
         let q = scene.primitives.get(hit.primitive as usize)?;
         if is_specular(scene, hit) {
             path = scatter(scene, hit, path, UVec2::ZERO, 0).onward;
             continue;
         }
-        let surface = surface_at(q, path.ray, hit.t, scene.environment.shadow_epsilon);
+        let surface = surface_at(q, hit.primitive, path.ray, hit.t, scene.environment.shadow_epsilon);
         return Some((*q, surface, arrival_of(scene, q, path, hit.t, surface), path.depth));
     }
 }
@@ -268,15 +270,17 @@ fn a_curved_mirror_needs_its_curvature() {
     let at = Vec2::new(33.0, 22.0);
     let differential = camera_differential(&scene.camera, at, 1.0);
     let ray = camera_ray(&scene.camera, at);
-    let hit = closest_hit(&scene, ray);
+    let hit = closest_hit(&scene, ray, NOTHING, NOTHING);
     let q = &scene.primitives[hit.primitive as usize];
-    let surface = surface_at(q, ray, hit.t, 1e-5);
+    let surface = surface_at(q, hit.primitive, ray, hit.t, 1e-5);
     let path = Path {
         ray,
         differential,
         throughput: Vec3::ONE,
         depth: 0,
         branch: 0,
+        left: NOTHING,
+        wall: NOTHING,
     };
     let arrival = arrival_of(&scene, q, path, hit.t, surface);
     let mirrored = |at: DVec2| {

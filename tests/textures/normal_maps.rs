@@ -3,6 +3,7 @@
 use glam::Vec3;
 use wgray::cpu::differential::Arrival;
 use wgray::cpu::path::usable_normal;
+use wgray::cpu::phong::phong_lobes;
 use wgray::cpu::ray::Ray;
 use wgray::cpu::surface::surface_at;
 use wgray::cpu::texture::appearance;
@@ -56,7 +57,7 @@ fn normal(scene: &Packed, primitive: usize, origin: Vec3, target: Vec3) -> Vec3 
         origin,
         direction: (target - origin).normalize(),
     };
-    let surface = surface_at(q, ray, (target - origin).length(), 1e-5);
+    let surface = surface_at(q, 0, ray, (target - origin).length(), 1e-5);
     let look = appearance(
         scene,
         q,
@@ -137,7 +138,7 @@ fn a_flat_map_changes_nothing() {
             origin,
             direction: (target - origin).normalize(),
         };
-        let plain = surface_at(q, ray, (target - origin).length(), 1e-5).normal;
+        let plain = surface_at(q, 0, ray, (target - origin).length(), 1e-5).normal;
         assert!(near(normal(&flat, 1, origin, target), plain));
     }
 }
@@ -150,9 +151,27 @@ fn mirrors_use_no_normal_that_would_lead_into_them() {
         origin: Vec3::new(5.0, 0.0, 1.0),
         direction: Vec3::new(-5.0, 0.0, -1.0).normalize(),
     };
-    let surface = surface_at(q, grazing, 26f32.sqrt(), 1e-5);
+    let surface = surface_at(q, 0, grazing, 26f32.sqrt(), 1e-5);
     let bent = normal(&map, 0, grazing.origin, Vec3::ZERO);
     assert_eq!(usable_normal(surface, bent), bent);
     let away = Vec3::new(-bent.x, 0.0, bent.z);
     assert_eq!(usable_normal(surface, away), surface.normal);
+}
+
+/// A flat surface does not hide its own points, so its own side must: a normal that is turned towards a light behind the
+/// surface sees none of it.
+#[test]
+fn a_bent_normal_sees_no_light_from_behind() {
+    let map = shapes(Vec3::new(0.9, 0.0, 0.3).normalize(), "", 1.0);
+    let q = &map.primitives[0];
+    let ray = Ray {
+        origin: Vec3::new(0.3, 0.2, 3.0),
+        direction: Vec3::NEG_Z,
+    };
+    let mut surface = surface_at(q, 0, ray, 3.0, 1e-5);
+    surface.normal = normal(&map, 0, ray.origin, Vec3::new(0.3, 0.2, 0.0));
+    let material = &map.materials[q.material as usize];
+    let lobes = |height: f32| phong_lobes(surface, material, Vec3::new(surface.normal.x.signum(), 0.0, height), 0);
+    assert!(surface.normal.x.abs() > 0.5 && lobes(0.1).diffuse > 0.5);
+    assert_eq!((lobes(-0.1).diffuse, lobes(-0.1).specular), (0.0, 0.0));
 }

@@ -106,9 +106,11 @@ impl Painter {
 
     /// The camera that is looked through, for a scene.
     pub(super) fn packed_camera(&self, loaded: &Loaded) -> Camera {
-        let own = loaded.packed.camera;
+        let (own, origin) = (loaded.packed.camera, loaded.packed.origin);
         let camera = self.camera.as_ref().and_then(|camera| camera.validate().ok());
-        camera.map_or(own, |camera| pack_camera(&camera, own.width, own.height, own.seed))
+        camera.map_or(own, |camera| {
+            pack_camera(&camera, origin, own.width, own.height, own.seed)
+        })
     }
 
     /// A scene with the camera that is looked through.

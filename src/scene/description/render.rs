@@ -15,7 +15,7 @@ pub struct RenderDescription {
     pub ambient: DVec3,
     /// Radiance of rays that leave the scene.
     pub background: DVec3,
-    /// Relative offset of shadow rays.
+    /// How far above a surface rays start at least, relative to the largest coordinate there.
     pub shadow_epsilon: f64,
     /// Whether glass casts shadows.
     pub shadows: Shadows,
@@ -46,7 +46,7 @@ impl Default for RenderDescription {
             integrator: Integrator::Phong,
             ambient: DVec3::ZERO,
             background: DVec3::ZERO,
-            shadow_epsilon: 1e-5,
+            shadow_epsilon: 0.0,
             shadows: Shadows::Opaque,
             max_depth: 8,
             ray_differentials: true,

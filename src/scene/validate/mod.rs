@@ -227,6 +227,7 @@ fn camera(description: &CameraDescription) -> Checked<Camera> {
     let right = right.normalize();
     Ok(Camera {
         position,
+        look_at,
         right,
         up: right.cross(forward),
         forward,

@@ -99,6 +99,7 @@ fn a_good_scene_is_what_its_file_says() {
     assert_eq!((scene.width, scene.height), (8, 4));
     let camera = Camera {
         position: DVec3::new(0.0, -4.0, 1.0),
+        look_at: DVec3::new(0.0, 0.0, 1.0),
         right: DVec3::X,
         up: DVec3::Z,
         forward: DVec3::Y,

@@ -1,0 +1,249 @@
+//! Spheres as grounds, from a thousandth to ten thousand of a scene's sizes, near the origin and far away: no point of a
+//! surface hides its own light, and shadows are right where things touch. The oracle, in f64, is the truth.
+
+use glam::DVec3;
+use wgray::cpu::camera::camera_ray;
+use wgray::cpu::surface::surface_at;
+use wgray::cpu::traverse::closest_hit;
+use wgray::pack::NOTHING;
+use wgray::scene::Description;
+
+use crate::oracle::{Flaw, Oracle};
+use crate::pictures::{differing, exact_ways, means, reference, render};
+use crate::random::Random;
+use crate::scenes::packed;
+
+/// A scene of the given size in the middle, whose text has lengths in units of that size.
+struct Setting {
+    size: f64,
+    offset: DVec3,
+}
+
+impl Setting {
+    fn point(&self, p: [f64; 3]) -> String {
+        format!("{:?}", (DVec3::from(p) * self.size + self.offset).to_array())
+    }
+
+    fn sphere(&self, material: &str, center: [f64; 3], radius: f64) -> String {
+        format!(
+            "[[shapes]]\ntype = 'sphere'\nmaterial = '{material}'\ncenter = {}\nradius = {:?}\n",
+            self.point(center),
+            radius * self.size
+        )
+    }
+
+    /// Seen from `from`, lit by a point light.
+    fn scene(&self, from: [f64; 3], to: [f64; 3], light: [f64; 3], shapes: &str) -> Description {
+        let text = format!(
+            "[image]\nwidth = 48\nheight = 36\n\
+             [camera]\nposition = {}\nlook_at = {}\nfov = 40\n\
+             [render]\nambient = [0.1, 0.1, 0.1]\nbackground = [0.2, 0.3, 0.4]\nmax_depth = 2\n\
+             pixel_samples = {{ count = 1 }}\nlight_samples = {{ count = 1 }}\n\
+             [materials.dull]\ntype = 'phong'\ncolor = [0.7, 0.6, 0.5]\nspecular = [0, 0, 0]\n\
+             [materials.mirror]\ntype = 'mirror'\n[materials.glass]\ntype = 'glass'\nior = 1.4\n\
+             [[lights]]\ntype = 'point'\nposition = {}\ncolor = [0.8, 0.8, 0.8]\n{shapes}",
+            self.point(from),
+            self.point(to),
+            self.point(light)
+        );
+        Description::parse(&text, "test").unwrap_or_else(|error| panic!("{error}\n{text}"))
+    }
+}
+
+/// Near the origin and a thousand sizes from it, of all magnitudes.
+fn settings() -> Vec<Setting> {
+    let mut all = Vec::new();
+    for size in [1e-3, 1.0, 1e3] {
+        for offset in [DVec3::ZERO, DVec3::new(1000.3, -999.1, 577.7)] {
+            let offset = offset * size;
+            all.push(Setting { size, offset });
+        }
+    }
+    all
+}
+
+const ABOVE: [f64; 3] = [0.3, -4.0, 1.5];
+const LIGHT: [f64; 3] = [2.0, -2.5, 4.0];
+
+/// The device gives the same bits.
+fn same_on_all_paths(d: &Description) {
+    let packed = packed(d);
+    let cpu = reference(&packed);
+    for way in exact_ways() {
+        assert_eq!(differing(&render(&packed, way), &cpu), 0, "{way:?}");
+    }
+}
+
+/// Light that is there or not makes a tenth; at a small sphere's limb a normal's last digits make less than this.
+const TOLERANCE: f64 = 1e-3;
+
+/// How many pixels are not the oracle's.
+fn wrong(d: &Description) -> usize {
+    let truth = Oracle::new(d, Flaw::None).picture();
+    let cpu = reference(&packed(d));
+    let close = |(a, b): (&f64, &f64)| (a - b).abs() <= TOLERANCE;
+    let pixels = means(&cpu).into_iter().zip(&truth);
+    pixels.filter(|(a, b)| !a.iter().zip(*b).all(close)).count()
+}
+
+/// Grounds of all radii, and the pixels of each that may be wrong: those on edges. `shapes` stand on it.
+fn check(radii: &[f64], most: usize, shapes: impl Fn(&Setting, f64) -> String) {
+    for setting in settings() {
+        for &radius in radii {
+            let d = setting.scene(ABOVE, [0.0, 0.0, 0.2], LIGHT, &shapes(&setting, radius));
+            let found = wrong(&d);
+            if radius == 1e3 && setting.size == 1.0 && setting.offset != DVec3::ZERO {
+                same_on_all_paths(&d);
+            }
+            let (size, offset) = (setting.size, setting.offset);
+            assert!(
+                found <= most,
+                "radius {radius}, size {size}, offset {offset}: {found} pixels of 1,728 are wrong"
+            );
+        }
+    }
+}
+
+const RADII: &[f64] = &[0.3, 1.0, 100.0, 1e3, 1e4];
+
+#[test]
+fn a_sphere_hides_no_light_from_its_own_points() {
+    check(RADII, 1, |s, radius| s.sphere("dull", [0.0, 0.0, -radius], radius));
+}
+
+#[test]
+fn small_spheres_on_large_ones_have_their_contact_shadows() {
+    check(&[100.0, 1e3, 1e4], 4, |s, radius| {
+        let on_it = |x: f64, r: f64| {
+            let up = ((radius + r).powi(2) - x * x).sqrt() - radius;
+            s.sphere("dull", [x, 0.0, up], r)
+        };
+        let ground = s.sphere("dull", [0.0, 0.0, -radius], radius);
+        ground + &on_it(-0.6, 0.5) + &on_it(0.4, 0.2) + &on_it(0.9, 0.05)
+    });
+}
+
+/// A grain of a thousandth, seen from near: the ground is ten million times as large.
+#[test]
+fn a_grain_on_the_largest_ground_has_its_contact_shadow() {
+    for offset in [DVec3::ZERO, DVec3::splat(1000.7)] {
+        let setting = Setting { size: 1.0, offset };
+        for radius in [1.0, 1e4] {
+            let shapes =
+                setting.sphere("dull", [0.0, 0.0, -radius], radius) + &setting.sphere("dull", [0.0, 0.0, 1e-3], 1e-3);
+            let d = setting.scene([0.0, -0.006, 0.003], [0.0, 0.0, 0.0005], LIGHT, &shapes);
+            let found = wrong(&d);
+            assert!(found <= 4, "radius {radius}, offset {offset}: {found} pixels");
+        }
+    }
+}
+
+#[test]
+fn mirrors_and_glass_of_all_radii_do_not_meet_themselves() {
+    for material in ["mirror", "glass"] {
+        check(RADII, 14, |s, radius| {
+            let ground = s.sphere(material, [0.0, 0.0, -radius], radius);
+            ground + &s.sphere("dull", [0.2, 0.5, 0.6], 0.5)
+        });
+    }
+}
+
+#[test]
+fn the_inside_of_a_sphere_is_lit_from_inside_alone() {
+    for setting in settings() {
+        for radius in [1.0, 100.0, 1e4] {
+            let up = |height: f64| [0.1, 0.0, height - radius];
+            let shapes = setting.sphere("dull", [0.0, 0.0, -radius], radius);
+            let outside = setting.scene(up(radius - 0.3), [0.0, 0.2, 0.0], [0.0, 0.0, 0.5], &shapes);
+            let inside = setting.scene(up(radius - 0.3), [0.0, 0.2, 0.0], [0.0, 0.0, -0.5], &shapes);
+            if radius == 100.0 && setting.size == 1.0 {
+                same_on_all_paths(&outside);
+            }
+            for d in [outside, inside] {
+                let found = wrong(&d);
+                assert!(found <= 1, "radius {radius}, size {}: {found} pixels", setting.size);
+            }
+        }
+    }
+}
+
+/// Faces that share edges, seen and lit along lines of symmetry, which pixels' centres lie on.
+#[test]
+fn neighbours_hide_no_light_at_shared_edges() {
+    for setting in settings() {
+        let p = |p: [f64; 3]| setting.point(p);
+        let floor = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| {
+            let vertices = [a, b, c].map(p).join(", ");
+            format!("[[shapes]]\ntype = 'triangle'\nmaterial = 'dull'\nvertices = [{vertices}]\n")
+        };
+        // two that make a square, tilted, and a third below it, so that both can cast shadows
+        let tilt = |x: f64, y: f64| [x, y, 0.3 * x + 0.1 * y];
+        let corners = [tilt(-3.0, -3.0), tilt(3.0, -3.0), tilt(3.0, 3.0), tilt(-3.0, 3.0)];
+        let below = floor([-1.0, -1.0, -3.0], [1.0, -1.0, -3.0], [0.0, 1.0, -3.0]);
+        let square = floor(corners[0], corners[1], corners[2]) + &floor(corners[0], corners[2], corners[3]);
+        let d = setting.scene([0.0, -0.01, 5.0], [0.0, 0.0, 0.0], [-6.0, 5.5, 2.0], &(below + &square));
+        assert_eq!(wrong(&d), 0, "a square of triangles, size {}", setting.size);
+        // a box of rectangles on a floor of one, and a tetrahedron beside it
+        let face = |center: [f64; 3], side: f64, normal: [f64; 3], tangent: [f64; 3]| {
+            format!(
+                "[[shapes]]\ntype = 'rectangle'\nmaterial = 'dull'\ncenter = {}\nsize = [{side:?}, {side:?}]\n\
+                 normal = {normal:?}\ntangent = {tangent:?}\n",
+                p(center),
+                side = side * setting.size
+            )
+        };
+        let (c, s) = (0.8, 0.6);
+        let box_faces = face([0.0, 0.0, 1.0], 1.0, [0.0, 0.0, 1.0], [c, s, 0.0])
+            + &face([0.5 * c, 0.5 * s, 0.5], 1.0, [c, s, 0.0], [0.0, 0.0, 1.0])
+            + &face([-0.5 * s, 0.5 * c, 0.5], 1.0, [-s, c, 0.0], [0.0, 0.0, 1.0])
+            + &face([-0.5 * c, -0.5 * s, 0.5], 1.0, [-c, -s, 0.0], [0.0, 0.0, 1.0])
+            + &face([0.5 * s, -0.5 * c, 0.5], 1.0, [s, -c, 0.0], [0.0, 0.0, 1.0])
+            + &face([0.0, 0.0, 0.0], 9.0, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
+        let corners = [[1.0, -1.5, 0.0], [1.7, -1.3, 0.0], [1.2, -0.8, 0.0], [1.3, -1.2, 0.9]].map(p);
+        let solid = format!(
+            "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'dull'\nvertices = [{}]\n",
+            corners.join(", ")
+        );
+        let d = setting.scene(ABOVE, [0.2, 0.0, 0.4], [-3.0, -2.0, 3.0], &(box_faces + &solid));
+        let found = wrong(&d);
+        assert!(
+            found <= 2,
+            "a box, size {}, offset {}: {found} pixels",
+            setting.size,
+            setting.offset
+        );
+    }
+}
+
+/// Rays start above what they leave, but hardly: in f64, and over all sizes.
+#[test]
+fn rays_start_a_little_above_their_surface() {
+    let random = Random::new(5);
+    let mut highest = 0.0f64;
+    for setting in settings() {
+        for radius in [1e-3, 0.1, 1.0, 1e2, 1e4] {
+            let shapes = setting.sphere("dull", [0.0, 0.0, -radius], radius);
+            let distance = 3.0 * radius.min(1.0);
+            let d = setting.scene([0.0, -distance, 0.4 * distance], [0.0, 0.0, 0.0], LIGHT, &shapes);
+            let (scene, size) = (packed(&d), setting.size);
+            let center = DVec3::new(0.0, 0.0, -radius) * size + setting.offset - scene.origin;
+            for _ in 0..2000 {
+                let at = glam::Vec2::new((random.unit() * 48.0) as f32, (random.unit() * 36.0) as f32);
+                let ray = camera_ray(&scene.camera, at);
+                let hit = closest_hit(&scene, ray, NOTHING, NOTHING);
+                if hit.primitive == NOTHING {
+                    continue;
+                }
+                let epsilon = scene.environment.shadow_epsilon;
+                let surface = surface_at(&scene.primitives[0], hit.primitive, ray, hit.t, epsilon);
+                let height = surface.start.as_dvec3().distance(center) - radius * size;
+                let position = surface.position.as_dvec3();
+                let offset = (surface.start - surface.position).length();
+                assert!(height > 0.0, "radius {radius}, size {size}: {height:e} of {offset:e}");
+                highest = highest.max(height / position.abs().max_element().max(distance * size));
+            }
+        }
+    }
+    println!("at most {highest:.1e} of the distance above");
+    assert!(highest < 1e-5, "{highest}");
+}
