@@ -102,12 +102,12 @@ fn bilinear_color(t: Texture, level: Level, uv: vec2f) -> vec3f {
 
 // The elliptical weighted average: Greene and Heckbert, "Creating Raster Omnimax Images from Multiple Perspective Views
 // Using the Elliptical Weighted Average Filter", IEEE CG&A 6(6), 1986; over a pyramid as in Pharr, Jakob and Humphreys,
-// "Physically Based Rendering", 3rd edition, 10.4.5, but on finer levels: in the level's texels the minor axis' half is
-// from 2 to 4. The last quarter of the way to the next level mixes the two.
+// "Physically Based Rendering", 3rd edition, 10.4.5, but on finer levels: in the level's texels half the minor axis is from
+// 2.2 to 4.4. The last quarter of the way to the next level mixes the two.
 fn ewa_color(t: Texture, f: Footprint) -> vec3f {
     let size = vec2f(f32(t.width), f32(t.height));
     let minor = footprint_ellipse(f.dx * size, f.dy * size, t.parameter).minor;
-    let lod = level_of_length(t, 0.5 * minor);
+    let lod = level_of_length(t, 0.45 * minor);
     let finer = floor(lod);
     let between = max(4.0 * (lod - finer) - 3.0, 0.0);
     let coarsest = lod >= f32(t.levels - 1u); // one texel: no footprint is needed, and it may have no bound

@@ -110,7 +110,7 @@ pub fn bilinear_color(scene: &Packed, t: &Texture, level: Level, uv: Vec2) -> Ve
 pub fn ewa_color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
     let size = Vec2::new(t.width as f32, t.height as f32);
     let minor = footprint_ellipse(f.dx * size, f.dy * size, t.parameter).minor;
-    let lod = level_of_length(t, 0.5 * minor);
+    let lod = level_of_length(t, 0.45 * minor);
     let finer = floor(lod);
     let between = max(4.0 * (lod - finer) - 3.0, 0.0);
     let coarsest = lod >= (t.levels - 1) as f32;
