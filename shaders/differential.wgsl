@@ -1,5 +1,5 @@
 // Ray differentials: how a ray changes with the point of the picture that it belongs to. Homan Igehy, "Tracing Ray
-// Differentials", SIGGRAPH 1999; equation numbers are those of that paper.
+// Differentials", SIGGRAPH 1999; sections are those of that paper.
 
 // Of a ray with respect to one coordinate of the picture, times the distance of two samples.
 struct Derivative {
@@ -12,7 +12,7 @@ struct Differential {
     y: Derivative,
 }
 
-// Along the ray to its hit at t, on a surface with this normal: (10) to (12).
+// Along the ray to its hit at t, on a surface with this normal: section 3.1, transfer.
 fn transferred(derivative: Derivative, ray: Ray, t: f32, normal: vec3f) -> Derivative {
     let moved = derivative.position + derivative.direction * t;
     let dt = dot(moved, normal) / dot(ray.direction, normal);
@@ -30,13 +30,14 @@ fn normal_derivative(q: Primitive, local: vec3f, dp: vec3f) -> vec3f {
     return select(vec3f(0.0), (dg - n * dot(n, dg)) * scale, q.kind == ELLIPSOID);
 }
 
-// By a mirror with the normal n: (14) to (16).
+// By a mirror with the normal n: section 3.1, reflection.
 fn reflected_derivative(derivative: Derivative, d: vec3f, n: vec3f, dn: vec3f) -> Derivative {
     let d_n = dot(derivative.direction, n) + dot(d, dn);
     return Derivative(derivative.position, derivative.direction - (dn * dot(d, n) + n * d_n) * 2.0);
 }
 
-// Into a medium, eta the ratio of the indices of refraction and `cosine` that of the refracted ray: (17) to (19).
+// Into a medium, eta the ratio of the indices of refraction and `cosine` that of the refracted ray: section 3.1,
+// refraction.
 fn refracted_derivative(derivative: Derivative, d: vec3f, n: vec3f, dn: vec3f, eta: f32, cosine: f32) -> Derivative {
     let d_n = dot(d, n);
     let mu = eta * d_n + cosine;

@@ -1,65 +1,184 @@
-// Textures that are computed: a checker and a grid of lines, averaged over the footprint.
+// Textures that are computed: a checker and a grid of lines. Both are made of one function along u and one along v: the
+// pulse, 1 on a part `on` of each period of 1 and 0 on the rest. Less its mean it is a wave; the wave's first and second
+// integrals have a closed form, and so has the mean of both waves' product over a parallelogram.
 
-// Pieces that a footprint is cut into along its longer edge; each is averaged as a box along u and v.
-const MOST_PIECES: f32 = 16.0;
-
-// The share of the second colour in a footprint: its mean over the pieces of a parallelogram. A piece has the box's
-// width that gives it the same variance along u and along v, which is exact where its edges are.
+// The share of the second colour in a footprint: its mean over the parallelogram.
 fn pattern_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
-    let swap = f.dx.x * f.dx.x + f.dx.y * f.dx.y < f.dy.x * f.dy.x + f.dy.y * f.dy.y;
-    let long = select(f.dx, f.dy, swap);
-    let short = select(f.dy, f.dx, swap);
-    let long_length = sqrt(long.x * long.x + long.y * long.y);
-    let short_length = sqrt(short.x * short.x + short.y * short.y);
-    let skewed = (abs(long.x) > 0.0) & (abs(long.y) > 0.0);
-    let pieces = select(1.0, floor(min(long_length / short_length, MOST_PIECES - 1.0)) + 1.0, skewed);
-    let piece = long / pieces;
-    let width = vec2f(sqrt(piece.x * piece.x + short.x * short.x), sqrt(piece.y * piece.y + short.y * short.y));
-    var sum = 0.0;
-    for (var i = 0.0; i < pieces; i += 1.0) {
-        let at = f.uv + long * ((i + 0.5) / pieces - 0.5);
-        sum += select(lines_in_box(at, width, line_width), checker_in_box(at, width), kind == CHECKER);
+    let checker = kind == CHECKER;
+    let scale = select(1.0, 0.5, checker);
+    let on = select(line_width, 0.5, checker);
+    let shift = select(0.5 * line_width, 0.0, checker);
+    let wide_x = !((abs(f.dx.x) + abs(f.dy.x)) * scale < WIDEST);
+    let wide_y = !((abs(f.dx.y) + abs(f.dy.y)) * scale < WIDEST);
+    let dx = vec2f(select(f.dx.x * scale, 0.0, wide_x), select(f.dx.y * scale, 0.0, wide_y));
+    let dy = vec2f(select(f.dy.x * scale, 0.0, wide_x), select(f.dy.y * scale, 0.0, wide_y));
+    let swap = dx.x * dx.x + dx.y * dx.y < dy.x * dy.x + dy.y * dy.y;
+    let long = select(dx, dy, swap);
+    let short = widened_edge(long, select(dy, dx, swap));
+    let reach = vec2f(abs(long.x) + abs(short.x), abs(long.y) + abs(short.y));
+    let at = vec2f(phase(f.uv.x * scale + shift), phase(f.uv.y * scale + shift));
+
+    // A footprint that meets at most one step of a pulse is looked at from there: that keeps the digits of small ones.
+    let least = min(on, 1.0 - on);
+    let near_x = reach.x < least;
+    let near_y = reach.y < least;
+    let offset = vec2f(nearest_step(at.x, on), nearest_step(at.y, on));
+    let rise = vec2f(select(0.5, -0.5, offset.x == at.x - on), select(0.5, -0.5, offset.y == at.y - on));
+    let wave = vec2f(wave_mean(select(at.x, offset.x, near_x), long.x, short.x, on, near_x),
+                     wave_mean(select(at.y, offset.y, near_y), long.y, short.y, on, near_y));
+    let mean_x = select(select(on + wave.x, 0.5 + rise.x * wave.x, near_x), on, wide_x);
+    let mean_y = select(select(on + wave.y, 0.5 + rise.y * wave.y, near_y), on, wide_y);
+
+    // The mean of the product is the product of the means where one of the two is constant.
+    let apart = wide_x | wide_y | (near_x & (abs(offset.x) >= 0.5 * reach.x)) | (near_y & (abs(offset.y) >= 0.5 * reach.y));
+    let crossed = max(min(abs(long.x), abs(long.y)), min(abs(short.x), abs(short.y)));
+    var together = 0.0;
+    if crossed > MOST_PERIODS {
+        together = far_product(at, long, short, on);
+    } else {
+        let near = near_x & near_y;
+        let area = long.x * short.y - long.y * short.x;
+        let product = around_footprint(select(at, offset, near), long, short, on, near) / area;
+        together = select(product - (mean_x - on) * (mean_y - on), rise.x * rise.y * (product - wave.x * wave.y), near);
     }
-    return sum / pieces;
+    let both = mean_x * mean_y + select(together, 0.0, apart);
+    let share = mean_x + mean_y - both * select(1.0, 2.0, checker);
+    return min(max(share, 0.0), 1.0);
 }
 
-// The share of odd squares of side 1 in a box around `at`.
-fn checker_in_box(at: vec2f, width: vec2f) -> f32 {
-    return 0.5 - 0.5 * (square_wave(at.x, width.x) * square_wave(at.y, width.y));
+// The place in a period.
+fn phase(x: f32) -> f32 {
+    let small = select(0.0, x, abs(x) < 8388608.0); // larger ones have no fraction
+    return small - floor(small);
 }
 
-// The mean over an interval around x of the function that is 1 from 0 to 1, -1 from 1 to 2, and so on.
-fn square_wave(x: f32, width: f32) -> f32 {
-    let reduced = x - 2.0 * floor(0.5 * x);
-    let point = select(-1.0, 1.0, reduced < 1.0);
-    let mean = (square_wave_integral(reduced + 0.5 * width) - square_wave_integral(reduced - 0.5 * width)) / width;
-    return select(0.0, select(point, mean, width > NARROWEST), width < WIDEST);
+// The shorter edge, moved away from the longer one's line if it is near to it: a footprint has an area, or is a point.
+fn widened_edge(long: vec2f, short: vec2f) -> vec2f {
+    let length = sqrt(long.x * long.x + long.y * long.y);
+    let across = vec2f(-long.y, long.x) / max(length, 1e-30);
+    let width = across.x * short.x + across.y * short.y;
+    let least = THINNEST * min(length, 1.0);
+    let more = select(least, -least, width < 0.0) - width;
+    return short + across * select(0.0, more, abs(width) < least);
 }
 
-fn square_wave_integral(x: f32) -> f32 {
-    let reduced = x - 2.0 * floor(0.5 * x);
-    return 1.0 - abs(reduced - 1.0);
+// From the nearest of the pulse's steps, which are at 0, `on` and 1, to x in [0, 1).
+fn nearest_step(x: f32, on: f32) -> f32 {
+    let outer = select(x - 1.0, x, x < 0.5);
+    let inner = x - on;
+    return select(outer, inner, abs(inner) < abs(outer));
 }
 
-// The share of lines around whole numbers in a box around `at`.
-fn lines_in_box(at: vec2f, width: vec2f, line_width: f32) -> f32 {
-    return 1.0 - (1.0 - pulse(at.x, width.x, line_width)) * (1.0 - pulse(at.y, width.y, line_width));
+// The wave; `near`: the sign of x, a step seen from itself.
+fn wave_value(x: f32, on: f32, near: bool) -> f32 {
+    return select(select(-on, 1.0 - on, x - floor(x) < on), select(1.0, -1.0, x < 0.0), near);
 }
 
-// The share of an interval around x that is within half a line's width of a whole number.
-fn pulse(x: f32, width: f32, line_width: f32) -> f32 {
-    let reduced = x - floor(x) + 0.5 * line_width; // lines now start at whole numbers
-    let point = select(0.0, 1.0, reduced - floor(reduced) < line_width);
-    let below = pulse_integral(reduced - 0.5 * width, line_width);
-    let mean = (pulse_integral(reduced + 0.5 * width, line_width) - below) / width;
-    return select(line_width, select(point, mean, width > NARROWEST), width < WIDEST);
+// Its integral, with the mean 0 over a period.
+fn wave_integral(x: f32, on: f32, near: bool) -> f32 {
+    let r = x - floor(x);
+    return select(min(r * (1.0 - on), (1.0 - r) * on) - 0.5 * on * (1.0 - on), abs(x), near);
 }
 
-fn pulse_integral(x: f32, line_width: f32) -> f32 {
-    let whole = floor(x);
-    return whole * line_width + min(x - whole, line_width);
+// The integral of that.
+fn wave_integral_2(x: f32, on: f32, near: bool) -> f32 {
+    let r = x - floor(x);
+    let s = 1.0 - r;
+    let far = select(0.5 * on * s * (1.0 - on - s), 0.5 * (1.0 - on) * r * (r - on), r < on);
+    return select(far, 0.5 * x * abs(x), near);
 }
 
-// Below the one the mean loses its digits, and is the value itself; above the other it is that of the whole pattern.
-const NARROWEST: f32 = 0.0001;
+// The wave's mean along one axis, over a footprint around x whose edges are a and b along it.
+fn wave_mean(x: f32, a: f32, b: f32, on: f32, near: bool) -> f32 {
+    let long = max(abs(a), abs(b));
+    let short = min(abs(a), abs(b));
+    let outer = 0.5 * (long + short);
+    let inner = 0.5 * (long - short);
+    let boxed = (wave_integral(x + 0.5 * long, on, near) - wave_integral(x - 0.5 * long, on, near)) / long;
+    let after = wave_integral_2(x + outer, on, near) - wave_integral_2(x + inner, on, near);
+    let before = wave_integral_2(x - inner, on, near) - wave_integral_2(x - outer, on, near);
+    let mean = select((after - before) / (long * short), boxed, short < 0.001 * long);
+    return select(mean, wave_value(x, on, near), (long < 1e-6) | (near & (abs(x) >= outer)));
+}
+
+// The integral of both waves' product over the footprint around `at` with the edges a and b. By Green's theorem it is
+// that of W(x) w(y) dy around it, where W is the integral of the wave w.
+fn around_footprint(at: vec2f, a: vec2f, b: vec2f, on: f32, near: bool) -> f32 {
+    let half = (a + b) * 0.5;
+    let other = (a - b) * 0.5;
+    var sum = 0.0;
+    var tail = at - half;
+    for (var i = 0; i < 4; i++) {
+        let head = at + select(half, other, (i == 0) | (i == 2)) * select(-1.0, 1.0, i < 2);
+        sum += along_edge(tail, head, on, near);
+        tail = head;
+    }
+    return sum;
+}
+
+// The integral of W(x) w(y) dy along an edge. Along a flat one it is the slope times that of W(x) w(y) dx: by parts, with
+// the second integral at the ends and where w(y) steps. Along a steep one x and y change places: the integrals of
+// W(x) w(y) dy and of W(y) w(x) dx are together W(x) W(y) at the ends.
+fn along_edge(tail: vec2f, head: vec2f, on: f32, near: bool) -> f32 {
+    let steep = abs(head.x - tail.x) < abs(head.y - tail.y);
+    let start = select(tail, tail.yx, steep);
+    let end = select(head, head.yx, steep);
+    let up = end.y >= start.y;
+    let low = select(end, start, up);
+    let high = select(start, end, up);
+    let run = high.x - low.x;
+    let rise = high.y - low.y;
+    let inverse = run / rise;
+    let first = select(floor(low.y), 0.0, near);
+    let last = select(min(floor(high.y) - first, MOST_PERIODS + 2.0), 0.0, near);
+    let value_low = wave_value(low.y, on, near);
+    let value_high = wave_value(high.y, on, near);
+    let height = select(1.0, 2.0, near);
+    var steps = 0.0;
+    for (var i = 0.0; i <= last; i += 1.0) {
+        let y = first + i - low.y;
+        let rises = select(i > 0.0, (value_low < 0.0) & (value_high > 0.0), near);
+        let falls = !near & ((i > 0.0) | (value_low > 0.0)) & ((i < last) | (value_high <= 0.0));
+        steps += select(0.0, height * wave_integral_2(low.x + y * inverse, on, near), rises);
+        steps -= select(0.0, wave_integral_2(low.x + (y + on) * inverse, on, near), falls);
+    }
+    let ends = wave_integral_2(high.x, on, near) * value_high - wave_integral_2(low.x, on, near) * value_low;
+    let along = select(0.0, rise / run, rise > 0.0) * (ends - steps) * select(-1.0, 1.0, up);
+    let corners = wave_integral(end.x, on, near) * wave_integral(end.y, on, near)
+        - wave_integral(start.x, on, near) * wave_integral(start.y, on, near);
+    return select(along, corners - along, steep);
+}
+
+// The mean of both waves' product over a footprint that crosses many periods: of the terms of its Fourier series those
+// that vary least along the longer edge, as the others' mean is next to nothing.
+fn far_product(at: vec2f, long: vec2f, short: vec2f, on: f32) -> f32 {
+    let flat = abs(long.x) > abs(long.y);
+    let a = select(long, long.yx, flat);
+    let b = select(short, short.yx, flat);
+    let x = select(at.x, at.y, flat) - 0.5 * on;
+    let y = select(at.y, at.x, flat) - 0.5 * on;
+    let ratio = min(abs(a.y) / abs(a.x), 1000.0);
+    let turn = select(1.0, -1.0, a.x * a.y > 0.0);
+    var sum = 0.0;
+    for (var i = 1.0; i <= MOST_HARMONICS; i += 1.0) {
+        let n = turn * i;
+        let m = floor(i * ratio + 0.5);
+        let along = sine_ratio(m * a.x + n * a.y) * sine_ratio(m * b.x + n * b.y);
+        let weight = on * on * (sine_ratio(m * on) * sine_ratio(n * on));
+        sum += 2.0 * weight * (sine(2.0 * (m * x + n * y) + 0.5) * along);
+    }
+    return sum;
+}
+
+// sin(pi x) / (pi x).
+fn sine_ratio(x: f32) -> f32 {
+    return select(sine(x) / (3.1415927 * x), 1.0, abs(x) < 0.001);
+}
+
+// Terms of that series; periods that an edge crosses along both axes at most without it, which bounds the work; a
+// footprint's least width, to its length or to a period; the extent along an axis beyond which the mean is that of the
+// whole pattern.
+const MOST_HARMONICS: f32 = 8.0;
+const MOST_PERIODS: f32 = 32.0;
+const THINNEST: f32 = 0.001;
 const WIDEST: f32 = 4096.0;

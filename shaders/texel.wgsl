@@ -27,9 +27,12 @@ fn level_size(size: u32, level: u32) -> u32 {
     return select(size >> level, 1u, (size >> level) == 0u);
 }
 
-// Red in the lowest byte.
+// Nine bits for each of red, green and blue, from the lowest on, and five for the exponent that they share: units of
+// 2^(exponent - 32) of a step of 8 bits. Every colour of 8 bits is exact, and so is the mean of dark ones nearly.
 fn unpacked_color(word: u32, format: u32) -> vec3f {
-    let color = vec3f(f32(word & 255u), f32((word >> 8u) & 255u), f32((word >> 16u) & 255u)) / 255.0;
+    let unit = bitcast<f32>(((word >> 27u) + 95u) << 23u);
+    let digits = vec3f(f32(word & 511u), f32((word >> 9u) & 511u), f32((word >> 18u) & 511u));
+    let color = digits * unit / 255.0;
     if format == SRGB8 {
         return vec3f(srgb_to_linear(color.x), srgb_to_linear(color.y), srgb_to_linear(color.z));
     }

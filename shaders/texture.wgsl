@@ -102,13 +102,14 @@ fn bilinear_color(t: Texture, level: Level, uv: vec2f) -> vec3f {
 
 // The elliptical weighted average: Greene and Heckbert, "Creating Raster Omnimax Images from Multiple Perspective Views
 // Using the Elliptical Weighted Average Filter", IEEE CG&A 6(6), 1986; over a pyramid as in Pharr, Jakob and Humphreys,
-// "Physically Based Rendering", 3rd edition, 10.4.5: between the two levels where the minor axis is about a texel.
+// "Physically Based Rendering", 3rd edition, 10.4.5, but on finer levels: in the level's texels half the minor axis is from
+// 2.2 to 4.4. The last quarter of the way to the next level mixes the two.
 fn ewa_color(t: Texture, f: Footprint) -> vec3f {
     let size = vec2f(f32(t.width), f32(t.height));
     let minor = footprint_ellipse(f.dx * size, f.dy * size, t.parameter).minor;
-    let lod = level_of_length(t, minor);
+    let lod = level_of_length(t, 0.45 * minor);
     let finer = floor(lod);
-    let between = lod - finer;
+    let between = max(4.0 * (lod - finer) - 3.0, 0.0);
     let coarsest = lod >= f32(t.levels - 1u); // one texel: no footprint is needed, and it may have no bound
     let dx = select(f.dx, vec2f(0.0), coarsest);
     let dy = select(f.dy, vec2f(0.0), coarsest);
@@ -120,13 +121,20 @@ fn ewa_color(t: Texture, f: Footprint) -> vec3f {
     return color;
 }
 
-// The mean over one level's texels in the ellipse, which is widened by a texel's reconstruction: M + I. The mean is
-// taken of differences to one of the texels, so that a constant stays what it is.
+// The mean over one level's texels in the ellipse, made wider or narrower such that the whole filter has the variance of
+// that on the finest level. In units where an ellipse with the half axis r has r^2, that one has M + I: I is for a texel's
+// reconstruction. A level's texels are means already, of a box with the variance 1/3, the finest ones' box taken off:
+// (1 - q) / 3 where q is the square of a finest texel's size, and I is now q I. The half axes stay above 1, so that
+// every ellipse holds a texel. The mean is taken of differences to one of the texels, so that a constant stays what it is.
 fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) -> vec3f {
     let size = vec2f(f32(level.width), f32(level.height));
-    let m = footprint_ellipse(dx * size, dy * size, t.parameter).m;
-    let xx = m.x + 1.0;
-    let yy = m.z + 1.0;
+    let q = size / vec2f(f32(t.width), f32(t.height));
+    let edges = vec2f(select(size.x, 0.0, level.width == 1u), select(size.y, 0.0, level.height == 1u));
+    let ellipse = footprint_ellipse(dx * edges, dy * edges, t.parameter);
+    let m = ellipse.m;
+    let least = 1.0 - ellipse.minor * ellipse.minor;
+    let xx = m.x + max((4.0 * (q.x * q.x) - 1.0) / 3.0, least);
+    let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, least);
     let slope = m.y / yy;
     let across = xx - m.y * slope; // the square of the half width of the row through the centre
     let x = near_coordinate(uv.x, t.wrap) * size.x - 0.5;

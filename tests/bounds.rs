@@ -106,6 +106,19 @@ const BOUNDS: &[Bound] = &[
         error: |x, result| ulps(result, f64::from(x[0]).atan2(f64::from(x[1]))),
     },
     Bound {
+        function: "sine",
+        unit: "10^-7, |x| below 1000",
+        bound: 3.0,
+        arguments: |random| {
+            let size = random.pick(&[0.6, 3.0, 1000.0]);
+            vec![random.between(-size, size) as f32]
+        },
+        error: |x, result| {
+            let turn = f64::from(x[0]).rem_euclid(2.0);
+            (result - (turn * std::f64::consts::PI).sin()).abs() * 1e7
+        },
+    },
+    Bound {
         function: "normalize",
         unit: "2^-24, largest component's error",
         bound: 3.0,
@@ -195,6 +208,9 @@ fn functions_have_their_exact_answers() {
         ("atan2", &[0.0, 1.0], 0.0),
         ("atan2", &[0.0, 0.0], 0.0),
         ("atan2", &[0.0, -1.0], std::f32::consts::PI),
+        ("sine", &[0.0], 0.0),
+        ("sine", &[-7.0], -0.0),
+        ("sine", &[1e30], 0.0),
         ("atan2", &[1.0, 0.0], std::f32::consts::FRAC_PI_2),
         ("atan2", &[-1.0, 0.0], -std::f32::consts::FRAC_PI_2),
         ("atan2", &[2.0, 2.0], std::f32::consts::FRAC_PI_4),
@@ -248,6 +264,7 @@ fn a_function_that_is_further_from_the_truth_is_found() {
         (1, "f * 0.0001984127", "f * 0.00001984127"),
         (2, "2.8853900817779268", "2.8854"),
         (4, "0.05882353", "0.5882353"),
+        (6, "0.007370431", "0.07370431"),
     ] {
         let bound = &BOUNDS[bound];
         let text = shared_source().text;

@@ -225,6 +225,10 @@ impl Situation {
             "vec3<f32>" => self.vector(name, random).write(words),
             "f32" => self.number(name, random).write(words),
             "u32" => whole(function, name, random).write(words),
+            "vec2<f32>" if ["long", "short", "a", "b", "tail", "head"].contains(&name) => {
+                let edge = vector(random).truncate() * random.magnitude(-3.0, 2.5);
+                edge.as_vec2().write(words);
+            }
             "vec2<f32>" => {
                 let size = random.pick(&[1.0, 1.0, 400.0]);
                 words.extend([(); 2].map(|()| ((random.unit() * size) as f32).to_bits()));
@@ -329,7 +333,7 @@ impl Situation {
             "t" => random.pick(&[self.t() as f32, FAR]),
             "start" => (self.local_start.length_squared() - 1.0) as f32,
             "reach" => random.pick(&[self.light.reach, 1.0 - 1e-5, 1e10, 1.0]),
-            "cosine" | "cosine_i" | "cosine_t" | "random" | "line_width" => random.unit() as f32,
+            "cosine" | "cosine_i" | "cosine_t" | "random" | "line_width" | "on" => random.unit() as f32,
             "eta" | "anisotropy" => random.magnitude(-1.0, 1.0) as f32,
             "epsilon" => random.pick(&[2e-6, 1e-4, 0.0]),
             _ => {

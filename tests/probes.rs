@@ -14,10 +14,13 @@ use wgray::cpu::footprint::{
     Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint, uv_derivative,
 };
 use wgray::cpu::light::{Segments, segment, segments_to_light, segments_to_local};
-use wgray::cpu::math::{atan2, cross, dot, exp2, floor, log2, max, min, normalize, positive_zero, power, power_whole};
+use wgray::cpu::math::{
+    atan2, cross, dot, exp2, floor, log2, max, min, normalize, positive_zero, power, power_whole, sine,
+};
 use wgray::cpu::path::{Path, Scattered, glass_path, mirrored_path, reflected_path, refracted_path, usable_normal};
 use wgray::cpu::pattern::{
-    checker_in_box, lines_in_box, pattern_share, pulse, pulse_integral, square_wave, square_wave_integral,
+    along_edge, around_footprint, far_product, nearest_step, pattern_share, phase, sine_ratio, wave_integral,
+    wave_integral_2, wave_mean, wave_value, widened_edge,
 };
 use wgray::cpu::phong::{Lobes, phong_block, phong_lobes, phong_power};
 use wgray::cpu::plane::{intersect_plane, plane_blocks};
@@ -90,6 +93,7 @@ probes! {
     log2(x: f32) -> f32;
     exp2(x: f32) -> f32;
     atan2(y: f32, x: f32) -> f32;
+    sine(x: f32) -> f32;
     hash4(key: UVec4) -> UVec4;
     unit_float(bits: u32) -> f32;
     sample_square(pattern: u32, side: u32, index: u32, group: u32, key: UVec2) -> Vec2;
@@ -172,12 +176,17 @@ probes! {
     texture_footprint(t: &Texture, f: Footprint) -> Footprint;
     footprint_ellipse(dx: Vec2, dy: Vec2, anisotropy: f32) -> Ellipse;
     pattern_share(kind: u32, line_width: f32, f: Footprint) -> f32;
-    checker_in_box(at: Vec2, width: Vec2) -> f32;
-    square_wave(x: f32, width: f32) -> f32;
-    square_wave_integral(x: f32) -> f32;
-    lines_in_box(at: Vec2, width: Vec2, line_width: f32) -> f32;
-    pulse(x: f32, width: f32, line_width: f32) -> f32;
-    pulse_integral(x: f32, line_width: f32) -> f32;
+    phase(x: f32) -> f32;
+    widened_edge(long: Vec2, short: Vec2) -> Vec2;
+    nearest_step(x: f32, on: f32) -> f32;
+    wave_value(x: f32, on: f32, near: bool) -> f32;
+    wave_integral(x: f32, on: f32, near: bool) -> f32;
+    wave_integral_2(x: f32, on: f32, near: bool) -> f32;
+    wave_mean(x: f32, a: f32, b: f32, on: f32, near: bool) -> f32;
+    around_footprint(at: Vec2, a: Vec2, b: Vec2, on: f32, near: bool) -> f32;
+    far_product(at: Vec2, long: Vec2, short: Vec2, on: f32) -> f32;
+    sine_ratio(x: f32) -> f32;
+    along_edge(tail: Vec2, head: Vec2, on: f32, near: bool) -> f32;
     near_coordinate(u: f32, wrap: u32) -> f32;
     wrapped_index(i: i32, size: u32, wrap: u32) -> u32;
     level_size(size: u32, level: u32) -> u32;

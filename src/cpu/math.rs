@@ -93,3 +93,16 @@ pub fn atan2(y: f32, x: f32) -> f32 {
         0.0
     }
 }
+
+pub fn sine(x: f32) -> f32 {
+    let whole = floor(x + 0.5);
+    let r = x - whole;
+    let r2 = r * r;
+    let tail = 0.599_264_5 - r2 * (0.082_145_89 - r2 * 0.007_370_431);
+    let series = r * (PI - r2 * (5.167_712_7 - r2 * (2.550_164 - r2 * tail)));
+    if whole - 2.0 * floor(0.5 * whole) > 0.0 {
+        -series
+    } else {
+        series
+    }
+}

@@ -33,11 +33,13 @@ pub fn level_size(size: u32, level: u32) -> u32 {
 }
 
 pub fn unpacked_color(word: u32, format: u32) -> Vec3 {
-    let color = Vec3::new(
-        (word & 255) as f32,
-        ((word >> 8) & 255) as f32,
-        ((word >> 16) & 255) as f32,
-    ) / 255.0;
+    let unit = f32::from_bits(((word >> 27) + 95) << 23);
+    let digits = Vec3::new(
+        (word & 511) as f32,
+        ((word >> 9) & 511) as f32,
+        ((word >> 18) & 511) as f32,
+    );
+    let color = digits * unit / 255.0;
     if format == SRGB8 {
         return Vec3::new(
             srgb_to_linear(color.x),

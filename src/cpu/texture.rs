@@ -110,9 +110,9 @@ pub fn bilinear_color(scene: &Packed, t: &Texture, level: Level, uv: Vec2) -> Ve
 pub fn ewa_color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
     let size = Vec2::new(t.width as f32, t.height as f32);
     let minor = footprint_ellipse(f.dx * size, f.dy * size, t.parameter).minor;
-    let lod = level_of_length(t, minor);
+    let lod = level_of_length(t, 0.45 * minor);
     let finer = floor(lod);
-    let between = lod - finer;
+    let between = max(4.0 * (lod - finer) - 3.0, 0.0);
     let coarsest = lod >= (t.levels - 1) as f32;
     let dx = if coarsest { Vec2::ZERO } else { f.dx };
     let dy = if coarsest { Vec2::ZERO } else { f.dy };
@@ -130,9 +130,16 @@ pub fn ewa_color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
 
 pub fn ewa_level_color(scene: &Packed, t: &Texture, level: Level, uv: Vec2, dx: Vec2, dy: Vec2) -> Vec3 {
     let size = Vec2::new(level.width as f32, level.height as f32);
-    let m = footprint_ellipse(dx * size, dy * size, t.parameter).m;
-    let xx = m.x + 1.0;
-    let yy = m.z + 1.0;
+    let q = size / Vec2::new(t.width as f32, t.height as f32);
+    let edges = Vec2::new(
+        if level.width == 1 { 0.0 } else { size.x },
+        if level.height == 1 { 0.0 } else { size.y },
+    );
+    let ellipse = footprint_ellipse(dx * edges, dy * edges, t.parameter);
+    let m = ellipse.m;
+    let least = 1.0 - ellipse.minor * ellipse.minor;
+    let xx = m.x + max((4.0 * (q.x * q.x) - 1.0) / 3.0, least);
+    let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, least);
     let slope = m.y / yy;
     let across = xx - m.y * slope;
     let x = near_coordinate(uv.x, t.wrap) * size.x - 0.5;

@@ -105,13 +105,20 @@ fn covers(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
     (0..to).map(cover).collect()
 }
 
+/// A colour by the encoding's curve, in steps of 8 bits: see `unpacked_color` in `shaders/texel.wgsl`.
 fn packed(color: DVec3, encoding: Encoding) -> u32 {
-    let byte = |x: f64| {
-        let x = match encoding {
-            Encoding::Srgb => linear_to_srgb(x),
-            Encoding::Linear => x,
-        };
-        (x * 255.0).round() as u32
-    };
-    byte(color.x) | byte(color.y) << 8 | byte(color.z) << 16
+    let steps = color.to_array().map(|x| match encoding {
+        Encoding::Srgb => linear_to_srgb(x) * 255.0,
+        Encoding::Linear => x * 255.0,
+    });
+    let largest = steps.into_iter().fold(0.0, f64::max);
+    // The largest value has nine binary digits, or fewer where the least unit is too large for that.
+    let exponent = ((largest as f32).to_bits() >> 23).clamp(103, 134) - 103;
+    let exponent = exponent + u32::from((largest / unit(exponent)).round() > 511.0);
+    let [red, green, blue] = steps.map(|x| (x / unit(exponent)).round() as u32);
+    red | green << 9 | blue << 18 | exponent << 27
+}
+
+fn unit(exponent: u32) -> f64 {
+    f64::from(f32::from_bits((exponent + 95) << 23))
 }

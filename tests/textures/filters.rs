@@ -175,8 +175,8 @@ fn ewa_is_a_gaussian_mean_over_the_ellipse() {
     };
     let numbers = Random::new(9);
     let texel = 1.0 / f64::from(n);
-    // None is wider than a texel: it would be looked up in coarser levels, too.
-    for (longest, narrowest) in [(1.0, 1.0), (6.0, 0.8)] {
+    // None is wider than three texels: it would be looked up in coarser levels, too.
+    for (longest, narrowest) in [(1.0, 1.0), (6.0, 0.8), (7.0, 2.9)] {
         let (mut narrower, mut mirrored) = (0, 0);
         for _ in 0..200 {
             let uv = Vec2::new(numbers.unit() as f32, numbers.unit() as f32);
@@ -239,6 +239,201 @@ fn ewa_keeps_what_lies_across_a_long_footprint() {
     };
     assert!(contrast("ewa") > 0.99, "{}", contrast("ewa"));
     assert!(contrast("trilinear") < 0.3, "{}", contrast("trilinear"));
+}
+
+/// A texture of 128 x 128 gray texels, from the bottom.
+fn gray(folder: &Path, name: &str, texel: impl Fn(usize, usize) -> f32) -> (Packed, Packed, Vec<f64>) {
+    write_exr(&folder.join(name), 128, 128, |x, y| {
+        [texel(x as usize, 127 - y as usize); 3]
+    });
+    let texels = (0..128 * 128).map(|i| f64::from(texel(i % 128, i / 128))).collect();
+    let scene = |filter: &str| textured(folder, &format!("type = 'image'\nfile = '{name}'\nfilter = '{filter}'"));
+    (scene("ewa"), scene("trilinear"), texels)
+}
+
+fn texel_at(texels: &[f64], x: i64, y: i64) -> f64 {
+    texels[(y.rem_euclid(128) * 128 + x.rem_euclid(128)) as usize]
+}
+
+/// The mean over the parallelogram around p, in texels, of what lies linearly between the texels.
+fn mean_over(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
+    let points = |edge: DVec2| (edge.length() * 1.5).ceil().max(16.0);
+    let (columns, rows) = (points(dx), points(dy));
+    let mut sum = 0.0;
+    for i in 0..columns as u32 {
+        for j in 0..rows as u32 {
+            let at = p + dx * ((f64::from(i) + 0.5) / columns - 0.5) + dy * ((f64::from(j) + 0.5) / rows - 0.5) - 0.5;
+            let (x, y, t) = (at.x.floor() as i64, at.y.floor() as i64, at - at.floor());
+            let row = |y: i64| texel_at(texels, x, y) * (1.0 - t.x) + texel_at(texels, x + 1, y) * t.x;
+            sum += row(y) * (1.0 - t.y) + row(y + 1) * t.y;
+        }
+    }
+    sum / (columns * rows)
+}
+
+/// The elliptical weighted average of the finest level.
+fn finest_ewa(texels: &[f64], p: DVec2, dx: DVec2, dy: DVec2) -> f64 {
+    let edges = DMat2::from_cols(dx, dy);
+    let m = edges * edges.transpose() + DMat2::IDENTITY;
+    let (inverse, reach) = (m.inverse(), DVec2::new(m.x_axis.x.sqrt(), m.y_axis.y.sqrt()));
+    let (low, high) = ((p - reach - 0.5).floor(), (p + reach).ceil());
+    let (mut sum, mut total) = (0.0, 0.0);
+    for y in low.y as i64..=high.y as i64 {
+        for x in low.x as i64..=high.x as i64 {
+            let d = DVec2::new(x as f64, y as f64) + 0.5 - p;
+            let weight = ((-2.0 * d.dot(inverse * d)).exp() - (-2f64).exp()).max(0.0);
+            sum += weight * texel_at(texels, x, y);
+            total += weight;
+        }
+    }
+    sum / total
+}
+
+/// What the page promises: EWA over the pyramid has at most 1.4 times the error of the same ellipse on the finest level,
+/// for square footprints and long ones at any angle. Trilinear, the control, has more nearly everywhere.
+#[test]
+fn ewa_over_the_pyramid_is_nearly_that_of_the_finest_level() {
+    let folder = tempfile::tempdir().unwrap();
+    let numbers = Random::new(21);
+    let noise: Vec<f32> = (0..128 * 128).map(|_| numbers.unit() as f32).collect();
+    let sparse: Vec<f32> = (0..128 * 128)
+        .map(|_| f32::from(u8::from(numbers.once_in(64))))
+        .collect();
+    let stripes = |period: f64| move |x: usize, _: usize| (0.5 + 0.5 * ((x as f64 + 0.5) * TAU / period).sin()) as f32;
+    let textures = [
+        ("noise", gray(folder.path(), "noise.exr", |x, y| noise[y * 128 + x])),
+        ("sparse", gray(folder.path(), "sparse.exr", |x, y| sparse[y * 128 + x])),
+        (
+            "tiles",
+            gray(folder.path(), "tiles.exr", |x, y| {
+                let dark = x % 16 < 1 || y % 16 < 1;
+                if dark {
+                    0.1
+                } else {
+                    0.4 + 0.4 * ((x / 16 + y / 16) % 2) as f32
+                }
+            }),
+        ),
+        ("wide stripes", gray(folder.path(), "wide.exr", stripes(128.0 / 6.0))),
+        ("stripes", gray(folder.path(), "stripes.exr", stripes(128.0 / 16.0))),
+        (
+            "narrow stripes",
+            gray(folder.path(), "narrow.exr", stripes(128.0 / 50.0)),
+        ),
+    ];
+    let (mut worst, mut worse, mut cases) = (0.0f64, 0, 0);
+    for anisotropy in [1.0, 2.0, 4.0, 8.0, 16.0] {
+        for width in [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 16.0] {
+            if width * anisotropy > 64.0 {
+                continue;
+            }
+            let mut errors = vec![[0.0; 3]; textures.len()];
+            for _ in 0..80 {
+                let p = DVec2::new(numbers.between(0.0, 128.0), numbers.between(0.0, 128.0));
+                let axis = DVec2::from_angle(numbers.between(0.0, TAU)) * width;
+                let (dx, dy) = (axis, axis.perp() * anisotropy);
+                for ((_, (ewa, trilinear, texels)), errors) in textures.iter().zip(&mut errors) {
+                    let truth = mean_over(texels, p, dx, dy);
+                    let [uv, du, dv] = [p, dx, dy].map(|v| (v / 128.0).as_vec2());
+                    let found = |scene: &Packed| f64::from(color(scene, uv, du, dv).x);
+                    let values = [found(ewa), finest_ewa(texels, p, dx, dy), found(trilinear)];
+                    for (error, value) in errors.iter_mut().zip(values) {
+                        *error += (value - truth).powi(2) / 80.0;
+                    }
+                }
+            }
+            for ((name, _), errors) in textures.iter().zip(&errors) {
+                let [ewa, finest, trilinear] = errors.map(f64::sqrt);
+                let stripes = name.ends_with("stripes");
+                // A stripe's error on the finest level is next to 0 at some sizes.
+                let bound = 1.4 * finest + if stripes { 0.05 } else { 0.0005 };
+                assert!(
+                    ewa <= bound,
+                    "{name} {width} x {anisotropy}: {ewa} {finest} {trilinear}"
+                );
+                worst = worst.max(if stripes { 0.0 } else { ewa / finest });
+                cases += u32::from(!stripes);
+                worse += u32::from(!stripes && trilinear > bound);
+                if (width, anisotropy, *name) == (1.0, 8.0, "noise") {
+                    assert!(ewa < 0.5 * trilinear, "{ewa} {trilinear}");
+                }
+            }
+        }
+    }
+    println!("EWA over the pyramid: at most {worst:.3} times the error of the finest level");
+    assert!(worse > cases / 2, "{worse} of {cases}");
+}
+
+/// A footprint's work is bounded for images of all shapes: none is longer in texels than its level's limit.
+#[test]
+fn ewa_is_bounded_for_flat_images() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = std::time::Instant::now();
+    for (width, height) in [(4096, 1), (1, 4096), (4095, 2), (3, 4096)] {
+        let mean = noise(folder.path(), width, height).iter().sum::<f64>() / f64::from(width * height);
+        let keys = "type = 'image'\nfile = 'noise.exr'\nfilter = 'ewa'\nmax_anisotropy = 64";
+        let scene = textured(folder.path(), keys);
+        let numbers = Random::new(2);
+        for i in 0..2000 {
+            let size = 2f64.powi(i % 14) / 4096.0;
+            let edge = |other: f64| {
+                let v = DVec2::from_angle(numbers.between(0.0, TAU)) * size * other;
+                (v / DVec2::new(f64::from(width), f64::from(height)) * 4096.0).as_vec2()
+            };
+            let found = color(&scene, Vec2::splat(0.3), edge(1.0), edge(0.1)).x;
+            assert!((0.0..=1.0).contains(&found));
+            if size > 1.0 {
+                assert!(
+                    (f64::from(found) - mean).abs() < 0.2,
+                    "{width} x {height}: {found} {mean}"
+                );
+            }
+        }
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    assert!(seconds < 20.0, "{seconds} s"); // without the bound, minutes
+}
+
+/// Texels of 8 bits are exact, and their means stay: a white texel in the dark is not lost, whatever the level.
+#[test]
+fn levels_of_8_bit_images_keep_what_is_dark() {
+    let folder = tempfile::tempdir().unwrap();
+    let value = |x: u32, y: u32| if (x, y) == (77, 130) { [255; 3] } else { [2, 0, 1] };
+    write_png(&folder.path().join("dark.png"), 256, 256, value);
+    let ramp = |x: u32, _: u32| [x as u8, 255 - x as u8, (x / 2) as u8];
+    write_png(&folder.path().join("ramp.png"), 256, 2, ramp);
+    for (encoding, decoded) in [("srgb", srgb_to_linear as fn(f32) -> f32), ("linear", |x| x)] {
+        let scene = |file: &str, filter: &str| {
+            let keys = format!("type = 'image'\nfile = '{file}'\nfilter = '{filter}'\nencoding = '{encoding}'");
+            textured(folder.path(), &keys)
+        };
+        let exact = scene("ramp.png", "nearest");
+        for x in 0..256 {
+            let expected = ramp(x, 0).map(|byte| decoded(f32::from(byte) / 255.0));
+            let uv = Vec2::new((x as f32 + 0.5) / 256.0, 0.5);
+            assert_eq!(color(&exact, uv, Vec2::ZERO, Vec2::ZERO).to_array(), expected);
+        }
+        let dark = scene("dark.png", "trilinear");
+        for level in 0..=8 {
+            let count = 4f64.powi(level);
+            let mean = [2, 0, 1].map(|byte| {
+                let background = f64::from(decoded(byte as f32 / 255.0));
+                background + (1.0 - background) / count
+            });
+            let uv = Vec2::new(
+                0.5 + f32::from(77u8 >> level << level),
+                0.5 + (255 - 130 >> level << level) as f32,
+            );
+            let half = (f32::powi(2.0, level) - 1.0) / 2.0;
+            let size = f32::powi(2.0, level) / 256.0;
+            let found = color(&dark, (uv + half) / 256.0, Vec2::new(size, 0.0), Vec2::new(0.0, size));
+            let brightest = mean.into_iter().fold(0.0, f64::max);
+            for (found, mean) in found.to_array().into_iter().zip(mean) {
+                let error = (f64::from(found) - mean).abs();
+                assert!(error < 0.005 * brightest, "{encoding} {level}: {found} {mean}");
+            }
+        }
+    }
 }
 
 #[test]
