@@ -1,12 +1,17 @@
-// Adaptive sampling: what is known of a pixel's variance, and when its displayed value is known well enough.
+// Adaptive sampling: what is known of a pixel's variance, and how many samples it gets by what its neighbours are like.
 
 // The moments of a pixel after another sample, of which `sum` is the sum before: xyz the sum of squared deviations from
 // the mean, w the number of samples. By Welford's update ("Note on a Method for Calculating Corrected Sums of Squares and
 // Products", Technometrics 4(3), 1962), for weighted samples.
 fn moments_with(moments: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
+    return moments + vec4f(squared_deviation(sum, sample), 1.0);
+}
+
+// What a sample adds to the sum of squared deviations.
+fn squared_deviation(sum: vec4f, sample: vec4f) -> vec3f {
     let before = sample.rgb - mean_of(sum) * sample.w;
     let after = sample.rgb - mean_of(sum + sample) * sample.w;
-    return moments + vec4f(before * after, 1.0);
+    return before * after;
 }
 
 fn mean_of(sum: vec4f) -> vec3f {
@@ -35,4 +40,37 @@ fn display_slope_squared(value: f32) -> f32 {
     let x = min(max(value, 0.01), 1.0);
     let slope = 0.45454547 * power(x, 0.45454547) / x;
     return slope * slope;
+}
+
+// A first look at a pixel after another sample: y the sum over samples and channels of squared deviations, z the sum
+// over samples of their squares.
+fn look_with(look: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
+    let deviation = squared_deviation(sum, sample);
+    let total = deviation.x + deviation.y + deviation.z;
+    return vec4f(look.x, look.y + total, look.z + total * total, look.w);
+}
+
+// A first look at its end: x the square of the standard error that the pixel then has as displayed, w one pixel.
+fn whole_look(look: vec4f, sum: vec4f, moments: vec4f) -> vec4f {
+    return vec4f(display_variance(sum, moments), look.y, look.z, 1.0);
+}
+
+// The samples of a pixel, at most so many, by the sum of its neighbours' first looks of `first` samples each: twice as
+// many until their mean square error would be small enough, as far as there is evidence for it. y y / z is the number
+// of samples that the estimate rests on: one where a single sample differs, all of them where half do.
+fn samples_wanted(looks: vec4f, first: u32, squared_error: f32, most: u32) -> u32 {
+    if !(looks.w > 0.0) | !(squared_error > 0.0) {
+        return most;
+    }
+    let variance = looks.x / looks.w * f32(first);
+    var count = first;
+    while count < most {
+        let enough = variance <= squared_error * f32(count);
+        let evident = looks.y * looks.y >= looks.z * (EVIDENCE * (f32(2u * count / first) - 1.0));
+        if enough | !evident {
+            break;
+        }
+        count *= 2u;
+    }
+    return select(count, most, count > most);
 }

@@ -58,5 +58,6 @@ const FAR: f32 = 3.4028234663852886e38;
 const NOTHING: u32 = 0xffffffffu;
 // Shadow rays are traced in blocks of so many, a bit of a word for each.
 const BLOCK: u32 = 32u;
-// Rays through a pixel's corners, under adaptive sampling.
-const CORNERS: u32 = 4u;
+// How many samples an estimate must rest on to allow a pixel as many samples again as its first look has, under adaptive
+// sampling.
+const EVIDENCE: f32 = 2.0;

@@ -147,28 +147,6 @@ fn filtered(u: vec2f) -> vec3f {
     return vec3f(0.5 + x, 0.5 + y, filter_table[i].z * filter_table[j].z);
 }
 
-// The moments of a pixel before its first sample: the spread of the radiances at its four corners. An edge that cuts off
-// a part of the pixel so small that no sample of the first round lies in it has a corner behind it.
-fn pixel_corners(pixel: vec2u) -> vec4f {
-    var sum = vec4f(0.0);
-    var moments = vec4f(0.0);
-    for (var i = 0u; i < CORNERS; i++) {
-        let corner = pixel + vec2u(i & 1u, i >> 1u);
-        let value = vec4f(radiance(camera_path(vec2f(corner)), pixel, NOTHING - i), 1.0);
-        moments = moments_with(moments, sum, value);
-        sum += value;
-    }
-    return vec4f(moments.rgb, 0.0);
-}
-
-// Whether a pixel, before its sample of this number, needs no more: it has stopped before, or it does so now, at the end
-// of a round.
-fn is_done(sum: vec4f, moments: vec4f, sample: u32) -> bool {
-    let stopped = !(moments.w == f32(sample));
-    let round_ends = (sample % PIXEL_SAMPLES == 0u) & (sample > 0u);
-    return stopped | (round_ends & (display_variance(sum, moments) <= bitcast<f32>(SQUARED_ERROR)));
-}
-
 // What the ray through a pixel's centre meets.
 fn pixel_first_hit(pixel: vec2u) -> FirstHit {
     let ray = camera_ray(camera, vec2f(pixel) + 0.5);

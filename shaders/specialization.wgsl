@@ -26,7 +26,8 @@ override LIGHT_SAMPLES: u32;
 // Bins of the filter's table; 0 if it is the box of the pixel.
 override FILTER_BINS: u32;
 
-// The bits of the square of the error that adaptive sampling aims at.
+// The samples that every pixel gets, and the bits of the square of the error that adaptive sampling aims at.
+override FIRST_LOOK: u32;
 override SQUARED_ERROR: u32;
 
 // Bits of the largest shininess if all are whole numbers, else 0.

@@ -41,6 +41,28 @@ impl Region {
     pub fn pixels(&self) -> u64 {
         u64::from(self.width()) * u64::from(self.height())
     }
+
+    /// The region and the pixels beside it, which may be outside of a picture.
+    pub fn with_neighbors(&self) -> Region {
+        Region {
+            x0: self.x0.saturating_sub(1),
+            y0: self.y0.saturating_sub(1),
+            x1: self.x1.saturating_add(1),
+            y1: self.y1.saturating_add(1),
+        }
+    }
+
+    /// What is in another region too.
+    pub fn within(&self, other: Region) -> Region {
+        let x = |x: u32| x.clamp(other.x0, other.x1);
+        let y = |y: u32| y.clamp(other.y0, other.y1);
+        Region {
+            x0: x(self.x0),
+            y0: y(self.y0),
+            x1: x(self.x1),
+            y1: y(self.y1),
+        }
+    }
 }
 
 /// The sums of a rectangle of pixels.
@@ -53,6 +75,8 @@ pub struct Film {
     /// Under adaptive sampling the moments of the same pixels, else nothing: in rgb the sum of the samples' squared
     /// deviations from their mean, in a the number of samples.
     pub moments: Vec<Vec4>,
+    /// Under adaptive sampling what the first samples of the same pixels tell their neighbours, else nothing.
+    pub looks: Vec<Vec4>,
 }
 
 impl Film {
@@ -62,14 +86,36 @@ impl Film {
             region,
             sums: vec![Vec4::zeroed(); region.pixels() as usize],
             moments: Vec::new(),
+            looks: Vec::new(),
         }
     }
 
-    /// A film without any sample, with moments.
+    /// A film without any sample, for adaptive sampling.
     pub fn adaptive(region: Region) -> Film {
         Film {
             moments: vec![Vec4::zeroed(); region.pixels() as usize],
+            looks: vec![Vec4::zeroed(); region.pixels() as usize],
             ..Film::new(region)
+        }
+    }
+
+    /// A part of the film.
+    pub fn part(self, part: Region) -> Film {
+        if part == self.region {
+            return self;
+        }
+        let width = self.region.width() as usize;
+        let columns = (part.x0 - self.region.x0) as usize..(part.x1 - self.region.x0) as usize;
+        let rows = (part.y0 - self.region.y0) as usize..(part.y1 - self.region.y0) as usize;
+        let of_part = |records: &[Vec4]| {
+            let of_rows = records.chunks(width).take(rows.end).skip(rows.start);
+            of_rows.flat_map(|row| row[columns.clone()].to_vec()).collect()
+        };
+        Film {
+            region: part,
+            sums: of_part(&self.sums),
+            moments: of_part(&self.moments),
+            looks: of_part(&self.looks),
         }
     }
 
@@ -83,9 +129,9 @@ impl Film {
         (0..self.moments.len()).map(|pixel| self.sample_count(pixel))
     }
 
-    /// The variance of a pixel's mean in red, green and blue, under adaptive sampling, estimated as for independent samples:
-    /// an upper bound for patterns that are more even. It is what sampling has stopped by, and so the spread of the
-    /// radiances at the pixel's corners is part of it.
+    /// The variance of a pixel's mean in red, green and blue, under adaptive sampling, estimated from its samples as if they
+    /// were independent: on average an upper bound for patterns that are more even. Where all samples are the same it is
+    /// 0. It is not what decided on the pixel's samples, which is what its neighbours are like.
     pub fn variance(&self, pixel: usize) -> [f32; 3] {
         let (sum, moments) = (self.sums[pixel], self.moments[pixel]);
         let scale = moments.w / ((moments.w - 1.0) * sum.w * sum.w);

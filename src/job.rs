@@ -20,9 +20,14 @@ pub trait Backend {
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError>;
     /// The largest film that it can have, in pixels.
     fn largest_film(&self) -> u64;
-    /// How many samples all pixels get; further ones are left out where they are not needed.
+    /// How many samples all pixels get; further ones are left out where they are not needed. They come first for all
+    /// pixels of the film, as they decide on the further ones.
     fn samples_of_all(&self) -> u32 {
         u32::MAX
+    }
+    /// The pixels whose samples decide on those of a region's pixels: itself, and what is around it.
+    fn around(&self, region: Region) -> Region {
+        region
     }
 }
 
@@ -91,15 +96,15 @@ pub fn render(
     let mut steps = Steps::new(cut, CALL, Order::Rows);
     let mut done = 0.0;
     for band in bands(region, cut, backend.largest_film()) {
-        backend.begin(band)?;
-        steps.start(band, samples);
+        steps.start(backend, band, samples);
+        backend.begin(steps.film)?;
         while let Some(work) = steps.step(backend)? {
             done += work;
             if !progress(done / total) {
                 return Err(RenderError::Cancelled);
             }
         }
-        output(backend.film()?)?;
+        output(backend.film()?.part(band))?;
     }
     Ok(())
 }
@@ -123,7 +128,11 @@ pub struct Steps {
     order: Order,
     pace: Pace,
     region: Region,
+    /// The region, and the pixels around it that get the samples of all.
+    film: Region,
     samples: u32,
+    /// How many samples all pixels get.
+    of_all: u32,
     /// The samples that are being added.
     pass: Range<u32>,
     /// The first row that does not have them.
@@ -142,16 +151,24 @@ impl Steps {
                 speed_of_all: 0.0,
             },
             region: Region::whole(0, 0),
+            film: Region::whole(0, 0),
             samples: 0,
+            of_all: 0,
             pass: 0..0,
             y: 0,
         }
     }
 
-    /// Starts a film, at the pace learnt so far.
-    pub fn start(&mut self, region: Region, samples: u32) {
+    /// Starts a film of a region, at the pace learnt so far.
+    pub fn start(&mut self, backend: &dyn Backend, region: Region, samples: u32) {
         self.region = region;
         self.samples = samples;
+        self.of_all = backend.samples_of_all().min(samples);
+        self.film = if self.of_all < samples {
+            backend.around(region)
+        } else {
+            region
+        };
         self.pace.start_film();
         self.begin_pass(0);
     }
@@ -167,25 +184,31 @@ impl Steps {
             return Ok(None);
         }
         let count = self.pass.len() as u32;
-        let rows = self
-            .cut
-            .rows_per_call
-            .unwrap_or_else(|| self.pace.rows(self.region, count));
+        let region = self.region_of_pass();
+        let rows = self.cut.rows_per_call.unwrap_or_else(|| self.pace.rows(region, count));
         let tile = Region {
             y0: self.y,
-            y1: self.y + rows.min(self.region.y1 - self.y),
-            ..self.region
+            y1: self.y + rows.min(region.y1 - self.y),
+            ..region
         };
         let start = Instant::now();
         backend.render(tile, self.pass.clone())?;
         let work = tile.pixels() as f64 * f64::from(count);
-        let of_all = self.pass.end <= backend.samples_of_all();
-        self.pace.took(work, start.elapsed(), of_all);
+        self.pace.took(work, start.elapsed(), self.pass.end <= self.of_all);
         self.y = tile.y1;
-        if self.y >= self.region.y1 {
+        if self.y >= region.y1 {
             self.begin_pass(self.pass.end);
         }
-        Ok(Some(work))
+        Ok(Some(tile.within(self.region).pixels() as f64 * f64::from(count)))
+    }
+
+    /// The pixels that the pass is for.
+    fn region_of_pass(&self) -> Region {
+        if self.pass.start < self.of_all {
+            self.film
+        } else {
+            self.region
+        }
     }
 
     /// Whether every pixel has all its samples.
@@ -217,8 +240,9 @@ impl Steps {
             .cut
             .samples_per_call
             .unwrap_or_else(|| self.pace.samples(self.region, rows));
-        self.pass = first..first + count.min(self.samples - first);
-        self.y = self.region.y0;
+        let end = if first < self.of_all { self.of_all } else { self.samples };
+        self.pass = first..first + count.min(end - first);
+        self.y = self.region_of_pass().y0;
     }
 }
 
@@ -303,7 +327,7 @@ mod tests {
         for (order, first) in [(Order::Rows, 0..16), (Order::Pixels, 0..4)] {
             let (mut notes, region) = (Notes(Vec::new()), Region::whole(64, 64));
             let mut steps = Steps::new(&Cut::default(), CALL, order);
-            steps.start(region, 16);
+            steps.start(&notes, region, 16);
             while steps.step(&mut notes).unwrap().is_some() {}
             assert_eq!(notes.0[0].1, first, "{order:?}");
             // every sample of every pixel once, those of a pixel in their order
@@ -316,6 +340,98 @@ mod tests {
                 }
             }
             assert_eq!(samples, [16; 64], "{order:?}");
+        }
+    }
+
+    /// Notes what it is asked for; four samples of a pixel decide on those of its neighbours.
+    #[derive(Default)]
+    struct Looks {
+        film: Option<Region>,
+        calls: Vec<(Region, Range<u32>)>,
+    }
+
+    impl Backend for Looks {
+        fn begin(&mut self, region: Region) -> Result<(), RenderError> {
+            self.film = Some(region);
+            Ok(())
+        }
+
+        fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+            self.calls.push((tile, samples));
+            Ok(())
+        }
+
+        fn film(&mut self) -> Result<Film, RenderError> {
+            self.film.map(Film::adaptive).ok_or(RenderError::Cancelled)
+        }
+
+        fn first_hits(&mut self, _: Region) -> Result<Vec<FirstHit>, RenderError> {
+            Ok(Vec::new())
+        }
+
+        fn largest_film(&self) -> u64 {
+            u64::MAX
+        }
+
+        fn samples_of_all(&self) -> u32 {
+            4
+        }
+
+        fn around(&self, region: Region) -> Region {
+            region.with_neighbors().within(Region::whole(64, 64))
+        }
+    }
+
+    #[test]
+    fn a_region_and_its_neighbours_get_first_looks_before_any_pixel_gets_more() {
+        let (region, film) = (
+            Region {
+                x0: 5,
+                y0: 10,
+                x1: 64,
+                y1: 64,
+            },
+            Region {
+                x0: 4,
+                y0: 9,
+                x1: 64,
+                y1: 64,
+            },
+        );
+        for samples_per_call in [None, Some(3)] {
+            let cut = Cut {
+                samples_per_call,
+                ..Cut::default()
+            };
+            let (mut backend, mut done, mut outputs) = (Looks::default(), 0.0, Vec::new());
+            let mut progress = |share| {
+                done = share;
+                true
+            };
+            let mut output = |film: Film| {
+                outputs.push((film.region, film.sums.len(), film.moments.len()));
+                Ok(())
+            };
+            render(&mut backend, region, 16, &cut, &mut progress, &mut output).unwrap();
+            assert_eq!((backend.film, outputs.len()), (Some(film), 1));
+            assert_eq!(outputs[0], (region, region.pixels() as usize, region.pixels() as usize));
+            let further = backend
+                .calls
+                .iter()
+                .position(|(_, samples)| samples.start >= 4)
+                .unwrap();
+            let work = |calls: &[(Region, Range<u32>)], part: Region, samples: Range<u32>| {
+                for (tile, range) in calls {
+                    assert_eq!((tile.x0, tile.x1), (part.x0, part.x1));
+                    assert!(range.start >= samples.start && range.end <= samples.end);
+                    assert_eq!(*tile, tile.within(part));
+                }
+                let pixels = calls.iter().map(|(tile, range)| tile.pixels() * range.len() as u64);
+                assert_eq!(pixels.sum::<u64>(), part.pixels() * samples.len() as u64);
+            };
+            work(&backend.calls[..further], film, 0..4);
+            work(&backend.calls[further..], region, 4..16);
+            assert!((done - 1.0).abs() < 1e-12, "{done}");
         }
     }
 }

@@ -476,6 +476,8 @@ fn whole(function: &str, name: &str, random: &Random) -> u32 {
         "exponent_bits" => random.below(14),
         "bits" if function == "power_whole" => random.below(14),
         "side" => 1 + random.below(16),
+        "first" if function == "samples_wanted" => 1 + random.below(64),
+        "most" => random.below(65_537),
         _ => random.pick(&[
             0,
             1,

@@ -73,13 +73,13 @@ pub fn whole(packed: &Packed) -> Region {
 /// A region rendered in bands, put together.
 pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Cut) -> Film {
     let mut all = Film {
-        region,
         sums: Vec::new(),
-        moments: Vec::new(),
+        ..Film::new(region)
     };
     let mut output = |band: Film| {
         all.sums.extend(band.sums);
         all.moments.extend(band.moments);
+        all.looks.extend(band.looks);
         Ok(())
     };
     let result = wgray::job::render(backend, region, packed.pixel_samples, cut, &mut |_| true, &mut output);
@@ -131,18 +131,7 @@ pub fn differing(a: &Film, b: &Film) -> usize {
 
 /// A part of a film.
 pub fn crop(film: &Film, part: Region) -> Film {
-    let (whole, width) = (film.region, film.region.width() as usize);
-    let columns = (part.x0 - whole.x0) as usize..(part.x1 - whole.x0) as usize;
-    let of_part = |records: &[Vec4]| {
-        let rows = records.chunks(width).skip((part.y0 - whole.y0) as usize);
-        let rows = rows.take(part.height() as usize);
-        rows.flat_map(|row| row[columns.clone()].to_vec()).collect()
-    };
-    Film {
-        region: part,
-        sums: of_part(&film.sums),
-        moments: of_part(&film.moments),
-    }
+    film.clone().part(part)
 }
 
 /// The means of the pixels as f64.

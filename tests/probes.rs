@@ -2,7 +2,10 @@
 
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 use naga::ScalarKind;
-use wgray::cpu::adaptive::{display_slope_squared, display_variance, mean_of, moments_with, variance_of_mean};
+use wgray::cpu::adaptive::{
+    display_slope_squared, display_variance, look_with, mean_of, moments_with, samples_wanted, squared_deviation,
+    variance_of_mean, whole_look,
+};
 use wgray::cpu::camera::{camera_derivative, camera_differential, camera_ray, image_plane_offset};
 use wgray::cpu::differential::{
     Arrival, Derivative, Differential, arrival, normal_derivative, reflected_derivative, reflected_differential,
@@ -112,6 +115,10 @@ probes! {
     filter_bin(u: f32, bins: u32) -> u32;
     filter_offset(u: f32, bin: u32, bins: u32, low: f32, high: f32) -> f32;
     moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
+    squared_deviation(sum: Vec4, sample: Vec4) -> Vec3;
+    look_with(look: Vec4, sum: Vec4, sample: Vec4) -> Vec4;
+    whole_look(look: Vec4, sum: Vec4, moments: Vec4) -> Vec4;
+    samples_wanted(looks: Vec4, first: u32, squared_error: f32, most: u32) -> u32;
     mean_of(sum: Vec4) -> Vec3;
     variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3;
     display_variance(sum: Vec4, moments: Vec4) -> f32;

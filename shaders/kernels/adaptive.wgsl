@@ -1,6 +1,7 @@
-// Renders like `render.wgsl`, but gives a pixel further rounds of samples only while its error is too large. The film
-// has a second half: each pixel's moments. All decisions are the pixel's own, at the ends of its rounds, so that every
-// cut of the work gives the same.
+// Renders like `render.wgsl`, but after a first look at all pixels gives further samples only to those that need them,
+// as their neighbours' first looks tell. The film has two further parts: each pixel's moments, and its first look. A
+// dispatch is for samples of the first look or for later ones, and these come after all first looks of the film. A
+// pixel's own samples have no say in how many there are of them: a mean of samples that decide on themselves is biased.
 
 @group(0) @binding(10) var<storage, read_write> film: array<vec4f>;
 
@@ -15,18 +16,42 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     let pixels = work.film_size.x * work.film_size.y;
     var sum = film[index];
     var moments = film[pixels + index];
-    if work.samples.x == 0u && work.samples.y > 0u {
-        moments = pixel_corners(pixel);
+    var look = film[2u * pixels + index];
+    var end = work.samples.y;
+    let looks = work.samples.x < FIRST_LOOK;
+    if !looks {
+        end = samples_wanted(looks_around(place), FIRST_LOOK, bitcast<f32>(SQUARED_ERROR), end);
     }
-    for (var sample = work.samples.x; sample < work.samples.y; sample++) {
-        if is_done(sum, moments, sample) {
-            break;
-        }
+    for (var sample = work.samples.x; sample < end; sample++) {
         let value = pixel_radiance(pixel, sample);
+        look = look_with(look, sum, value);
         moments = moments_with(moments, sum, value);
         sum += value;
     }
     film[index] = sum;
     film[pixels + index] = moments;
+    if looks {
+        film[2u * pixels + index] = whole_look(look, sum, moments);
+    }
     sign(local);
+}
+
+// The sum of the first looks at a pixel's four neighbours, as far as they are in the picture.
+fn looks_around(place: vec2u) -> vec4f {
+    let width = work.film_size.x;
+    let index = 2u * width * work.film_size.y + place.y * width + place.x;
+    var sum = vec4f(0.0);
+    if place.y > 0u {
+        sum += film[index - width];
+    }
+    if place.x > 0u {
+        sum += film[index - 1u];
+    }
+    if place.x + 1u < width {
+        sum += film[index + 1u];
+    }
+    if place.y + 1u < work.film_size.y {
+        sum += film[index + width];
+    }
+    return sum;
 }

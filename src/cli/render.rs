@@ -15,7 +15,7 @@ use wgray::film::{Film, Region, mean};
 use wgray::gpu::{self, Gpu, compose::Shaders};
 use wgray::image::{self, Aov, Band, Format, Layout, Pending};
 use wgray::job::{self, Backend, Cut};
-use wgray::pack::{CORNERS, Packed, pack};
+use wgray::pack::{Packed, pack};
 use wgray::scene::{Overrides, Pattern, Scene};
 
 use super::outputs::Outputs;
@@ -411,7 +411,7 @@ fn write_picture(
                 .work(|backend| job::render(backend, band, plan.scene.pixel_samples, &cut, &mut update, &mut take))?;
             time += start.elapsed();
             camera_rays += match plan.scene.adaptive {
-                true => film.sample_counts().map(|count| u64::from(count + CORNERS)).sum(),
+                true => film.sample_counts().map(u64::from).sum(),
                 false => band.pixels() * u64::from(plan.scene.pixel_samples),
             };
             let hits = match plan.aovs.iter().any(|aov| !aov.is_of_film()) {

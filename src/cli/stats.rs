@@ -28,7 +28,7 @@ pub struct Stats {
     pub render_s: f64,
     /// From the start of the process to the written picture.
     pub total_s: f64,
-    /// Rays from the camera for the picture's samples; under adaptive sampling those through pixels' corners too.
+    /// Rays from the camera for the picture's samples.
     pub camera_rays: u64,
     /// Rays to lights; the kernels do not count them.
     pub shadow_rays: Option<u64>,

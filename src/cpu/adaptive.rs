@@ -1,13 +1,19 @@
-//! Twin of `shaders/adaptive.wgsl`: what is known of a pixel's variance, and when its displayed value is known well enough.
+//! Twin of `shaders/adaptive.wgsl`: what is known of a pixel's variance, and how many samples it gets by what its
+//! neighbours are like.
 
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
 use super::math::{max, min, power};
+use crate::pack::EVIDENCE;
 
 pub fn moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4 {
+    moments + squared_deviation(sum, sample).extend(1.0)
+}
+
+pub fn squared_deviation(sum: Vec4, sample: Vec4) -> Vec3 {
     let before = sample.xyz() - mean_of(sum) * sample.w;
     let after = sample.xyz() - mean_of(sum + sample) * sample.w;
-    moments + (before * after).extend(1.0)
+    before * after
 }
 
 pub fn mean_of(sum: Vec4) -> Vec3 {
@@ -37,4 +43,32 @@ pub fn display_slope_squared(value: f32) -> f32 {
     let x = min(max(value, 0.01), 1.0);
     let slope = 0.454_545_47 * power(x, 0.454_545_47) / x;
     slope * slope
+}
+
+pub fn look_with(look: Vec4, sum: Vec4, sample: Vec4) -> Vec4 {
+    let deviation = squared_deviation(sum, sample);
+    let total = deviation.x + deviation.y + deviation.z;
+    Vec4::new(look.x, look.y + total, look.z + total * total, look.w)
+}
+
+pub fn whole_look(look: Vec4, sum: Vec4, moments: Vec4) -> Vec4 {
+    Vec4::new(display_variance(sum, moments), look.y, look.z, 1.0)
+}
+
+pub fn samples_wanted(looks: Vec4, first: u32, squared_error: f32, most: u32) -> u32 {
+    // not <=, which lets what is no number pass
+    if !(looks.w > 0.0) | !(squared_error > 0.0) {
+        return most;
+    }
+    let variance = looks.x / looks.w * first as f32;
+    let mut count = first;
+    while count < most {
+        let enough = variance <= squared_error * count as f32;
+        let evident = looks.y * looks.y >= looks.z * (EVIDENCE * ((2 * count / first) as f32 - 1.0));
+        if enough | !evident {
+            break;
+        }
+        count *= 2;
+    }
+    count.min(most)
 }

@@ -3,7 +3,6 @@
 use bytemuck::Zeroable;
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 
-use super::adaptive::{display_variance, moments_with};
 use super::camera::{camera_differential, camera_ray};
 use super::differential::{Arrival, Differential, arrival};
 use super::filter::{filter_bin, filter_offset};
@@ -18,8 +17,7 @@ use super::surface::{Surface, first_hit, surface_at};
 use super::texture::appearance;
 use super::traverse::{closest_hit, hidden_samples};
 use crate::pack::{
-    BLOCK, CORNERS, EMITTER, FAR, FirstHit, GLASS, GRID, LEAVES, Light, MIRROR, Material, NOTHING, Packed, Primitive,
-    SPLITS,
+    BLOCK, EMITTER, FAR, FirstHit, GLASS, GRID, LEAVES, Light, MIRROR, Material, NOTHING, Packed, Primitive, SPLITS,
 };
 
 pub fn radiance(scene: &Packed, camera_path: Path, pixel: UVec2, sample: u32) -> Vec3 {
@@ -213,27 +211,6 @@ pub fn filtered(scene: &Packed, u: Vec2) -> Vec3 {
     let x = filter_offset(u.x, i, bins, of_x.x, of_x.y);
     let y = filter_offset(u.y, j, bins, of_y.x, of_y.y);
     Vec3::new(0.5 + x, 0.5 + y, of_x.z * of_y.z)
-}
-
-pub fn pixel_corners(scene: &Packed, pixel: UVec2) -> Vec4 {
-    let mut sum = Vec4::ZERO;
-    let mut moments = Vec4::ZERO;
-    for i in 0..CORNERS {
-        let corner = pixel + UVec2::new(i & 1, i >> 1);
-        let path = camera_path(scene, corner.as_vec2());
-        let value = radiance(scene, path, pixel, NOTHING - i).extend(1.0);
-        moments = moments_with(moments, sum, value);
-        sum += value;
-    }
-    moments.truncate().extend(0.0)
-}
-
-pub fn is_done(scene: &Packed, sum: Vec4, moments: Vec4, sample: u32) -> bool {
-    let s = &scene.specialization;
-    // not !=, which naga makes false where there is no number
-    let stopped = !(moments.w == sample as f32);
-    let round_ends = sample.is_multiple_of(s.pixel_samples) & (sample > 0);
-    stopped | (round_ends & (display_variance(sum, moments) <= f32::from_bits(s.squared_error)))
 }
 
 pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {

@@ -5,8 +5,8 @@ use std::ops::Range;
 use glam::{UVec2, Vec4};
 use rayon::prelude::*;
 
-use super::adaptive::moments_with;
-use super::integrator::{is_done, pixel_corners, pixel_first_hit, pixel_radiance};
+use super::adaptive::{look_with, moments_with, samples_wanted, whole_look};
+use super::integrator::{pixel_first_hit, pixel_radiance};
 use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::job::Backend;
@@ -47,21 +47,38 @@ impl Backend for Cpu<'_> {
 
     fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
         let scene = self.scene;
-        let Film { region, sums, moments } = &mut self.film;
-        let sums = runs(*region, sums, tile);
-        if scene.adaptive {
-            let both = sums.into_par_iter().zip(runs(*region, moments, tile));
-            both.for_each(|((first, sums), (_, moments))| {
-                for ((x, sum), moments) in (first.x..).zip(sums).zip(moments) {
-                    adaptive(scene, UVec2::new(x, first.y), samples.clone(), sum, moments);
-                }
-            });
-        } else {
+        let Film {
+            region,
+            sums,
+            moments,
+            looks,
+        } = &mut self.film;
+        let region = *region;
+        let sums = runs(region, sums, tile);
+        if !scene.adaptive {
             sums.into_par_iter().for_each(|(first, sums)| {
                 for (x, sum) in (first.x..).zip(sums) {
                     for sample in samples.clone() {
                         *sum += pixel_radiance(scene, UVec2::new(x, first.y), sample);
                     }
+                }
+            });
+            return Ok(());
+        }
+        let both = sums.into_par_iter().zip(runs(region, moments, tile));
+        if samples.start < scene.specialization.first_look {
+            let all = both.zip(runs(region, looks, tile));
+            all.for_each(|(((first, sums), (_, moments)), (_, looks))| {
+                for (((x, sum), moments), look) in (first.x..).zip(sums).zip(moments).zip(looks) {
+                    first_look(scene, UVec2::new(x, first.y), samples.clone(), sum, moments, look);
+                }
+            });
+        } else {
+            both.for_each(|((first, sums), (_, moments))| {
+                for ((x, sum), moments) in (first.x..).zip(sums).zip(moments) {
+                    let pixel = UVec2::new(x, first.y);
+                    let looks = looks_around(looks, region, pixel);
+                    further_samples(scene, pixel, samples.clone(), sum, moments, looks);
                 }
             });
         }
@@ -79,7 +96,17 @@ impl Backend for Cpu<'_> {
     }
 
     fn samples_of_all(&self) -> u32 {
-        self.scene.specialization.pixel_samples
+        self.scene.specialization.first_look
+    }
+
+    fn around(&self, region: Region) -> Region {
+        let camera = &self.scene.camera;
+        match self.scene.adaptive {
+            true => region
+                .with_neighbors()
+                .within(Region::whole(camera.width, camera.height)),
+            false => region,
+        }
     }
 
     fn largest_film(&self) -> u64 {
@@ -99,17 +126,44 @@ fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut 
     .collect()
 }
 
-/// What `shaders/kernels/adaptive.wgsl` does to a pixel.
-fn adaptive(scene: &Packed, pixel: UVec2, samples: Range<u32>, sum: &mut Vec4, moments: &mut Vec4) {
-    if samples.start == 0 && samples.end > 0 {
-        *moments = pixel_corners(scene, pixel);
-    }
+/// What `shaders/kernels/adaptive.wgsl` does to a pixel at first.
+fn first_look(scene: &Packed, pixel: UVec2, samples: Range<u32>, sum: &mut Vec4, moments: &mut Vec4, look: &mut Vec4) {
     for sample in samples {
-        if is_done(scene, *sum, *moments, sample) {
-            break;
-        }
+        let value = pixel_radiance(scene, pixel, sample);
+        *look = look_with(*look, *sum, value);
+        *moments = moments_with(*moments, *sum, value);
+        *sum += value;
+    }
+    *look = whole_look(*look, *sum, *moments);
+}
+
+/// What it does to a pixel later on.
+fn further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, sum: &mut Vec4, moments: &mut Vec4, looks: Vec4) {
+    let s = &scene.specialization;
+    let end = samples_wanted(looks, s.first_look, f32::from_bits(s.squared_error), samples.end);
+    for sample in samples.start..end {
         let value = pixel_radiance(scene, pixel, sample);
         *moments = moments_with(*moments, *sum, value);
         *sum += value;
     }
+}
+
+fn looks_around(looks: &[Vec4], region: Region, pixel: UVec2) -> Vec4 {
+    let (x, y) = (pixel.x - region.x0, pixel.y - region.y0);
+    let width = region.width() as usize;
+    let index = y as usize * width + x as usize;
+    let mut sum = Vec4::ZERO;
+    if y > 0 {
+        sum += looks[index - width];
+    }
+    if x > 0 {
+        sum += looks[index - 1];
+    }
+    if x + 1 < region.width() {
+        sum += looks[index + 1];
+    }
+    if y + 1 < region.height() {
+        sum += looks[index + width];
+    }
+    sum
 }

@@ -174,14 +174,8 @@ impl Canvas {
             cpu.begin(region)?;
             self.cpu = cpu.film()?;
         }
-        self.steps.start(
-            region,
-            if scale > self.finest {
-                1
-            } else {
-                self.scene.pixel_samples
-            },
-        );
+        let samples = if scale > self.finest { 1 } else { self.scene.pixel_samples };
+        self.steps.start(&self.gpu, region, samples);
         Ok(())
     }
 
@@ -370,6 +364,14 @@ impl Backend for Both<'_> {
 
     fn largest_film(&self) -> u64 {
         self.gpu.largest_film()
+    }
+
+    fn samples_of_all(&self) -> u32 {
+        self.gpu.samples_of_all()
+    }
+
+    fn around(&self, region: Region) -> Region {
+        self.gpu.around(region)
     }
 }
 

@@ -56,6 +56,8 @@ pub struct Gpu {
     adaptive: bool,
     /// The most samples of a call that the driver is thought to run whole.
     samples_per_call: u32,
+    /// The whole picture.
+    picture: Region,
 }
 
 /// What it takes to compile another kernel for the same scene.
@@ -143,6 +145,7 @@ impl Gpu {
             before: None,
             film: None,
             adaptive: packed.adaptive,
+            picture: Region::whole(packed.camera.width, packed.camera.height),
         };
         let nothing = Region {
             x0: 0,
@@ -170,12 +173,14 @@ impl Gpu {
         if same_kernel {
             self.film = None;
             (self.scene, self.more_texels) = upload(&self.device, packed, texels)?;
+            self.picture = Region::whole(packed.camera.width, packed.camera.height);
         }
         Ok(same_kernel)
     }
 
     /// Changes the camera. Whoever does so starts a new film.
     pub fn set_camera(&mut self, camera: &Camera) -> Result<(), RenderError> {
+        self.picture = Region::whole(camera.width, camera.height);
         self.device
             .checked(|| self.device.queue.write_buffer(&self.scene[0], 0, bytes_of(camera)))
     }
@@ -317,7 +322,7 @@ impl Backend for Gpu {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
         self.film = None; // before the next one: the two together may not fit
         self.film = Some(match self.adaptive {
-            true => self.target::<[Vec4; 2]>(region)?,
+            true => self.target::<[Vec4; 3]>(region)?,
             false => self.target::<Vec4>(region)?,
         });
         Ok(())
@@ -337,11 +342,14 @@ impl Backend for Gpu {
             return Ok(Film::new(Region::whole(0, 0)));
         };
         let mut sums: Vec<Vec4> = self.device.download(&film.buffer)?;
-        let moments = sums.split_off(film.region.pixels() as usize);
+        let pixels = film.region.pixels() as usize;
+        let mut moments = sums.split_off(pixels);
+        let looks = moments.split_off(pixels.min(moments.len()));
         Ok(Film {
             region: film.region,
             sums,
             moments,
+            looks,
         })
     }
 
@@ -360,12 +368,28 @@ impl Backend for Gpu {
     }
 
     fn samples_of_all(&self) -> u32 {
-        self.kernels.constants.pixel_samples
+        self.kernels.constants.first_look
+    }
+
+    fn around(&self, region: Region) -> Region {
+        match self.adaptive {
+            true => region.with_neighbors().within(self.picture),
+            false => region,
+        }
     }
 
     fn largest_film(&self) -> u64 {
         let info = &self.device.info;
-        info.largest_binding.min(info.largest_buffer) / size_of::<FirstHit>() as u64
+        let bytes = info.largest_binding.min(info.largest_buffer);
+        if !self.adaptive {
+            return bytes / size_of::<FirstHit>() as u64;
+        }
+        let most = bytes / size_of::<[Vec4; 3]>() as u64;
+        let beside = 2 * (u64::from(self.picture.width()) + u64::from(self.picture.height())) + 4;
+        match self.picture.pixels() <= most {
+            true => most,
+            false => most.saturating_sub(beside), // a part of it comes with the pixels around
+        }
     }
 }
 

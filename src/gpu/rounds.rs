@@ -1,6 +1,6 @@
 //! How many samples of a pixel one call may have, so that software Vulkan runs it whole.
 
-use crate::pack::{BLOCK, CORNERS, LEAVES, Specialization};
+use crate::pack::{BLOCK, LEAVES, Specialization};
 
 /// After so many rounds of all its loops together, Mesa 22.3's software Vulkan ends every loop of an invocation. Rounds
 /// are counted for all lanes of a vector: a round that any of them needs counts.
@@ -12,9 +12,8 @@ const CANDIDATES: f64 = 4.0;
 /// A call that is cut short nevertheless is repeated with fewer samples, so that too much costs time alone; too little
 /// costs what a call costs.
 pub fn samples_per_call(s: &Specialization, baked: bool) -> u32 {
-    let corners = if s.squared_error == 0 { 0 } else { CORNERS };
     let samples = MOST_ROUNDS / rounds_of_sample(s, baked);
-    (samples as u32).saturating_sub(corners).max(1)
+    (samples as u32).max(1)
 }
 
 /// Rounds of the loops of one sample, about; at least 1.

@@ -94,5 +94,6 @@ pub const NOTHING: u32 = u32::MAX;
 /// Shadow rays are traced in blocks of so many, a bit of a word for each.
 pub const BLOCK: u32 = 32;
 
-/// Rays through a pixel's corners, under adaptive sampling.
-pub const CORNERS: u32 = 4;
+/// How many samples an estimate must rest on to allow a pixel as many samples again as its first look has, under adaptive
+/// sampling.
+pub const EVIDENCE: f32 = 2.0;

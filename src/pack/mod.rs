@@ -126,6 +126,7 @@ pub fn pack(scene: &Scene) -> Packed {
         light_side: side(light_samples),
         light_samples: light_samples.count,
         filter_bins: filter_table.len() as u32,
+        first_look: adaptive.map_or(pixels.count, |adaptive| first_look(pixels.count, adaptive.max_samples)),
         squared_error: adaptive
             .map_or(0.0, |adaptive| (adaptive.error * adaptive.error) as f32)
             .to_bits(),
@@ -163,6 +164,13 @@ pub fn pack(scene: &Scene) -> Packed {
         adaptive: adaptive.is_some(),
         specialization,
     }
+}
+
+/// The samples that adaptive sampling gives all pixels before it decides on more: a round, or as many as it takes for an
+/// estimate of the variance.
+fn first_look(round: u32, most: u32) -> u32 {
+    const LEAST: u32 = 16;
+    LEAST.next_multiple_of(round).max(round).min(most)
 }
 
 /// Whether a filter is the pixel itself: the same weight for all samples inside.

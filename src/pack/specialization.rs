@@ -51,6 +51,8 @@ specialization! {
     light_samples = "LIGHT_SAMPLES",
     /// Bins of the filter's table; 0 if it is the box of the pixel.
     filter_bins = "FILTER_BINS",
+    /// How many samples every pixel gets.
+    first_look = "FIRST_LOOK",
     /// The bits, as an f32, of the square of the error that adaptive sampling aims at.
     squared_error = "SQUARED_ERROR",
     /// Bits of the largest shininess if all are whole numbers, else 0.

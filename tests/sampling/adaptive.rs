@@ -1,16 +1,16 @@
-//! Adaptive sampling: the same on both paths and under every cut; where it stops, and what its estimate is worth.
+//! Adaptive sampling: the same on both paths and under every cut; who gets how many samples, and what is known of a
+//! pixel's variance. `unbiased.rs` has what comes of it.
 
-use glam::{UVec2, Vec4};
-use wgray::cpu::adaptive::{display_slope_squared, display_variance, moments_with, variance_of_mean};
-use wgray::cpu::integrator::{pixel_corners, pixel_radiance};
-use wgray::film::mean;
+use glam::{DVec3, UVec2, Vec4};
+use wgray::cpu::adaptive::{display_slope_squared, display_variance, moments_with, samples_wanted, variance_of_mean};
+use wgray::cpu::integrator::pixel_radiance;
+use wgray::film::Region;
 use wgray::job::Cut;
 use wgray::pack::Packed;
 use wgray::scene::{AdaptiveDescription, Overrides, Pattern, PixelFilterDescription, PixelFilterKind, Scene};
 
 use super::cornell;
-use crate::pictures::{backend, both, differing, exact_ways, film, reference, render, whole};
-use crate::scenes;
+use crate::pictures::{backend, crop, differing, exact_ways, film, reference, render, whole};
 
 const GOING_ON: [Pattern; 4] = [Pattern::Jittered, Pattern::Random, Pattern::Halton, Pattern::Sobol];
 
@@ -40,6 +40,7 @@ fn pictures_are_the_same_on_both_paths_and_under_every_cut() {
                     (1 << 20, None, None),
                     (41 * 7, Some(5), Some(3)),
                     (1, Some(17), None),
+                    (1, None, None),
                     (500, Some(1), Some(2)),
                 ] {
                     let cut = Cut {
@@ -66,22 +67,105 @@ fn pictures_are_the_same_on_both_paths_and_under_every_cut() {
 }
 
 #[test]
-fn samples_come_in_rounds_between_the_least_and_the_most() {
+fn a_crop_is_a_part_of_the_whole() {
     let packed = adaptive(Pattern::Sobol, 0.01, 100);
-    let film = reference(&packed);
-    let mut counts: Vec<u32> = film.sample_counts().collect();
-    for (pixel, count) in counts.iter().enumerate() {
-        assert!(count % 16 == 0 || *count == 100, "{count}");
-        let (sum, moments) = (film.sums[pixel], film.moments[pixel]);
-        assert!(*count == 100 || display_variance(sum, moments) <= 0.01 * 0.01);
+    let expected = reference(&packed);
+    for way in exact_ways() {
+        for (x0, y0, x1, y1) in [
+            (0, 0, 1, 1),
+            (20, 13, 21, 14),
+            (3, 5, 37, 29),
+            (40, 0, 41, 33),
+            (0, 32, 41, 33),
+        ] {
+            let part = Region { x0, y0, x1, y1 };
+            for band_pixels in [1 << 20, 50] {
+                let cut = Cut {
+                    band_pixels,
+                    ..Cut::default()
+                };
+                let found = film(&mut *backend(&packed, way), &packed, part, &cut);
+                assert_eq!(differing(&found, &crop(&expected, part)), 0, "{way:?}, {part:?}");
+            }
+        }
     }
-    counts.sort_unstable();
-    counts.dedup();
-    assert_eq!((counts[0], counts[counts.len() - 1]), (16, 100));
+}
+
+/// The number of samples by the samples of the neighbours, each pixel's own way from the formulas; `None` where roundings
+/// decide.
+fn wanted(packed: &Packed, pixel: UVec2, first: u32, error: f64, most: u32) -> Option<u32> {
+    let (mut squares, mut neighbors, mut deviations, mut fourth) = (0.0, 0.0, 0.0, 0.0);
+    for (dx, dy) in [(0, -1), (-1, 0), (1, 0), (0, 1)] {
+        let (x, y) = (pixel.x.checked_add_signed(dx), pixel.y.checked_add_signed(dy));
+        let Some((x, y)) = x
+            .zip(y)
+            .filter(|(x, y)| *x < packed.camera.width && *y < packed.camera.height)
+        else {
+            continue;
+        };
+        let values = (0..first).map(|i| pixel_radiance(packed, UVec2::new(x, y), i).truncate().as_dvec3());
+        let (mut n, mut mean, mut sum) = (0.0, DVec3::ZERO, DVec3::ZERO);
+        for value in values {
+            n += 1.0;
+            let last = mean;
+            mean += (value - mean) / n;
+            let deviation = (value - last) * (value - mean);
+            sum += deviation;
+            deviations += deviation.element_sum();
+            fourth += deviation.element_sum().powi(2);
+        }
+        let slope = mean.to_array().map(|v| v.clamp(0.01, 1.0).powf(1.0 / 2.2 - 1.0) / 2.2);
+        squares += (sum / (n - 1.0) * DVec3::from(slope).powf(2.0)).element_sum() / 3.0;
+        neighbors += 1.0;
+    }
+    let by_variance = squares / neighbors / (error * error);
+    let evidence = if fourth > 0.0 {
+        deviations * deviations / fourth
+    } else {
+        0.0
+    };
+    let by_evidence = f64::from(first) * (1.0 + evidence / 2.0);
+    let mut count = first;
+    while count < most && by_variance > f64::from(count) && by_evidence >= f64::from(2 * count) {
+        count *= 2;
+    }
+    let close = |limit: f64| (0..20).any(|k| (limit / f64::from(first << k) - 1.0).abs() < 1e-3);
+    (!close(by_variance) && !close(by_evidence)).then_some(count.min(most))
 }
 
 #[test]
-fn extreme_errors_give_the_least_or_the_most_samples() {
+fn samples_double_as_far_as_the_neighbours_tell() {
+    for (round, first, error, most) in [
+        (16, 16, 0.01, 100),
+        (4, 16, 0.02, 256),
+        (3, 18, 0.005, 1000),
+        (1, 16, 0.03, 40),
+    ] {
+        let packed = cornell(Pattern::Sobol, round, |description| {
+            let max_samples = Some(most);
+            description.render.adaptive = Some(AdaptiveDescription { error, max_samples });
+        });
+        let film = reference(&packed);
+        let (mut told, mut counts) = (0, Vec::new());
+        for (pixel, count) in film.sample_counts().enumerate() {
+            let at = UVec2::new(pixel as u32 % 41, pixel as u32 / 41);
+            if let Some(expected) = wanted(&packed, at, first, error, most) {
+                assert_eq!(count, expected, "{round}, {at}");
+                told += 1;
+            }
+            counts.push(count);
+        }
+        counts.sort_unstable();
+        counts.dedup();
+        assert!(
+            told > 1300 && counts.len() > 2 && counts[0] == first,
+            "{told}, {counts:?}"
+        );
+    }
+}
+
+#[test]
+fn extreme_errors_give_the_first_look_or_the_most_samples() {
     let uniform = |count| {
         cornell(Pattern::Sobol, count, |description| {
             // the light's samples go on from group to group, whatever the pixel's count is
@@ -90,24 +174,63 @@ fn extreme_errors_give_the_least_or_the_most_samples() {
     };
     for (error, count) in [(1.0, 16), (0.0, 64)] {
         let adaptive = reference(&adaptive(Pattern::Sobol, error, 64));
-        let uniform = reference(&uniform(count));
-        // Error 0 stops where a pixel's samples are all the same: its mean is the same with any number of them.
-        for (pixel, (a, b)) in adaptive.sums.iter().zip(&uniform.sums).enumerate() {
-            let stopped = adaptive.sample_count(pixel) < count;
-            assert!(!stopped || adaptive.moments[pixel].truncate() == glam::Vec3::ZERO);
-            if stopped {
-                let apart = |a: f32, b: f32| (a - b).abs() > 1e-5;
-                assert!(!mean(*a).into_iter().zip(mean(*b)).any(|(a, b)| apart(a, b)));
-            } else {
-                assert_eq!(a, b);
-            }
-        }
+        assert_eq!(adaptive.sums, reference(&uniform(count)).sums);
+        assert!(adaptive.sample_counts().all(|n| n == count));
     }
 }
 
 #[test]
+fn the_smallest_pictures_and_rounds() {
+    let counts = |width, height, round, most| {
+        let packed = cornell(Pattern::Random, round, |description| {
+            (description.image.width, description.image.height) = (width, height);
+            let max_samples = Some(most);
+            description.render.adaptive = Some(AdaptiveDescription {
+                error: 1e-4,
+                max_samples,
+            });
+        });
+        let expected = reference(&packed);
+        for way in exact_ways() {
+            assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
+        }
+        expected.sample_counts().collect::<Vec<u32>>()
+    };
+    // without neighbours nothing is known
+    assert_eq!(counts(1, 1, 4, 50), [50]);
+    assert!(counts(7, 1, 4, 50).iter().all(|n| [16, 32, 50].contains(n)));
+    // no more than there may be
+    assert_eq!(counts(3, 3, 1, 2), [2; 9]);
+    assert!(counts(5, 5, 1, 17).iter().all(|n| [16, 17].contains(n)));
+}
+
+/// Sums of first looks: the mean square error of one pixel, sums of deviations and of their squares, pixels.
+#[test]
+fn a_look_allows_what_it_has_evidence_for() {
+    let wanted = |looks: [f32; 4], error: f32, most| samples_wanted(Vec4::from(looks), 16, error * error, most);
+    // 4 pixels, each with a standard error of 0.04: 4 times the samples halve it
+    let certain = [4.0 * 0.04 * 0.04, 1000.0, 1.0, 4.0];
+    for (error, count) in [
+        (0.041, 16),
+        (0.021, 64),
+        (0.011, 256),
+        (0.009, 512),
+        (0.001, 1000),
+        (0.0, 1000),
+    ] {
+        assert_eq!(wanted(certain, error, 1000), count, "{error}");
+    }
+    // a single sample that differs allows none, two of them as many again, six the fourfold
+    for (samples, count) in [(1.0, 16), (1.9, 16), (2.0, 32), (5.9, 32), (6.0, 64), (30.0, 256)] {
+        assert_eq!(wanted([1.0, samples, samples, 4.0], 0.001, 1000), count, "{samples}");
+    }
+    assert_eq!(wanted([0.0, 0.0, 0.0, 4.0], 0.001, 1000), 16);
+    assert_eq!(wanted([0.0, 0.0, 0.0, 0.0], 0.001, 1000), 1000);
+}
+
+#[test]
 fn moments_are_the_variance_of_the_samples() {
-    let packed = adaptive(Pattern::Random, 0.0, 48);
+    let packed = adaptive(Pattern::Random, 0.01, 48);
     let film = reference(&packed);
     for (pixel, sum) in film.sums.iter().enumerate() {
         let at = UVec2::new(pixel as u32 % 41, pixel as u32 / 41);
@@ -118,8 +241,7 @@ fn moments_are_the_variance_of_the_samples() {
             .iter()
             .map(|v| (v.truncate() - mean) * (v.truncate() - mean))
             .sum();
-        let corners = pixel_corners(&packed, at).truncate().as_dvec3();
-        let expected = (deviations + corners) / f64::from(n) / f64::from(n - 1);
+        let expected = deviations / f64::from(n) / f64::from(n - 1);
         let found = variance_of_mean(*sum, film.moments[pixel]);
         let error = (found.as_dvec3() - expected).abs();
         assert!(
@@ -169,33 +291,6 @@ fn weighted_moments_of_a_constant_are_nothing() {
     // negative control
     let other = moments_with(moments, sum, Vec4::new(0.3, 0.2, 0.6, 1.0));
     assert!(other.z > 1e-3);
-}
-
-#[test]
-fn an_edge_that_no_sample_meets_is_found_by_the_corners() {
-    // A white rectangle on black that reaches 1 % into the columns and rows of its edge.
-    let scene = "\
-image = { width = 20, height = 20 }
-camera = { type = 'orthographic', position = [0, 0, 5], look_at = [0, 0, 0], up = [0, 1, 0], height = 20 }
-render = { ambient = [1, 1, 1], pixel_samples = { pattern = 'sobol', count = 16 }, adaptive = { error = 0.001 } }
-materials.white = { type = 'phong', color = [1, 1, 1] }
-shapes = [{ type = 'rectangle', material = 'white', center = [0, 0, 0], size = [8.02, 8.02], normal = [0, 0, 1], tangent = [1, 0, 0] }]
-";
-    let packed = scenes::parse(scene);
-    for way in both() {
-        let film = render(&packed, way);
-        let mut blind = 0;
-        for (pixel, count) in film.sample_counts().enumerate() {
-            let at = UVec2::new(pixel as u32 % 20, pixel as u32 / 20);
-            let outside = |x: u32| x == 5 || x == 14;
-            let inside = |x: u32| (5..=14).contains(&x);
-            let edge = inside(at.x) && inside(at.y) && (outside(at.x) || outside(at.y));
-            assert_eq!(count > 16, edge, "{at}: {count} samples");
-            let first = pixel_radiance(&packed, at, 0);
-            blind += u32::from(edge && (1..16).all(|i| pixel_radiance(&packed, at, i) == first));
-        }
-        assert!(blind > 10, "the first rounds alone would have found the edge");
-    }
 }
 
 #[test]

@@ -3,6 +3,7 @@
 mod adaptive;
 mod filters;
 mod sequences;
+mod unbiased;
 
 use wgray::pack::Packed;
 use wgray::scene::{Description, Pattern};
