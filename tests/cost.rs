@@ -182,7 +182,7 @@ fn a_scene_file_takes_a_few_times_its_size() {
     assert_eq!(code, Some(0), "{told}");
     assert!(told.contains("shapes: 100001 of"), "{told}");
     // The control: less is not enough.
-    assert_ne!(check_within(PROGRAM + 60_000, &path).0, Some(0));
+    assert_ne!(check_within(PROGRAM + 20_000, &path).0, Some(0));
 }
 
 #[cfg(target_os = "linux")]
