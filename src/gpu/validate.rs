@@ -211,6 +211,7 @@ mod tests {
             &[
                 (AOV, "@compute @workgroup_size(8, 8)", ""),
                 (AOV, "@builtin(global_invocation_id) ", ""),
+                (AOV, "@builtin(local_invocation_index) ", ""),
             ],
             &["kernels/aov.wgsl: `aov` must be the entry point: @compute"],
         );
