@@ -23,6 +23,7 @@ const WITHOUT_TWIN: &[(&str, &str)] = &[
         "Rust's own quotients and square roots are rounded correctly",
     ),
     ("specialization.wgsl", "overrides only"),
+    ("texels.wgsl", "the CPU has all texels in one list"),
     (
         "scene.wgsl",
         "how a kernel reads the scene; baked kernels have the same functions with constants",

@@ -275,7 +275,7 @@ impl Plan {
         match Gpu::new(&device, &self.scene, &Shaders::built_in(), options) {
             Err(why @ RenderError::TooLarge { .. }) if *choice == gpu::Choice::Auto => {
                 if !self.quiet {
-                    eprintln!("warning: rendering on the CPU: {why}");
+                    super::say(&format!("warning: rendering on the CPU: {why}"));
                 }
                 Ok(self.cpu())
             }

@@ -26,12 +26,15 @@ pub struct Request {
     pub fallback: Option<Arc<Shaders>>,
 }
 
+/// A scene on a device, and the shaders that it has.
+pub type Ready = (Box<Gpu>, Arc<Shaders>);
+
 /// What was made of a request.
 pub struct Built {
     /// The request's.
     pub id: u64,
-    /// The scene on a device, and the shaders that it has; `None` if the request's are wrong, and have no fallback.
-    pub result: Option<Result<(Box<Gpu>, Arc<Shaders>), RenderError>>,
+    /// The scene on a device; `None` if the request's are wrong, and have no fallback.
+    pub result: Option<Result<Ready, RenderError>>,
     /// What is wrong with the request's shaders.
     pub refused: Option<ShaderErrors>,
     /// How long it took to compile.

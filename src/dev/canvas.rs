@@ -174,7 +174,11 @@ impl Canvas {
             cpu.begin(region)?;
             self.cpu = cpu.film()?;
         }
-        let samples = if scale > self.finest { 1 } else { self.scene.pixel_samples };
+        let samples = if scale > self.finest {
+            1
+        } else {
+            self.scene.pixel_samples
+        };
         self.steps.start(&self.gpu, region, samples);
         Ok(())
     }

@@ -118,17 +118,16 @@ fn brighter(text: &str, i: usize) -> String {
     document.to_string()
 }
 
+/// Makes the change of a round.
+type Change<'a> = dyn FnMut(usize, &Session) -> Result<(), Option<String>> + 'a;
+
 struct Clock<'a> {
     session: Session,
     stopped: &'a AtomicBool,
 }
 
 impl Clock<'_> {
-    fn all(
-        &mut self,
-        change: &'static str,
-        make: &mut dyn FnMut(usize, &Session) -> Result<(), Option<String>>,
-    ) -> Result<Measured, Option<String>> {
+    fn all(&mut self, change: &'static str, make: &mut Change) -> Result<Measured, Option<String>> {
         let mut measured = Measured {
             change,
             stopped: Vec::new(),

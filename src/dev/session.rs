@@ -11,7 +11,7 @@ use tokio::sync::watch;
 
 use super::build::Builder;
 use super::messages::{Command, Event, Report, State};
-use super::painter::Painter;
+use super::painter::{Painter, Told};
 use super::picture::Frame;
 use super::source::Sources;
 use super::watch::Watch;
@@ -126,16 +126,12 @@ impl Session {
         let (frame_sender, frames) = watch::channel(None);
         let looking = Arc::new(AtomicUsize::new(0));
         let wanted_by = (only_for_viewers && out.is_none()).then(|| looking.clone());
-        let painter = Painter::new(
-            sources,
-            device,
-            builder,
-            out,
-            wanted_by,
+        let told = Told {
             report,
-            state_sender,
-            frame_sender,
-        );
+            state: state_sender,
+            frames: frame_sender,
+        };
+        let painter = Painter::new(sources, device, builder, out, wanted_by, told);
         let thread = std::thread::Builder::new()
             .name("render".to_string())
             .spawn(move || run(painter, inbox))?;

@@ -301,6 +301,7 @@ mod tests {
             exact: true,
             largest_binding: 1,
             largest_buffer: 1,
+            storage_buffers: 8,
         }
     }
 

@@ -139,8 +139,8 @@ mod tests {
         );
         assert_eq!(
             told(info(1 << 18, storage), &packed(5000, 0)),
-            "small: the scene's shapes take 0.3 MiB, a shader sees 0.2 MiB of a buffer at most; --device cpu has no such limit"
+            "small: the scene's shapes take 0.4 MiB, a shader sees 0.2 MiB of a buffer at most; --device cpu has no such limit"
         );
-        TexelParts::of(&info(1 << 18, storage), &packed(4000, 0)).unwrap();
+        TexelParts::of(&info(1 << 18, storage), &packed(3000, 0)).unwrap();
     }
 }

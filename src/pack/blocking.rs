@@ -262,7 +262,7 @@ materials.m = { type = 'phong', color = [1, 1, 1] }
         let blocks = |p: &Primitive| {
             let mut range = Range {
                 normal: p.z.as_dvec3().normalize(),
-                center: p.center.as_dvec3(),
+                center: p.anchor.as_dvec3(),
                 below: p.kind == ELLIPSOID,
                 above: p.kind == ELLIPSOID,
             };

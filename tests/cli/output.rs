@@ -285,3 +285,51 @@ fn stats_have_the_promised_fields() {
         assert!(!fields[name].as_str().unwrap().is_empty());
     }
 }
+
+/// Whatever the driver: where it ends loops early and a sample is too long for it, the CPU takes over and a line says so.
+#[test]
+fn a_sample_too_long_for_the_driver_is_rendered_all_the_same() {
+    if crate::adapter::device().is_none() {
+        return;
+    }
+    let place = Place::new();
+    let long = [
+        "render",
+        "small.toml",
+        "--size",
+        "2x1",
+        "--spp",
+        "1",
+        "--light-samples",
+        "65536",
+    ];
+    let render = |device: &str, out: &str| {
+        let more = [
+            "--device",
+            device,
+            "-o",
+            out,
+            "--aov",
+            "depth",
+            "--stats",
+            "s.json",
+            "--progress",
+            "none",
+        ];
+        place.run(&[&long[..], &more[..]].concat())
+    };
+    let ran = render("gpu", "gpu.exr");
+    assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
+    let stats: serde_json::Value = serde_json::from_slice(&place.read("s.json")).expect("JSON");
+    if stats["device"] == "cpu" {
+        let line = ran.stderr.trim_end();
+        assert!(line.starts_with("warning: rendering on the CPU: "), "{line}");
+        assert!(line.contains("ends long loops early") && !line.contains('\n'), "{line}");
+    } else {
+        assert_eq!(ran.stderr, "");
+    }
+    assert_eq!(render("cpu", "cpu.exr").code, 0);
+    if crate::adapter::device().is_some_and(crate::adapter::bit_exact) {
+        assert!(place.read("gpu.exr") == place.read("cpu.exr"));
+    }
+}

@@ -318,7 +318,8 @@ mod unix {
                 "error: standard output: cannot be written: No space",
             ),
             (
-                "{ $0 render small.toml --device cpu -o -; echo $? > code; } | true; exit $(cat code)",
+                "{ while [ ! -e gone ]; do sleep 0.05; done; $0 render small.toml --device cpu -o -; echo $? > code; } \
+                 | { exec <&-; touch gone; }; exit $(cat code)",
                 "error: standard output: cannot be written: Broken pipe",
             ),
         ] {

@@ -326,7 +326,7 @@ fn what_cannot_be_is_told() {
     for (render, expected) in [
         (
             "adaptive = { error = 0.1 }",
-            "s.toml:4: render.adaptive: the pattern of pixel_samples must not be a grid",
+            "s.toml:4: render.adaptive: the pattern of pixel_samples is \"grid\", which has no further samples",
         ),
         (
             &format!("{sobol}adaptive = {{ error = 2 }}"),
@@ -378,7 +378,8 @@ fn what_cannot_be_is_told() {
         pixel_pattern: pattern,
         ..Overrides::default()
     };
-    assert!(told("", &option(0.1, None)).starts_with("--adaptive: the pattern of pixel_samples must not be a grid"));
+    let grid = "--adaptive: the pattern of pixel_samples is \"grid\", which has no further samples";
+    assert!(told("", &option(0.1, None)).starts_with(grid));
     assert!(told("", &option(-0.1, Some(Pattern::Sobol))).starts_with("--adaptive: -0.1 must be from 0 to 1"));
     let scene = Scene::parse(&text(""), "s.toml", &option(0.1, Some(Pattern::Sobol))).expect("a sound scene");
     let adaptive = scene.render.adaptive.expect("adaptive sampling");

@@ -171,7 +171,7 @@ fn all_images_together_must_fit() {
          together they must fit 1024.0 MiB"
     );
     // What fits is decoded, and then is too short for its header.
-    assert!(told(&texture("b", "fits.png", "ewa")).contains("must be sound"));
+    assert!(told(&texture("b", "fits.png", "ewa")).contains("is damaged or cut short"));
 }
 
 #[test]

@@ -107,6 +107,16 @@ struct Pending {
     constants: Constants,
 }
 
+/// Who is told what happens.
+pub struct Told {
+    /// The terminal.
+    pub report: Box<dyn Fn(Report) + Send>,
+    /// Whoever looks at the state.
+    pub state: watch::Sender<Arc<State>>,
+    /// Whoever looks at the picture.
+    pub frames: watch::Sender<Option<Arc<Frame>>>,
+}
+
 impl Painter {
     /// A session that knows no files yet.
     pub fn new(
@@ -115,10 +125,13 @@ impl Painter {
         builder: Builder,
         out: Option<PathBuf>,
         looking: Option<Arc<AtomicUsize>>,
-        report: Box<dyn Fn(Report) + Send>,
-        state_sender: watch::Sender<Arc<State>>,
-        frame_sender: watch::Sender<Option<Arc<Frame>>>,
+        told: Told,
     ) -> Painter {
+        let Told {
+            report,
+            state: state_sender,
+            frames: frame_sender,
+        } = told;
         let state = State {
             scene: sources.scene.display().to_string(),
             shaders: sources.shaders.as_ref().map(|folder| folder.display().to_string()),

@@ -139,7 +139,7 @@ impl<'a> Parts<'a> {
         let mut rest = Rest::default();
         let mut end = 0;
         let places = self.parts.iter().map(|part| part.place.clone());
-        for place in places.chain([self.text.len()..self.text.len()]) {
+        for place in places.chain(std::iter::once(self.text.len()..self.text.len())) {
             if end < place.start {
                 rest.pieces.push((rest.text.len(), end));
                 rest.text.push_str(&self.text[end..place.start]);

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::scene::Description;
-use crate::scene::parse::{place_in, read_file};
+use crate::scene::parse::{place_in, read_file, syntax_error};
 
 const START: &str = "\
 image = { width = 4, height = 4 }
@@ -13,10 +13,14 @@ const SPHERE: &str = "[[shapes]]\ntype = 'sphere'\nmaterial = 'a'\ncenter = [0, 
 const RED: &str = "[materials.a]\ntype = 'phong'\ncolor = [1, 0, 0]\n";
 const BLUE: &str = "[materials.\"b c\"]\ntype = 'phong'\ncolor = [0, 0, 1]\n";
 
-/// What a text says, or where it is wrong, read as a whole.
+/// What a text says, or what is wrong with it and in which line, read as a whole.
 fn whole(text: &str) -> Result<Description, (usize, String)> {
-    let table = toml::from_str(text).map_err(|error| (Broken::of(0, &error).at, error.message().to_owned()))?;
-    read_file(table).map_err(|problem| (place_in(text, &problem.key), problem.to_string()))
+    let line = |at: usize| 1 + text[..at].matches('\n').count();
+    let table = toml::from_str(text).map_err(|error| {
+        let at = Broken::of(0, &error).at;
+        (line(at), syntax_error(text, "s", at, error.message()).to_string())
+    })?;
+    read_file(table).map_err(|problem| (line(place_in(text, &problem.key)), problem.to_string()))
 }
 
 /// The same by parts, with line and column of what is wrong.
@@ -27,8 +31,7 @@ fn by_parts(text: &str) -> Result<Description, String> {
 fn assert_same(text: &str) {
     match (whole(text), by_parts(text)) {
         (Ok(whole), Ok(parts)) => assert!(whole == parts, "{text}"),
-        (Err((at, whole)), Err(parts)) => {
-            let line = 1 + text[..at].matches('\n').count();
+        (Err((line, whole)), Err(parts)) => {
             assert!(
                 parts.starts_with(&format!("s:{line}:")),
                 "{text}\n{line}: {whole}\n{parts}"
@@ -114,9 +117,13 @@ fn parts_and_what_must_be_read_as_a_whole_have_a_largest_size() {
     let many = "[0, 0, 0],".repeat(LARGEST / 10 + 1);
     let told = |text: &str| by_parts(text).unwrap_err();
     let long = format!("{START}{RED}[[shapes]]\nx = [{many}]\n");
-    assert_eq!(told(&long), "s:6:1: the table that begins here is larger than 4 MiB");
+    assert_eq!(
+        told(&long),
+        "s:6:1: shapes[0]: the table that begins here is larger than 4 MiB"
+    );
     let rest = format!("{START}x = [{many}]\n{SPHERE}");
-    assert!(told(&rest).starts_with("s:1:1: in a file larger than 4 MiB every texture, material, light and shape"));
+    assert!(told(&rest).starts_with("s:1:1: "));
+    assert!(told(&rest).contains("in a file larger than 4 MiB every texture, material, light and shape"));
     let spheres = SPHERE.repeat(LARGEST / SPHERE.len() + 1);
     assert!(by_parts(&format!("{START}{spheres}{RED}")).unwrap().shapes.len() > 50_000);
     assert!(told(&format!("{START}{spheres}[materials]\n{RED}")).contains("must have a header of its own"));
@@ -138,7 +145,10 @@ fn parts_and_what_must_be_read_as_a_whole_have_a_largest_size() {
         told(&bad)
     );
     let twice = told(&format!("{START}{RED}{spheres}{RED}"));
-    assert!(twice.contains("duplicate key") && !twice.starts_with("s:3:"), "{twice}");
+    assert!(
+        twice.contains("is there twice, first in line 3") && !twice.starts_with("s:3:"),
+        "{twice}"
+    );
     let bad = format!("{START}{spheres}{}", SPHERE.replace("radius", "size"));
     let line = bad.matches('\n').count();
     assert!(told(&bad).starts_with(&format!("s:{line}: shapes[")), "{}", told(&bad));
