@@ -88,6 +88,30 @@ fn random_scenes_are_the_same_on_gpu_and_cpu() {
     println!("{number} random scenes, each from buffers and as constants: every pixel has the same bits");
 }
 
+/// Small pictures with so many samples that some drivers would end the loops of a call early.
+#[test]
+fn random_scenes_of_many_samples_are_the_same() {
+    if !adapter::device().is_some_and(bit_exact) {
+        return;
+    }
+    let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
+    let strategy = any_scene::description();
+    for case in 0..5 {
+        let mut d = strategy.new_tree(&mut runner).expect("a scene").current();
+        (d.image.width, d.image.height) = (3, 2);
+        let (pixel, light) = (d.render.pixel_samples.pattern, d.render.light_samples.pattern);
+        d.render.light_samples = patterns::samples(light, 256);
+        match &mut d.render.adaptive {
+            Some(adaptive) => adaptive.max_samples = Some(1024),
+            None => d.render.pixel_samples = patterns::samples(pixel, 576),
+        }
+        if let Err(reason) = check(&d, sources::shaders()) {
+            let path = save(&d, "failing-scene-of-many-samples.toml");
+            panic!("case {case}: {reason}: wgray render {}", path.display());
+        }
+    }
+}
+
 /// Where bits are not promised, the pixels of random scenes are near, together: by plain WGSL, on devices that are not
 /// software Vulkan, and on one with poor quotients and square roots.
 #[test]
