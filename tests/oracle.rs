@@ -98,17 +98,20 @@ impl<'a> Oracle<'a> {
 
     /// The means of all pixels. Samples are at the centres of square grids, whatever the scene says.
     pub fn picture(&self) -> Vec<[f64; 3]> {
-        let (width, height) = (self.scene.image.width, self.scene.image.height);
+        let pixels = self.scene.image.width * self.scene.image.height;
+        (0..pixels).map(|i| self.pixel(i)).collect()
+    }
+
+    /// One of them: row by row from the top left.
+    pub fn pixel(&self, i: u32) -> [f64; 3] {
+        let width = self.scene.image.width;
         let places = self.grid(self.scene.render.pixel_samples.count);
-        let pixel = |i: u32| {
-            let corner = DVec2::new(f64::from(i % width), f64::from(i / width));
-            let sum: DVec3 = places
-                .iter()
-                .map(|place| self.radiance(self.camera_ray(corner + *place), 0))
-                .sum();
-            (sum / places.len() as f64).to_array()
-        };
-        (0..width * height).map(pixel).collect()
+        let corner = DVec2::new(f64::from(i % width), f64::from(i / width));
+        let sum: DVec3 = places
+            .iter()
+            .map(|place| self.radiance(self.camera_ray(corner + *place), 0))
+            .sum();
+        (sum / places.len() as f64).to_array()
     }
 
     /// What the rays through the pixels' centres meet.
