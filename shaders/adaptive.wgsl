@@ -7,11 +7,12 @@ fn moments_with(moments: vec4f, sum: vec4f, sample: vec4f) -> vec4f {
     return moments + vec4f(squared_deviation(sum, sample), 1.0);
 }
 
-// What a sample adds to the sum of squared deviations.
+// What a sample adds to the sum of squared deviations; not below 0, which weights of either sign would make of it.
 fn squared_deviation(sum: vec4f, sample: vec4f) -> vec3f {
     let before = sample.rgb - mean_of(sum) * sample.w;
     let after = sample.rgb - mean_of(sum + sample) * sample.w;
-    return before * after;
+    let product = before * after;
+    return select(product, vec3f(0.0), product < vec3f(0.0));
 }
 
 fn mean_of(sum: vec4f) -> vec3f {

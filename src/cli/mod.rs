@@ -63,6 +63,7 @@ pub fn main() -> ExitCode {
         Command::Dev(_) => None,
     };
     prepare_environment(threads);
+    signal::file_size_limit_is_an_error();
     let result = match cli.command {
         Command::Render(args) => render::run(*args, start),
         Command::Check(args) => check::run(&args),

@@ -41,7 +41,7 @@ pub struct Args {
     format: Option<Format>,
 
     /// Size of the picture in pixels, in place of the scene's
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
     size: Option<(u32, u32)>,
 
     /// Samples of every pixel, in place of the scene's; a square number for some patterns
@@ -70,7 +70,7 @@ pub struct Args {
     asset_root: Option<PathBuf>,
 
     /// Renders the pixels of columns x0 to x1 - 1 and rows y0 to y1 - 1 only, the same as in the whole picture
-    #[arg(long, value_name = "x0,y0,x1,y1", value_parser = parse_crop)]
+    #[arg(long, value_name = "x0,y0,x1,y1", value_parser = parse_crop, allow_hyphen_values = true)]
     crop: Option<Region>,
 
     /// What renders. auto: a real GPU, else software Vulkan, else the CPU; gpu: any adapter; cpu: the CPU without any

@@ -25,6 +25,16 @@ const HANG_UP: i32 = signal_hook::consts::SIGHUP;
 #[cfg(not(unix))]
 const HANG_UP: i32 = SIGTERM; // there is none
 
+/// Makes a file that grows beyond the limit of the process (`ulimit -f`) an error like a full disk, which is told and cleaned
+/// up, rather than the program's end.
+pub fn file_size_limit_is_an_error() {
+    #[cfg(unix)]
+    // SAFETY: nothing runs when the signal comes, and no other thread does yet.
+    unsafe {
+        libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
+    }
+}
+
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let mut action = std::mem::MaybeUninit::<libc::sigaction>::zeroed();

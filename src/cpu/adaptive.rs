@@ -13,7 +13,8 @@ pub fn moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4 {
 pub fn squared_deviation(sum: Vec4, sample: Vec4) -> Vec3 {
     let before = sample.xyz() - mean_of(sum) * sample.w;
     let after = sample.xyz() - mean_of(sum + sample) * sample.w;
-    before * after
+    let product = before * after;
+    Vec3::select(product.cmplt(Vec3::ZERO), Vec3::ZERO, product)
 }
 
 pub fn mean_of(sum: Vec4) -> Vec3 {

@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 use super::math::{max, min};
 use super::ray::vector_to_local;
 use super::surface::primitive_uv;
-use crate::pack::{ELLIPSOID, Primitive, RECTANGLE, Texture};
+use crate::pack::{CLAMP, ELLIPSOID, Primitive, RECTANGLE, Texture};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
@@ -45,7 +45,14 @@ pub fn texture_footprint(t: &Texture, f: Footprint) -> Footprint {
         t.u.x * f.uv.x + t.u.y * f.uv.y + t.u.z,
         t.v.x * f.uv.x + t.v.y * f.uv.y + t.v.z,
     );
-    Footprint { uv, dx, dy }
+    let x = (t.wrap == CLAMP) & ((uv.x < 0.0) | (uv.x > 1.0));
+    let y = (t.wrap == CLAMP) & ((uv.y < 0.0) | (uv.y > 1.0));
+    let along = |d: Vec2| Vec2::new(if x { 0.0 } else { d.x }, if y { 0.0 } else { d.y });
+    Footprint {
+        uv,
+        dx: along(dx),
+        dy: along(dy),
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

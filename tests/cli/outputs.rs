@@ -297,6 +297,22 @@ mod unix {
     }
 
     #[test]
+    fn a_limit_of_file_sizes_is_told_like_a_full_disk() {
+        let place = Place::new();
+        let ran = bash(
+            &place,
+            "ulimit -f 1; $0 render small.toml --device cpu --size 200x200 --spp 1 -o big.exr",
+        );
+        assert_eq!(ran.code, 1, "{}", ran.stderr);
+        assert!(
+            ran.stderr.starts_with("error: big.exr: cannot be written: "),
+            "{}",
+            ran.stderr
+        );
+        assert_eq!(place.files(), Vec::<String>::new());
+    }
+
+    #[test]
     fn devices_are_written_through() {
         let place = Place::new();
         quiet(

@@ -35,6 +35,11 @@ fn pictures_are_the_same_on_both_paths_and_under_every_cut() {
             });
             let expected = reference(&packed);
             assert!(expected.sample_counts().any(|n| n > 16) && expected.sample_counts().any(|n| n == 16));
+            let variances = (0..expected.sums.len()).flat_map(|pixel| expected.variance(pixel));
+            assert!(
+                variances.into_iter().all(|variance| variance >= 0.0),
+                "{pattern:?}, {kind:?}"
+            );
             for way in exact_ways() {
                 for (band_pixels, samples_per_call, rows_per_call) in [
                     (1 << 20, None, None),
