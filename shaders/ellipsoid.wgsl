@@ -44,5 +44,5 @@ fn ellipsoid_blocks(o: vec3f, d: vec3f, start: f32, reach: f32) -> bool {
     let b = dot(o, d);
     let end = start + reach * (2.0 * b + reach * a);
     let passes = (b < 0.0) & (-b < reach * a) & (ellipsoid_discriminant(o, d, start) >= 0.0);
-    return ((start < 0.0) & (end > 0.0)) | ((start > 0.0) & ((end < 0.0) | passes));
+    return ((start < 0.0) != (end < 0.0)) | ((start > 0.0) & passes);
 }

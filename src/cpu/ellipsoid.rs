@@ -47,7 +47,7 @@ pub fn ellipsoid_blocks(o: Vec3, d: Vec3, start: f32, reach: f32) -> bool {
     let b = dot(o, d);
     let end = start + reach * (2.0 * b + reach * a);
     let passes = (b < 0.0) & (-b < reach * a) & (ellipsoid_discriminant(o, d, start) >= 0.0);
-    ((start < 0.0) & (end > 0.0)) | ((start > 0.0) & ((end < 0.0) | passes))
+    ((start < 0.0) != (end < 0.0)) | ((start > 0.0) & passes)
 }
 
 #[cfg(test)]
@@ -152,6 +152,8 @@ mod tests {
         };
         assert!(blocks([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 1.0), "through");
         assert!(blocks([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.5), "into");
+        assert!(blocks([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.7), "into, past the middle");
+        assert!(blocks([-1.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.2), "from the surface into");
         assert!(blocks([0.0, 0.0, 0.0], [4.0, 0.0, 0.0], 1.0), "out of");
         assert!(!blocks([-2.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.24), "ends before");
         assert!(!blocks([0.0, 0.0, 0.0], [4.0, 0.0, 0.0], 0.24), "stays inside");
