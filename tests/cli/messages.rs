@@ -4,23 +4,10 @@ use super::{Place, Ran, SCENE};
 
 #[cfg(unix)]
 mod unix {
-    use std::process::Command;
-
-    use super::super::program;
     use super::*;
 
     fn sh(place: &Place, line: &str) -> Ran {
-        let output = Command::new("sh")
-            .current_dir(place.path("."))
-            .args(["-c", line])
-            .arg(program())
-            .output()
-            .unwrap();
-        Ran {
-            code: output.status.code().unwrap_or(-1),
-            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
-            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
-        }
+        place.shell("sh", line)
     }
 
     /// Streams that take nothing: full, closed, or with a reader who has gone.

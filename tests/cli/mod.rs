@@ -108,6 +108,22 @@ impl Place {
         }
     }
 
+    /// Runs a line of a shell in which `$0` is the program.
+    #[cfg(unix)]
+    fn shell(&self, shell: &str, line: &str) -> Ran {
+        let output = std::process::Command::new(shell)
+            .current_dir(self.folder.path())
+            .args(["-c", line])
+            .arg(program())
+            .output()
+            .expect("a shell");
+        Ran {
+            code: output.status.code().unwrap_or(-1),
+            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+        }
+    }
+
     /// Runs the program, which must succeed in silence.
     fn quietly(&self, arguments: &[&str]) {
         let ran = self.run(arguments);

@@ -196,19 +196,8 @@ mod unix {
     use super::super::program;
     use super::*;
 
-    /// Runs a line of bash in which `$0` is the program.
     fn bash(place: &Place, line: &str) -> Ran {
-        let output = Command::new("bash")
-            .current_dir(place.path("."))
-            .args(["-c", line])
-            .arg(program())
-            .output()
-            .unwrap();
-        Ran {
-            code: output.status.code().unwrap_or(-1),
-            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
-            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
-        }
+        place.shell("bash", line)
     }
 
     #[track_caller]
