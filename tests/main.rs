@@ -32,4 +32,5 @@ mod sources;
 mod statistics;
 mod textures;
 mod twins;
+mod unchanged;
 mod words;

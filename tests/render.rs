@@ -73,7 +73,7 @@ pub fn small_scenes() -> Vec<(String, Packed)> {
 }
 
 /// Every pattern in some scene, every scene with some pattern, with many sizes, seeds and numbers of samples.
-fn variations() -> Vec<(String, Packed)> {
+pub fn variations() -> Vec<(String, Packed)> {
     let (scenes, patterns) = (scenes::descriptions(), patterns::all());
     let vary = |i: usize| {
         let (name, d) = &scenes[i % scenes.len()];
