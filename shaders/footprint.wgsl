@@ -6,28 +6,14 @@ struct Footprint {
     dy: vec2f,
 }
 
-// At a point of local space, whose position has the derivatives `dx` and `dy` in the world.
-fn surface_footprint(q: Primitive, local: vec3f, dx: vec3f, dy: vec3f) -> Footprint {
-    let uv = primitive_uv(q, local);
-    return Footprint(uv, uv_derivative(q, local, vector_to_local(q, dx)), uv_derivative(q, local, vector_to_local(q, dy)));
+// On a surface of the primitive q, whose position has the derivatives `dx` and `dy`.
+fn surface_footprint(q: Primitive, surface: Surface, dx: vec3f, dy: vec3f) -> Footprint {
+    let local = point_to_local(q, surface.position);
+    return Footprint(surface.uv, uv_derivative(q, local, vector_to_local(q, dx)),
+                     uv_derivative(q, local, vector_to_local(q, dy)));
 }
 
-// Of `primitive_uv`, where the local point has the derivative d.
-fn uv_derivative(q: Primitive, local: vec3f, d: vec3f) -> vec2f {
-    if q.kind == RECTANGLE {
-        return d.xy * 0.5;
-    }
-    if q.kind == ELLIPSOID {
-        let r2 = max(local.x * local.x + local.y * local.y, 1e-12); // 0 at the poles
-        let du = (local.x * d.y - local.y * d.x) / r2;
-        let r = sqrt(r2);
-        let dv = r * d.z - local.z * ((local.x * d.x + local.y * d.y) / r);
-        return vec2f(du * 0.15915494309189535, dv * 0.3183098861837907);
-    }
-    return d.xy;
-}
-
-// The same in a texture's own coordinates. Beyond an edge that is clamped nothing changes across the edge: the footprint
+// A surface's footprint in a texture's own coordinates. Beyond an edge that is clamped nothing changes across the edge: the footprint
 // is a point there in that direction, so that no coarse level brings in what is far from the edge.
 fn texture_footprint(t: Texture, f: Footprint) -> Footprint {
     let dx = vec2f(t.u.x * f.dx.x + t.u.y * f.dx.y, t.v.x * f.dx.x + t.v.y * f.dx.y);

@@ -18,7 +18,7 @@ struct Scattered {
 }
 
 fn mirrored_path(path: Path, surface: Surface, at: Arrival, material: Material) -> Scattered {
-    let onward = reflected_path(path, surface, at, path.throughput * material.specular);
+    let onward = reflected_path(path, surface, at, path.throughput * material.tint);
     return Scattered(onward, onward, false);
 }
 
@@ -30,15 +30,15 @@ fn usable_normal(surface: Surface, normal: vec3f) -> vec3f {
 
 // Both branches at the first bounces; then the one that `random`, in [0, 1), chooses.
 fn glass_path(path: Path, surface: Surface, at: Arrival, material: Material, random: f32) -> Scattered {
-    let eta = select(material.shininess, 1.0 / material.shininess, surface.side > 0.0);
-    let cosine_i = max(dot(surface.wo, surface.normal), 1e-6);
+    let eta = select(material.ior, 1.0 / material.ior, surface.side > 0.0);
+    let cosine_i = max(dot(surface.wo, surface.shading_normal), 1e-6);
     let cosine_t = refracted_cosine(cosine_i, eta);
     let reflectance = fresnel(cosine_i, cosine_t, eta);
     let splits = (path.depth < SPLITS) & (reflectance > 0.0) & (reflectance < 1.0);
     let share = select(1.0, reflectance, splits);
     var reflection = reflected_path(path, surface, at, path.throughput * share);
     let rest = select(1.0, 1.0 - reflectance, splits);
-    let refraction = refracted_path(path, surface, at, path.throughput * material.specular * rest, eta, cosine_i, cosine_t);
+    let refraction = refracted_path(path, surface, at, path.throughput * material.tint * rest, eta, cosine_i, cosine_t);
     if splits {
         reflection.branch |= 1u << path.depth;
         return Scattered(refraction, reflection, true);
@@ -51,8 +51,8 @@ fn glass_path(path: Path, surface: Surface, at: Arrival, material: Material, ran
 
 fn reflected_path(path: Path, surface: Surface, at: Arrival, throughput: vec3f) -> Path {
     let d = path.ray.direction;
-    let ray = Ray(surface.start, reflected_direction(d, surface.normal));
-    let differential = reflected_differential(at, d, surface.normal);
+    let ray = Ray(surface.start, reflected_direction(d, surface.shading_normal));
+    let differential = reflected_differential(at, d, surface.shading_normal);
     return Path(ray, differential, throughput, path.depth + 1u, path.branch, surface.above, surface.below);
 }
 
@@ -60,7 +60,7 @@ fn refracted_path(path: Path, surface: Surface, at: Arrival, throughput: vec3f, 
                   cosine_t: f32) -> Path {
     let d = path.ray.direction;
     let below = surface.position - (surface.start - surface.position);
-    let ray = Ray(below, refracted_direction(d, surface.normal, eta, cosine_i, cosine_t));
-    let differential = refracted_differential(at, d, surface.normal, eta, cosine_t);
+    let ray = Ray(below, refracted_direction(d, surface.shading_normal, eta, cosine_i, cosine_t));
+    let differential = refracted_differential(at, d, surface.shading_normal, eta, cosine_t);
     return Path(ray, differential, throughput, path.depth + 1u, path.branch, surface.below, surface.above);
 }

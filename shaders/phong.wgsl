@@ -10,11 +10,11 @@ struct Lobes {
 // behind that which a normal map gives it.
 fn phong_lobes(surface: Surface, material: Material, to: vec3f, exponent_bits: u32) -> Lobes {
     let inverse_length = 1.0 / sqrt(dot(to, to));
-    let n_l = dot(surface.normal, to);
-    let n_v = dot(surface.normal, surface.wo);
+    let n_l = dot(surface.shading_normal, to);
+    let n_v = dot(surface.shading_normal, surface.wo);
     let r_v = (2.0 * n_l * n_v - dot(surface.wo, to)) * inverse_length;
     let r_v_power = phong_power(max(r_v, 0.0), material, exponent_bits);
-    let lit = (n_l > 0.0) & (dot(surface.facing, to) > 0.0);
+    let lit = (n_l > 0.0) & (dot(surface.normal, to) > 0.0);
     return Lobes(select(0.0, n_l * inverse_length, lit), select(0.0, r_v_power, lit));
 }
 

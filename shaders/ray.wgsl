@@ -20,6 +20,13 @@ fn vector_to_local(q: Primitive, v: vec3f) -> vec3f {
     return vec3f(dot(q.x, v), dot(q.y, v), dot(q.z, v));
 }
 
+// The derivative of a point of the world by a texture coordinate, from that of its local point. The columns of the
+// linear map are the cross products of the inverse map's rows, over its determinant.
+fn vector_to_world(q: Primitive, v: vec3f) -> vec3f {
+    let sum = cross(q.y, q.z) * v.x + cross(q.z, q.x) * v.y + cross(q.x, q.y) * v.z;
+    return sum / q.determinant;
+}
+
 // Where the ray meets the plane z = 0 of a flat primitive; not finite if it does not.
 fn plane_distance(q: Primitive, ray: Ray) -> f32 {
     return dot(q.z, q.anchor - ray.origin) / dot(q.z, ray.direction);

@@ -61,3 +61,10 @@ fn sample_key(pixel: vec2u, seed: u32, purpose: u32) -> vec2u {
     let bits = hash4(vec4u(pixel.x, pixel.y, seed, purpose));
     return bits.xy;
 }
+
+// Four numbers for one decision of a path. A path's decisions have numbers of their own if no two of one purpose are at the
+// same `bounce`.
+fn decision_bits(pixel: vec2u, seed: u32, sample: u32, bounce: u32, purpose: u32) -> vec4u {
+    let key = sample_key(pixel, seed, purpose);
+    return hash4(vec4u(key.x, key.y, sample, bounce));
+}

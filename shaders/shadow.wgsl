@@ -30,19 +30,6 @@ fn block_sample(block: Block, i: u32) -> vec2f {
     return sample_square(block.pattern, block.side, block.first + i, block.group, block.key);
 }
 
-fn blocks(kind: u32, o: vec3f, d: vec3f, start: f32, reach: f32) -> bool {
-    if kind == RECTANGLE {
-        return rectangle_blocks(o, d, reach);
-    }
-    if kind == TRIANGLE {
-        return triangle_blocks(o, d, reach);
-    }
-    if kind == ELLIPSOID {
-        return ellipsoid_blocks(o, d, start, reach);
-    }
-    return plane_blocks(o, d, reach);
-}
-
 // The cone of all shadow rays from p to a light: s (towards + u a + v b) for s >= 0 and a, b in -1..=1.
 struct Cone {
     apex: vec3f,

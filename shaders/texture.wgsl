@@ -163,20 +163,19 @@ fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) ->
     return base + sum * select(0.0, 1.0 / total, total > 0.0);
 }
 
-// A surface's material and normal as its textures make them.
+// What a surface looks like: its material and its shading normal as its textures make them.
 struct Appearance {
     material: Material,
     normal: vec3f,
 }
 
 // `lookups` is how many the material has at most.
-fn appearance(q: Primitive, material: Material, surface: Surface, at: Arrival, lookups: u32) -> Appearance {
+fn appearance(hit: Hit, material: Material, surface: Surface, at: Arrival, lookups: u32) -> Appearance {
     var look = Appearance(material, surface.normal);
     if lookups == 0u {
         return look;
     }
-    let local = point_to_local(q, surface.position);
-    let footprint = surface_footprint(q, local, at.x.position, at.y.position);
+    let footprint = footprint_of(hit, surface, at);
     for (var i = 0u; i < lookups; i++) {
         let lookup = material.lookups[i];
         if lookup != 0u {
@@ -185,9 +184,10 @@ fn appearance(q: Primitive, material: Material, surface: Surface, at: Arrival, l
             look.material.ambient = select(look.material.ambient, color, (lookup & FOR_AMBIENT) != 0u);
             look.material.diffuse = select(look.material.diffuse, color, (lookup & FOR_DIFFUSE) != 0u);
             look.material.specular = select(look.material.specular, color, (lookup & FOR_SPECULAR) != 0u);
+            look.material.tint = select(look.material.tint, color, (lookup & FOR_TINT) != 0u);
             if NORMAL_MAPS == 1u {
                 if (lookup & FOR_NORMAL) != 0u {
-                    look.normal = mapped_normal(q, local, surface, t, color);
+                    look.normal = mapped_normal(surface, t, color);
                 }
             }
         }

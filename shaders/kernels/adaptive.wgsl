@@ -3,7 +3,7 @@
 // dispatch is for samples of the first look or for later ones, and these come after all first looks of the film. A
 // pixel's own samples have no say in how many there are of them: a mean of samples that decide on themselves is biased.
 
-@group(0) @binding(10) var<storage, read_write> film: array<vec4f>;
+@group(0) @binding(1) var<storage, read_write> film: array<vec4f>;
 
 @compute @workgroup_size(8, 8)
 fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {

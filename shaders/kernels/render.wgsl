@@ -2,7 +2,7 @@
 // weights.
 // The sum goes on from the film's own value, one sample after the other, so that every cut of the work gives the same.
 
-@group(0) @binding(10) var<storage, read_write> film: array<vec4f>;
+@group(0) @binding(1) var<storage, read_write> film: array<vec4f>;
 
 @compute @workgroup_size(8, 8)
 fn render(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {

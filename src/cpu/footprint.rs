@@ -1,13 +1,12 @@
 //! Twin of `shaders/footprint.wgsl`: the footprint of a sample on a surface, in texture coordinates.
 
-use std::f32::consts::FRAC_1_PI;
-
 use glam::{Vec2, Vec3};
 
 use super::math::{max, min};
-use super::ray::vector_to_local;
-use super::surface::primitive_uv;
-use crate::pack::{CLAMP, ELLIPSOID, Primitive, RECTANGLE, Texture};
+use super::primitive::uv_derivative;
+use super::ray::{point_to_local, vector_to_local};
+use super::surface::Surface;
+use crate::pack::{CLAMP, Primitive, Texture};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
@@ -16,26 +15,13 @@ pub struct Footprint {
     pub dy: Vec2,
 }
 
-pub fn surface_footprint(q: &Primitive, local: Vec3, dx: Vec3, dy: Vec3) -> Footprint {
+pub fn surface_footprint(q: &Primitive, surface: Surface, dx: Vec3, dy: Vec3) -> Footprint {
+    let local = point_to_local(q, surface.position);
     Footprint {
-        uv: primitive_uv(q, local),
+        uv: surface.uv,
         dx: uv_derivative(q, local, vector_to_local(q, dx)),
         dy: uv_derivative(q, local, vector_to_local(q, dy)),
     }
-}
-
-pub fn uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2 {
-    if q.kind == RECTANGLE {
-        return Vec2::new(d.x, d.y) * 0.5;
-    }
-    if q.kind == ELLIPSOID {
-        let r2 = max(local.x * local.x + local.y * local.y, 1e-12);
-        let du = (local.x * d.y - local.y * d.x) / r2;
-        let r = r2.sqrt();
-        let dv = r * d.z - local.z * ((local.x * d.x + local.y * d.y) / r);
-        return Vec2::new(du * (0.5 * FRAC_1_PI), dv * FRAC_1_PI);
-    }
-    Vec2::new(d.x, d.y)
 }
 
 pub fn texture_footprint(t: &Texture, f: Footprint) -> Footprint {

@@ -28,7 +28,7 @@ pub struct Scattered {
 }
 
 pub fn mirrored_path(path: Path, surface: Surface, at: Arrival, material: &Material) -> Scattered {
-    let onward = reflected_path(path, surface, at, path.throughput * material.specular);
+    let onward = reflected_path(path, surface, at, path.throughput * material.tint);
     Scattered {
         onward,
         other: onward,
@@ -47,18 +47,18 @@ pub fn usable_normal(surface: Surface, normal: Vec3) -> Vec3 {
 
 pub fn glass_path(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Scattered {
     let eta = if surface.side > 0.0 {
-        1.0 / material.shininess
+        1.0 / material.ior
     } else {
-        material.shininess
+        material.ior
     };
-    let cosine_i = max(dot(surface.wo, surface.normal), 1e-6);
+    let cosine_i = max(dot(surface.wo, surface.shading_normal), 1e-6);
     let cosine_t = refracted_cosine(cosine_i, eta);
     let reflectance = fresnel(cosine_i, cosine_t, eta);
     let splits = (path.depth < SPLITS) & (reflectance > 0.0) & (reflectance < 1.0);
     let share = if splits { reflectance } else { 1.0 };
     let mut reflection = reflected_path(path, surface, at, path.throughput * share);
     let rest = if splits { 1.0 - reflectance } else { 1.0 };
-    let throughput = path.throughput * material.specular * rest;
+    let throughput = path.throughput * material.tint * rest;
     let refraction = refracted_path(path, surface, at, throughput, eta, cosine_i, cosine_t);
     if splits {
         reflection.branch |= 1 << path.depth;
@@ -86,9 +86,9 @@ pub fn reflected_path(path: Path, surface: Surface, at: Arrival, throughput: Vec
     let d = path.ray.direction;
     let ray = Ray {
         origin: surface.start,
-        direction: reflected_direction(d, surface.normal),
+        direction: reflected_direction(d, surface.shading_normal),
     };
-    let differential = reflected_differential(at, d, surface.normal);
+    let differential = reflected_differential(at, d, surface.shading_normal);
     Path {
         ray,
         differential,
@@ -113,9 +113,9 @@ pub fn refracted_path(
     let below = surface.position - (surface.start - surface.position);
     let ray = Ray {
         origin: below,
-        direction: refracted_direction(d, surface.normal, eta, cosine_i, cosine_t),
+        direction: refracted_direction(d, surface.shading_normal, eta, cosine_i, cosine_t),
     };
-    let differential = refracted_differential(at, d, surface.normal, eta, cosine_t);
+    let differential = refracted_differential(at, d, surface.shading_normal, eta, cosine_t);
     Path {
         ray,
         differential,

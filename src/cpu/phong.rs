@@ -16,11 +16,11 @@ pub struct Lobes {
 
 pub fn phong_lobes(surface: Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes {
     let inverse_length = 1.0 / dot(to, to).sqrt();
-    let n_l = dot(surface.normal, to);
-    let n_v = dot(surface.normal, surface.wo);
+    let n_l = dot(surface.shading_normal, to);
+    let n_v = dot(surface.shading_normal, surface.wo);
     let r_v = (2.0 * n_l * n_v - dot(surface.wo, to)) * inverse_length;
     let r_v_power = phong_power(max(r_v, 0.0), material, exponent_bits);
-    let lit = (n_l > 0.0) & (dot(surface.facing, to) > 0.0);
+    let lit = (n_l > 0.0) & (dot(surface.normal, to) > 0.0);
     Lobes {
         diffuse: if lit { n_l * inverse_length } else { 0.0 },
         specular: if lit { r_v_power } else { 0.0 },

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::math::dot;
+use super::math::{cross, dot};
 use crate::pack::Primitive;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +23,11 @@ pub fn point_to_local(q: &Primitive, p: Vec3) -> Vec3 {
 
 pub fn vector_to_local(q: &Primitive, v: Vec3) -> Vec3 {
     Vec3::new(dot(q.x, v), dot(q.y, v), dot(q.z, v))
+}
+
+pub fn vector_to_world(q: &Primitive, v: Vec3) -> Vec3 {
+    let sum = cross(q.y, q.z) * v.x + cross(q.z, q.x) * v.y + cross(q.x, q.y) * v.z;
+    sum / q.determinant
 }
 
 pub fn plane_distance(q: &Primitive, ray: Ray) -> f32 {

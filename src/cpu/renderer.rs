@@ -6,7 +6,8 @@ use glam::{UVec2, Vec4};
 use rayon::prelude::*;
 
 use super::adaptive::{look_with, moments_with, samples_wanted, whole_look};
-use super::integrator::{pixel_first_hit, pixel_radiance};
+use super::geometry::pixel_first_hit;
+use super::pixel::pixel_radiance;
 use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::job::Backend;

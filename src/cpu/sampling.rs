@@ -61,3 +61,8 @@ pub fn sample_key(pixel: UVec2, seed: u32, purpose: u32) -> UVec2 {
     let bits = hash4(UVec4::new(pixel.x, pixel.y, seed, purpose));
     UVec2::new(bits.x, bits.y)
 }
+
+pub fn decision_bits(pixel: UVec2, seed: u32, sample: u32, bounce: u32, purpose: u32) -> UVec4 {
+    let key = sample_key(pixel, seed, purpose);
+    hash4(UVec4::new(key.x, key.y, sample, bounce))
+}

@@ -2,15 +2,13 @@
 
 use glam::{UVec2, Vec2, Vec3};
 
-use super::ellipsoid::{ellipsoid_blocks, ellipsoid_level};
+use super::ellipsoid::ellipsoid_level;
 use super::light::{Segments, segment, segments_to_light, segments_to_local};
 use super::math::dot;
-use super::plane::plane_blocks;
+use super::primitive::blocks;
 use super::ray::vector_to_local;
-use super::rectangle::rectangle_blocks;
 use super::sampling::sample_square;
-use super::triangle::triangle_blocks;
-use crate::pack::{ELLIPSOID, Light, Primitive, RECTANGLE, Sphere, TRIANGLE};
+use crate::pack::{Light, Primitive, Sphere};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {
@@ -42,20 +40,6 @@ pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light,
 
 pub fn block_sample(block: Block, i: u32) -> Vec2 {
     sample_square(block.pattern, block.side, block.first + i, block.group, block.key)
-}
-
-#[inline(always)] // compiled for each kind
-pub fn blocks(kind: u32, o: Vec3, d: Vec3, start: f32, reach: f32) -> bool {
-    if kind == RECTANGLE {
-        return rectangle_blocks(o, d, reach);
-    }
-    if kind == TRIANGLE {
-        return triangle_blocks(o, d, reach);
-    }
-    if kind == ELLIPSOID {
-        return ellipsoid_blocks(o, d, start, reach);
-    }
-    plane_blocks(o, d, reach)
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

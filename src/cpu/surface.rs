@@ -1,33 +1,26 @@
 //! Twin of `shaders/surface.wgsl`: the point where a ray meets a primitive.
 
-use std::f32::consts::FRAC_1_PI;
-
 use glam::{Vec2, Vec3};
 
 use super::ellipsoid::ellipsoid_level;
-use super::math::{atan2, dot, max, normalize, positive_zero};
-use super::ray::{Ray, point_to_local, vector_to_local};
-use crate::pack::{ELLIPSOID, FirstHit, NOTHING, Primitive, RECTANGLE};
+use super::math::{dot, max, positive_zero};
+use super::primitive::{is_round, local_tangents, primitive_gradient, primitive_normal, primitive_uv};
+use super::ray::{Ray, point_to_local, vector_to_local, vector_to_world};
+use crate::pack::{FirstHit, NOTHING, Primitive};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
     pub position: Vec3,
     pub normal: Vec3,
+    pub shading_normal: Vec3,
     pub wo: Vec3,
     pub start: Vec3,
     pub side: f32,
-    pub facing: Vec3,
     pub above: u32,
     pub below: u32,
-}
-
-pub fn primitive_gradient(q: &Primitive, local: Vec3) -> Vec3 {
-    let round = q.x * local.x + q.y * local.y + q.z * local.z;
-    if q.kind == ELLIPSOID { round } else { q.z }
-}
-
-pub fn primitive_normal(q: &Primitive, local: Vec3) -> Vec3 {
-    normalize(primitive_gradient(q, local))
+    pub uv: Vec2,
+    pub du: Vec3,
+    pub dv: Vec3,
 }
 
 pub fn largest(v: Vec3) -> f32 {
@@ -41,7 +34,8 @@ pub fn surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surf
     let gradient = primitive_gradient(q, from_anchor - q.middle);
     let inverse_slope = 1.0 / dot(gradient, gradient).sqrt();
     let outward = gradient * inverse_slope;
-    let height = if q.kind == ELLIPSOID {
+    let round = is_round(q.kind);
+    let height = if round {
         0.5 * ellipsoid_level(q, from_anchor)
     } else {
         from_anchor.z
@@ -51,29 +45,30 @@ pub fn surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surf
     let side = if inside { -1.0 } else { 1.0 };
     let normal = outward * side;
     let size = max(largest(position), largest(way));
-    let round = q.kind == ELLIPSOID;
     Surface {
         position,
         normal,
+        shading_normal: normal,
         wo: -ray.direction,
         start: position + normal * (epsilon * size),
         side,
-        facing: normal,
         above: if round & inside { NOTHING } else { i },
         below: if round & !inside { NOTHING } else { i },
+        uv: Vec2::ZERO,
+        du: Vec3::ZERO,
+        dv: Vec3::ZERO,
     }
 }
 
-pub fn primitive_uv(q: &Primitive, local: Vec3) -> Vec2 {
-    if q.kind == RECTANGLE {
-        return Vec2::new(0.5 * local.x + 0.5, 0.5 * local.y + 0.5);
+pub fn with_coordinates(surface: Surface, q: &Primitive) -> Surface {
+    let local = point_to_local(q, surface.position);
+    let tangents = local_tangents(q, local);
+    Surface {
+        uv: primitive_uv(q, local),
+        du: vector_to_world(q, tangents.u),
+        dv: vector_to_world(q, tangents.v),
+        ..surface
     }
-    if q.kind == ELLIPSOID {
-        let longitude = atan2(local.y, local.x) * (0.5 * FRAC_1_PI);
-        let latitude = atan2((local.x * local.x + local.y * local.y).sqrt(), -local.z) * FRAC_1_PI;
-        return Vec2::new(if longitude < 0.0 { longitude + 1.0 } else { longitude }, latitude);
-    }
-    Vec2::new(local.x, local.y)
 }
 
 pub fn first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit {

@@ -3,15 +3,17 @@
 use glam::{Vec2, Vec3};
 
 use super::differential::Arrival;
-use super::footprint::{Footprint, footprint_ellipse, surface_footprint, texture_footprint};
+use super::footprint::{Footprint, footprint_ellipse, texture_footprint};
+use super::geometry::footprint_of;
 use super::math::{floor, log2, max};
+use super::normal_map::mapped_normal;
 use super::pattern::pattern_share;
-use super::ray::point_to_local;
+use super::ray::Hit;
 use super::surface::Surface;
-use super::tangent::mapped_normal;
+
 use super::texel::{gaussian_weight, level_size, near_coordinate, unpacked_color, wrapped_index};
 use crate::pack::{
-    EWA, FLOAT, FOR_AMBIENT, FOR_DIFFUSE, FOR_NORMAL, FOR_SPECULAR, LINES, Material, NEAREST, Packed, Primitive,
+    EWA, FLOAT, FOR_AMBIENT, FOR_DIFFUSE, FOR_NORMAL, FOR_SPECULAR, FOR_TINT, LINES, Material, NEAREST, Packed,
     TEXTURE_NUMBER, TRILINEAR, Texture,
 };
 
@@ -176,7 +178,7 @@ pub struct Appearance {
 
 pub fn appearance(
     scene: &Packed,
-    q: &Primitive,
+    hit: Hit,
     material: &Material,
     surface: Surface,
     at: Arrival,
@@ -189,8 +191,7 @@ pub fn appearance(
     if lookups == 0 {
         return look;
     }
-    let local = point_to_local(q, surface.position);
-    let footprint = surface_footprint(q, local, at.x.position, at.y.position);
+    let footprint = footprint_of(scene, hit, surface, at);
     for i in 0..lookups as usize {
         let lookup = material.lookups[i];
         if lookup != 0 {
@@ -205,8 +206,11 @@ pub fn appearance(
             if lookup & FOR_SPECULAR != 0 {
                 look.material.specular = color;
             }
+            if lookup & FOR_TINT != 0 {
+                look.material.tint = color;
+            }
             if lookup & FOR_NORMAL != 0 {
-                look.normal = mapped_normal(q, local, surface, t, color);
+                look.normal = mapped_normal(surface, t, color);
             }
         }
     }

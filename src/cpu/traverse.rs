@@ -1,55 +1,57 @@
-//! Which primitives a ray meets: the same results as `shaders/scene.wgsl` and `shaders/traverse.wgsl`.
+//! Which primitives a ray meets: the same results as `shaders/buffers.wgsl` and `shaders/traverse.wgsl`.
 
 use std::ops::Range;
 
-use super::ellipsoid::intersect_ellipsoid;
-use super::plane::intersect_plane;
+use super::primitive::intersect;
 use super::ray::{Hit, Ray, closer};
-use super::rectangle::intersect_rectangle;
 use super::shadow::{Block, Cone, cone_to_light, may_block, shadow_bits};
 use super::surface::Surface;
-use super::triangle::intersect_triangle;
-use crate::pack::{ELLIPSOID, FAR, Light, NOTHING, PLANE, Packed, Primitive, RECTANGLE, TRIANGLE};
+use crate::pack::{ELLIPSOID, FAR, Light, NOTHING, PLANE, Packed, RECTANGLE, TRIANGLE};
+
+/// Calls a function with each kind of primitives as a constant, so that it is compiled for each.
+macro_rules! for_each_kind {
+    ($ranges:expr, |$kind:ident, $range:ident| $body:expr) => {
+        for (kind, $range) in $ranges {
+            match kind {
+                RECTANGLE => for_each_kind!(@ RECTANGLE, $kind, $body),
+                TRIANGLE => for_each_kind!(@ TRIANGLE, $kind, $body),
+                ELLIPSOID => for_each_kind!(@ ELLIPSOID, $kind, $body),
+                _ => for_each_kind!(@ PLANE, $kind, $body),
+            }
+        }
+    };
+    (@ $value:ident, $kind:ident, $body:expr) => {{
+        let $kind = $value;
+        $body
+    }};
+}
 
 pub fn closest_hit(scene: &Packed, ray: Ray, left: u32, wall: u32) -> Hit {
-    let s = &scene.specialization;
     let mut hit = Hit {
         t: FAR,
         primitive: NOTHING,
     };
-    let mut i = 0;
-    let mut nearest = |intersect: fn(&Primitive, bool, Ray, f32) -> f32, count: u32| {
-        for q in &scene.primitives[i as usize..(i + count) as usize] {
-            hit = closer(hit, intersect(q, i == wall, ray, hit.t), i, left);
-            i += 1;
-        }
-    };
-    nearest(|q, _, ray, limit| intersect_rectangle(q, ray, limit), s.rectangles);
-    nearest(|q, _, ray, limit| intersect_triangle(q, ray, limit), s.triangles);
-    nearest(intersect_ellipsoid, s.ellipsoids);
-    nearest(|q, _, ray, limit| intersect_plane(q, ray, limit), s.planes);
+    for_each_kind!(scene.kinds(), |kind, range| for i in range {
+        let t = intersect(kind, &scene.primitives[i], i as u32 == wall, ray, hit.t);
+        hit = closer(hit, t, i as u32, left);
+    });
     hit
 }
 
 pub fn hidden_samples(scene: &Packed, surface: Surface, light: &Light, block: Block) -> u32 {
-    let s = &scene.specialization;
     let cone = cone_to_light(light, surface.start);
-    let triangles = s.rectangles..s.rectangles + s.blocking_triangles;
-    let round = s.rectangles + s.triangles;
-    let ellipsoids = round..round + s.blocking_ellipsoids;
-    let endless = round + s.ellipsoids;
-    let planes = endless..endless + s.blocking_planes;
-    hidden_by(scene, RECTANGLE, 0..s.blocking_rectangles, surface, &cone, light, block)
-        | hidden_by(scene, TRIANGLE, triangles, surface, &cone, light, block)
-        | hidden_by(scene, ELLIPSOID, ellipsoids, surface, &cone, light, block)
-        | hidden_by(scene, PLANE, planes, surface, &cone, light, block)
+    let mut bits = 0;
+    for_each_kind!(scene.shadow_casters(), |kind, range| {
+        bits |= hidden_by(scene, kind, range, surface, &cone, light, block);
+    });
+    bits
 }
 
 #[inline(always)] // compiled for each kind
 fn hidden_by(
     scene: &Packed,
     kind: u32,
-    range: Range<u32>,
+    range: Range<usize>,
     surface: Surface,
     cone: &Cone,
     light: &Light,
@@ -57,7 +59,8 @@ fn hidden_by(
 ) -> u32 {
     let mut bits = 0;
     for i in range {
-        let (q, sphere) = (&scene.primitives[i as usize], &scene.bounds[i as usize]);
+        let (q, sphere) = (&scene.primitives[i], &scene.bounds[i]);
+        let i = i as u32;
         if (i != surface.above) & may_block(sphere, cone) {
             bits |= shadow_bits(kind, q, cone.apex, i == surface.below, light, block);
         }

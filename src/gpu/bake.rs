@@ -1,12 +1,12 @@
-//! A small scene written into its kernel as constants: the functions of `scene.wgsl`, with a statement for each primitive
-//! instead of a loop. Software Vulkan reads a buffer lane by lane, constants for free.
+//! A scene as text. A small one is written into its kernel as constants: the functions of `buffers.wgsl`, with a statement
+//! for each primitive instead of a loop. Software Vulkan reads a buffer lane by lane, constants for free.
 
 use std::fmt::Write;
-use std::ops::Range;
 
-use glam::Vec3;
+use bytemuck::cast_slice;
+use glam::UVec4;
 
-use crate::pack::{BLOCK, ELLIPSOID, Light, Material, Packed, Primitive, Specialization, Sphere, Texture};
+use crate::pack::{BLOCK, Field as _, Light, Material, Packed, Record, Texture};
 
 /// Larger scenes are read from buffers: compiling grows with every primitive.
 pub const MOST_PRIMITIVES: usize = 64;
@@ -19,14 +19,10 @@ pub fn bake_if_small(packed: &Packed) -> Option<String> {
     (packed.primitives.len() <= MOST_PRIMITIVES && records <= MOST_RECORDS).then(|| bake(packed))
 }
 
-/// What the shaders call a primitive of each kind, by [`Primitive::kind`].
-const KINDS: [&str; 4] = ["rectangle", "triangle", "ellipsoid", "plane"];
-
-/// The WGSL text of a scene's `closest_hit`, `shadow_candidates`, `load_primitive`, `load_blocker`, `load_material`,
-/// `load_light` and `load_texture`.
+/// The WGSL text of the functions of `buffers.wgsl`, and of those that load records, for one scene.
 pub fn bake(packed: &Packed) -> String {
     let mut out = String::new();
-    let records: Vec<String> = packed.primitives.iter().map(primitive).collect();
+    let records: Vec<String> = packed.primitives.iter().map(Record::constant).collect();
     write_function(
         &mut out,
         "closest_hit(ray: Ray, left: u32, wall: u32) -> Hit",
@@ -34,25 +30,36 @@ pub fn bake(packed: &Packed) -> String {
         "hit",
         |body| {
             for (i, (p, record)) in packed.primitives.iter().zip(&records).enumerate() {
-                let kind = KINDS[p.kind as usize];
-                let wall = match p.kind {
-                    ELLIPSOID => format!("{i}u == wall, "),
-                    _ => String::new(),
-                };
+                let kind = p.kind;
                 let _ = writeln!(
                     body,
-                    "    hit = closer(hit, intersect_{kind}({record}, {wall}ray, hit.t), {i}u, left);"
+                    "    hit = closer(hit, intersect({kind}u, {record}, {i}u == wall, ray, hit.t), {i}u, left);"
+                );
+            }
+        },
+    );
+    write_function(
+        &mut out,
+        "hidden_samples(surface: Surface, light: Light, block: Block) -> u32",
+        "let cone = cone_to_light(light, surface.start);\n    var bits = 0u;",
+        "bits",
+        |body| {
+            for (kind, range) in packed.shadow_casters() {
+                let (start, end) = (range.start, range.end);
+                let _ = writeln!(
+                    body,
+                    "    bits |= hidden_by({kind}u, vec2u({start}u, {end}u), surface, cone, light, block);"
                 );
             }
         },
     );
     let signature = "shadow_candidates(first: u32, end: u32, cone: Cone) -> u32";
     write_function(&mut out, signature, "var bits = 0u;", "bits", |body| {
-        for range in blocking(&packed.specialization) {
+        for (_, range) in packed.shadow_casters() {
             for first in range.clone().step_by(BLOCK as usize) {
                 let _ = writeln!(body, "    if first == {first}u {{");
                 for i in first..range.end.min(first + BLOCK as usize) {
-                    let (bit, sphere) = (i - first, sphere(&packed.bounds[i]));
+                    let (bit, sphere) = (i - first, packed.bounds[i].constant());
                     let _ = writeln!(
                         body,
                         "        bits |= select(0u, {}u, may_block({sphere}, cone));",
@@ -63,16 +70,14 @@ pub fn bake(packed: &Packed) -> String {
             }
         }
     });
-    write_table(&mut out, "load_primitive", "Primitive", &records);
     write_function(
         &mut out,
         "load_blocker(kind: u32, i: u32) -> Primitive",
         "var r = Primitive();",
         "r",
         |body| {
-            for range in blocking(&packed.specialization) {
-                for (k, i) in range.clone().enumerate() {
-                    let kind = packed.primitives[i].kind;
+            for (kind, range) in packed.shadow_casters() {
+                for (k, i) in range.enumerate() {
                     let test = if k == 0 {
                         String::new()
                     } else {
@@ -83,38 +88,45 @@ pub fn bake(packed: &Packed) -> String {
             }
         },
     );
-    write_table(
-        &mut out,
-        "load_material",
-        "Material",
-        &packed.materials.iter().map(material).collect::<Vec<_>>(),
-    );
-    write_table(
-        &mut out,
-        "load_light",
-        "Light",
-        &packed.lights.iter().map(light).collect::<Vec<_>>(),
-    );
-    write_table(
-        &mut out,
-        "load_texture",
-        "Texture",
-        &packed.textures.iter().map(texture).collect::<Vec<_>>(),
-    );
+    let lights = packed.counts.lights.constant();
+    let _ = writeln!(out, "fn light_counts() -> vec2u {{\n    return {lights};\n}}");
+    write_table(&mut out, "load_primitive", &packed.primitives);
+    write_table(&mut out, "load_material", &packed.materials);
+    write_table(&mut out, "load_light", &packed.lights);
+    write_table(&mut out, "load_texture", &packed.textures);
     out
 }
 
-/// The primitives of each kind that can cast a shadow.
-fn blocking(s: &Specialization) -> [Range<usize>; 4] {
-    let (triangles, ellipsoids) = (s.rectangles, s.rectangles + s.triangles);
-    let planes = ellipsoids + s.ellipsoids;
-    [
-        0..s.blocking_rectangles,
-        triangles..triangles + s.blocking_triangles,
-        ellipsoids..ellipsoids + s.blocking_ellipsoids,
-        planes..planes + s.blocking_planes,
-    ]
-    .map(|range| range.start as usize..range.end as usize)
+/// The WGSL text of the functions that load records from the rows of one buffer, in the order of [`rows`].
+pub fn tables() -> String {
+    let mut out = String::new();
+    from_rows::<Material>(&mut out, "load_material", "0u");
+    from_rows::<Light>(&mut out, "load_light", "counts.tables.x");
+    from_rows::<Texture>(&mut out, "load_texture", "counts.tables.y");
+    out
+}
+
+/// The rows of a scene's materials, lights and textures.
+pub fn rows(packed: &Packed) -> Vec<UVec4> {
+    let bytes = [
+        cast_slice(&packed.materials),
+        cast_slice(&packed.lights),
+        cast_slice::<_, u8>(&packed.textures),
+    ];
+    bytemuck::pod_collect_to_vec(&bytes.concat())
+}
+
+/// A function that loads record i of a table that starts at a row.
+fn from_rows<R: Record>(out: &mut String, name: &str, start: &str) {
+    let (record, size) = (R::NAME, size_of::<R>() / size_of::<UVec4>());
+    let _ = writeln!(
+        out,
+        "fn {name}(i: u32) -> {record} {{\n    let at = {start} + i * {size}u;"
+    );
+    for row in 0..size {
+        let _ = writeln!(out, "    let r{row} = records[at + {row}u];");
+    }
+    let _ = writeln!(out, "    return {};\n}}", R::from_rows());
 }
 
 fn write_function(out: &mut String, signature: &str, start: &str, result: &str, body: impl FnOnce(&mut String)) {
@@ -124,89 +136,18 @@ fn write_function(out: &mut String, signature: &str, start: &str, result: &str, 
 }
 
 /// A function from an index to a constant record, by a chain of selections.
-fn write_table(out: &mut String, name: &str, record: &str, records: &[String]) {
-    let first = records.first().map_or(format!("{record}()"), Clone::clone);
+fn write_table<R: Record>(out: &mut String, name: &str, records: &[R]) {
+    let record = R::NAME;
+    let first = records.first().map_or(format!("{record}()"), R::constant);
     write_function(
         out,
         &format!("{name}(i: u32) -> {record}"),
         &format!("var r = {first};"),
         "r",
         |body| {
-            for (i, constant) in records.iter().enumerate().skip(1) {
+            for (i, constant) in records.iter().map(R::constant).enumerate().skip(1) {
                 let _ = writeln!(body, "    if i == {i}u {{ r = {constant}; }}");
             }
         },
     );
-}
-
-fn vector(v: Vec3) -> String {
-    format!("vec3f({:?}f, {:?}f, {:?}f)", v.x, v.y, v.z)
-}
-
-fn primitive(p: &Primitive) -> String {
-    format!(
-        "Primitive({}, {}u, {}, {}u, {}, {}u, {}, {:?}f, {}, {:?}f)",
-        vector(p.anchor),
-        p.material,
-        vector(p.x),
-        p.shape,
-        vector(p.y),
-        p.kind,
-        vector(p.z),
-        p.determinant,
-        vector(p.middle),
-        p.level
-    )
-}
-
-fn sphere(s: &Sphere) -> String {
-    format!("Sphere({}, {:?}f)", vector(s.center), s.radius)
-}
-
-fn material(m: &Material) -> String {
-    format!(
-        "Material({}, {}u, {}, {:?}f, {}, {}u, vec4u({}u, {}u, {}u, {}u))",
-        vector(m.ambient),
-        m.kind,
-        vector(m.diffuse),
-        m.shininess,
-        vector(m.specular),
-        m.exponent,
-        m.lookups.x,
-        m.lookups.y,
-        m.lookups.z,
-        m.lookups.w
-    )
-}
-
-fn texture(t: &Texture) -> String {
-    format!(
-        "Texture({}, {}u, {}, {:?}f, {}, {}u, {}, {}u, {}u, {}u, {}u, {}u)",
-        vector(t.first),
-        t.kind,
-        vector(t.second),
-        t.parameter,
-        vector(t.u),
-        t.format,
-        vector(t.v),
-        t.wrap,
-        t.texels,
-        t.width,
-        t.height,
-        t.levels
-    )
-}
-
-fn light(l: &Light) -> String {
-    format!(
-        "Light({}, {:?}f, {}, {:?}f, {}, {:?}f, {}, {}u)",
-        vector(l.center),
-        l.reach,
-        vector(l.u),
-        l.finite,
-        vector(l.v),
-        l.area,
-        vector(l.color),
-        l.number
-    )
 }

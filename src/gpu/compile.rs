@@ -62,11 +62,11 @@ impl Checked {
     /// The kernel as SPIR-V for one specialisation, computed on the device exactly as it is written.
     pub fn exact_spirv(
         &self,
-        kernel: Kernel,
+        kernel: &Kernel,
         constants: &Specialization,
         rounding: Rounding,
     ) -> Result<Vec<u32>, ShaderError> {
-        self.exact_entry(kernel.entry_point(), &constants.constants(), rounding)
+        self.exact_entry(kernel.entry_point, &constants.constants(), rounding)
     }
 
     /// The same for any compute entry point, with the values of its overrides.

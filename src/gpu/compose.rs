@@ -3,6 +3,11 @@
 use std::ops::Range;
 use std::{fs, io, path::Path};
 
+use glam::Vec4;
+
+use super::bake::tables;
+use crate::pack::{self, FirstHit, Specialization};
+
 macro_rules! files {
     ($($name:literal),* $(,)?) => {
         &[$(($name, include_str!(concat!("../../shaders/", $name)))),*]
@@ -13,36 +18,36 @@ macro_rules! files {
 pub const BUILT_IN: &[(&str, &str)] = files![
     "adaptive.wgsl",
     "bindings.wgsl",
+    "buffers.wgsl",
     "camera.wgsl",
-    "constants.wgsl",
     "differential.wgsl",
     "ellipsoid.wgsl",
     "filter.wgsl",
     "footprint.wgsl",
-    "integrator.wgsl",
+    "geometry.wgsl",
+    "integrators/phong.wgsl",
     "kernels/adaptive.wgsl",
-    "kernels/aov.wgsl",
+    "kernels/first_hits.wgsl",
     "kernels/render.wgsl",
-    "layout.wgsl",
     "light.wgsl",
     "math.wgsl",
+    "normal_map.wgsl",
     "path.wgsl",
     "pattern.wgsl",
     "phong.wgsl",
+    "pixel.wgsl",
     "plane.wgsl",
+    "primitive.wgsl",
     "ray.wgsl",
     "receipt.wgsl",
     "rectangle.wgsl",
     "rng.wgsl",
     "rounding.wgsl",
     "sampling.wgsl",
-    "scene.wgsl",
     "sequence.wgsl",
     "shadow.wgsl",
-    "specialization.wgsl",
     "specular.wgsl",
     "surface.wgsl",
-    "tangent.wgsl",
     "texel.wgsl",
     "texels.wgsl",
     "texture.wgsl",
@@ -52,8 +57,6 @@ pub const BUILT_IN: &[(&str, &str)] = files![
 
 /// The files of the shared mathematics: pure functions and records, each with a twin in `src/cpu/`.
 pub const SHARED: &[&str] = &[
-    "constants.wgsl",
-    "layout.wgsl",
     "math.wgsl",
     "rng.wgsl",
     "sampling.wgsl",
@@ -63,6 +66,7 @@ pub const SHARED: &[&str] = &[
     "triangle.wgsl",
     "ellipsoid.wgsl",
     "plane.wgsl",
+    "primitive.wgsl",
     "camera.wgsl",
     "surface.wgsl",
     "light.wgsl",
@@ -74,7 +78,7 @@ pub const SHARED: &[&str] = &[
     "footprint.wgsl",
     "pattern.wgsl",
     "texel.wgsl",
-    "tangent.wgsl",
+    "normal_map.wgsl",
     "filter.wgsl",
     "adaptive.wgsl",
 ];
@@ -82,53 +86,51 @@ pub const SHARED: &[&str] = &[
 /// What may take the place of quotients and square roots. It comes first, as naga wants functions before their calls.
 pub const ROUNDING: &str = "rounding.wgsl";
 
-/// What every kernel adds to [`SHARED`]: its constants, its buffers and the way through the scene.
-const KERNEL: &[&str] = &[
-    "specialization.wgsl",
-    "bindings.wgsl",
-    "receipt.wgsl",
-    "traverse.wgsl",
-    "texture.wgsl",
-    "integrator.wgsl",
-];
+/// What every kernel adds to [`SHARED`]: its buffers, and the way through the scene.
+const KERNEL: &[&str] = &["bindings.wgsl", "receipt.wgsl", "traverse.wgsl", "geometry.wgsl"];
+/// What takes samples of a pixel.
+const SAMPLES: &[&str] = &["texture.wgsl", "pixel.wgsl", "integrators/phong.wgsl"];
 /// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.
-const FROM_BUFFERS: &str = "scene.wgsl";
+const FROM_BUFFERS: &str = "buffers.wgsl";
 /// The texels in one buffer.
 const TEXELS: &str = "texels.wgsl";
 
-/// A compute shader's entry point and the file that it is in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kernel {
-    /// Accumulates samples in the film.
-    Render,
-    /// The same, as long as a pixel needs them.
-    Adaptive,
-    /// Writes what the first hit of each pixel's centre is like.
-    Aov,
-}
-
-impl Kernel {
-    /// Every kernel.
-    pub const ALL: [Kernel; 3] = [Kernel::Render, Kernel::Adaptive, Kernel::Aov];
-
+/// A compute shader.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Kernel {
     /// The entry point's name.
-    pub fn entry_point(self) -> &'static str {
-        match self {
-            Kernel::Render => "render",
-            Kernel::Adaptive => "adaptive",
-            Kernel::Aov => "aov",
-        }
-    }
-
-    /// The file that has it.
-    pub fn file(self) -> &'static str {
-        match self {
-            Kernel::Render => "kernels/render.wgsl",
-            Kernel::Adaptive => "kernels/adaptive.wgsl",
-            Kernel::Aov => "kernels/aov.wgsl",
-        }
-    }
+    pub entry_point: &'static str,
+    /// The file that has it, and declares what it writes.
+    pub file: &'static str,
+    /// What it is made of besides [`SHARED`] and the scene.
+    pub files: &'static [&'static [&'static str]],
+    /// The size in bytes of what it writes for a pixel.
+    pub record: usize,
 }
+
+/// Accumulates samples in the film.
+pub static RENDER: Kernel = Kernel {
+    entry_point: "render",
+    file: "kernels/render.wgsl",
+    files: &[KERNEL, SAMPLES],
+    record: size_of::<Vec4>(),
+};
+/// Accumulates samples as long as a pixel needs them.
+pub static ADAPTIVE: Kernel = Kernel {
+    entry_point: "adaptive",
+    file: "kernels/adaptive.wgsl",
+    files: &[KERNEL, SAMPLES],
+    record: size_of::<[Vec4; 3]>(),
+};
+/// Writes what the ray through each pixel's centre meets first.
+pub static FIRST_HITS: Kernel = Kernel {
+    entry_point: "first_hits",
+    file: "kernels/first_hits.wgsl",
+    files: &[KERNEL],
+    record: size_of::<FirstHit>(),
+};
+/// Every kernel.
+pub static KERNELS: [&Kernel; 3] = [&RENDER, &ADAPTIVE, &FIRST_HITS];
 
 /// The texts of all shader files.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -168,26 +170,38 @@ impl Shaders {
         self
     }
 
+    /// The shared mathematics by themselves: constants, records and pure functions.
+    pub fn shared(&self) -> Source {
+        let mut source = Source::default();
+        source.append("src/pack/constants.rs", &pack::constant_declarations());
+        source.append("src/pack/layout.rs", &pack::declarations());
+        for name in SHARED {
+            source.append(name, self.text(name));
+        }
+        source
+    }
+
     /// A kernel that reads the scene from buffers, or, if `baked` is the text of the functions that know the scene, has
     /// it as constants.
-    pub fn compose(&self, kernel: Kernel, baked: Option<&str>) -> Source {
+    pub fn compose(&self, kernel: &Kernel, baked: Option<&str>) -> Source {
         self.compose_with_texels(kernel, baked, None)
     }
 
-    /// The same where `texels` is the text of the function that reads texels from several buffers.
-    pub fn compose_with_texels(&self, kernel: Kernel, baked: Option<&str>, texels: Option<&str>) -> Source {
+    /// [`Shaders::compose`] where `texels` is the text of the function that reads texels from several buffers.
+    pub fn compose_with_texels(&self, kernel: &Kernel, baked: Option<&str>, texels: Option<&str>) -> Source {
         let mut source = Source::default();
-        for name in [&ROUNDING]
-            .into_iter()
-            .chain(SHARED)
-            .chain(KERNEL)
-            .chain([&kernel.file()])
-        {
+        source.append(ROUNDING, self.text(ROUNDING));
+        source.extend(&self.shared());
+        source.append("src/pack/specialization.rs", &Specialization::declarations());
+        for name in kernel.files.iter().copied().flatten().chain([&kernel.file]) {
             source.append(name, self.text(name));
         }
         match baked {
             Some(text) => source.append("(the scene as constants)", text),
-            None => source.append(FROM_BUFFERS, self.text(FROM_BUFFERS)),
+            None => {
+                source.append(FROM_BUFFERS, self.text(FROM_BUFFERS));
+                source.append("(the tables of records)", &tables());
+            }
         }
         match texels {
             Some(text) => source.append("(the texels' buffers)", text),
@@ -230,6 +244,16 @@ impl Source {
         if !text.ends_with('\n') {
             self.text.push('\n');
         }
+    }
+
+    /// Adds all files of another text.
+    fn extend(&mut self, other: &Source) {
+        let start = self.text.len();
+        self.parts.extend(other.parts.iter().map(|part| Part {
+            file: part.file.clone(),
+            start: start + part.start,
+        }));
+        self.text.push_str(&other.text);
     }
 
     /// The text with a part of it replaced, and its lines where they were. What is replaced lies in one file.

@@ -14,7 +14,7 @@ use crate::error::ShaderError;
 /// What is wrong with the interface of a kernel that naga accepts. What it writes is looked at if it is `whole`, with the
 /// bodies of all its functions.
 pub fn mistakes(
-    kernel: Kernel,
+    kernel: &Kernel,
     source: &Source,
     checked: &Checked,
     whole: bool,
@@ -33,7 +33,7 @@ pub fn mistakes(
 }
 
 struct Sides<'a> {
-    kernel: Kernel,
+    kernel: &'a Kernel,
     source: &'a Source,
     own: &'a Module,
     built_in: &'a Source,
@@ -54,7 +54,7 @@ impl Sides<'_> {
 
     /// What the program reads after a call must have been written.
     fn results(&mut self, own: &Checked, right: &Checked) {
-        let entry = self.kernel.entry_point();
+        let entry = self.kernel.entry_point;
         let at = |module: &Module, binding| {
             let mut all = module.global_variables.iter();
             all.find(|(_, variable)| variable.binding == binding)
@@ -100,7 +100,7 @@ impl Sides<'_> {
     }
 
     fn entry_point(&mut self) {
-        let name = self.kernel.entry_point();
+        let name = self.kernel.entry_point;
         let is_it = |entry: &&naga::EntryPoint| entry.name == name && entry.stage == ShaderStage::Compute;
         let Some(right) = self.right.entry_points.iter().find(is_it) else {
             return;
@@ -135,7 +135,7 @@ impl Sides<'_> {
                     (None, Some(other)) => format!("the entry point must be called `{name}`, not `{other}`"),
                     (None, None) => format!("there is no entry point: {attributes} fn {name}"),
                 };
-                let file = self.source.start_of(self.kernel.file());
+                let file = self.source.start_of(self.kernel.file);
                 let file = file.map(|start| Span::from(start..start + 1));
                 (place(name).or_else(|| place(other?)).or(file), message)
             }

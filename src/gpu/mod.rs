@@ -11,6 +11,7 @@ mod prune;
 mod renderer;
 mod rounding;
 mod rounds;
+mod scene;
 pub mod spirv;
 mod texels;
 mod validate;

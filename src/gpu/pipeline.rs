@@ -18,53 +18,83 @@ const UNIFORM: BufferBindingType = BufferBindingType::Uniform;
 const READ: BufferBindingType = BufferBindingType::Storage { read_only: true };
 const WRITE: BufferBindingType = BufferBindingType::Storage { read_only: false };
 
-/// How the buffers of `shaders/bindings.wgsl` are bound: what the kernel writes, and its receipt, are the last.
-pub const BINDINGS: [BufferBindingType; 12] = [
-    UNIFORM, UNIFORM, UNIFORM, READ, READ, READ, READ, READ, READ, UNIFORM, WRITE, WRITE,
+/// The groups of `shaders/bindings.wgsl`: what changes with every call, with the scene, with its shapes.
+pub const GROUPS: [&[BufferBindingType]; 3] = [
+    &[UNIFORM, WRITE, WRITE],
+    &[UNIFORM, UNIFORM, UNIFORM, UNIFORM, READ, READ],
+    &[READ, READ],
 ];
+
+/// The group of the scene, which ends with its texels.
+pub const SCENE: usize = 1;
 
 /// How many of them are storage buffers.
 pub const STORAGE_BUFFERS: usize = {
-    let (mut count, mut i) = (0, 0);
-    while i < BINDINGS.len() {
-        if !matches!(BINDINGS[i], BufferBindingType::Uniform) {
-            count += 1;
+    let (mut count, mut group) = (0, 0);
+    while group < GROUPS.len() {
+        let mut i = 0;
+        while i < GROUPS[group].len() {
+            if !matches!(GROUPS[group][i], BufferBindingType::Uniform) {
+                count += 1;
+            }
+            i += 1;
         }
-        i += 1;
+        group += 1;
     }
     count
 };
 
-/// The bindings of every kernel, and behind them those of so many further buffers of texels.
-pub fn bind_group_layout(device: &Device, more_texels: usize) -> wgpu::BindGroupLayout {
-    let more = std::iter::repeat_n(READ, more_texels);
-    let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
-        .zip(BINDINGS.into_iter().chain(more))
-        .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: BindingType::Buffer {
-                ty,
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            count: None,
-        })
-        .collect();
-    device
-        .device
-        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+/// WebGPU promises so many by default.
+const _: () = assert!(STORAGE_BUFFERS <= 8);
+
+/// The groups of every kernel; that of the scene ends with so many further buffers of texels.
+pub fn bind_group_layouts(device: &Device, more_texels: usize) -> Vec<wgpu::BindGroupLayout> {
+    let layout = |(group, types): (usize, &&[BufferBindingType])| {
+        let more = std::iter::repeat_n(READ, if group == SCENE { more_texels } else { 0 });
+        let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
+            .zip(types.iter().copied().chain(more))
+            .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
+                binding,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty: BindingType::Buffer {
+                    ty,
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            })
+            .collect();
+        let descriptor = wgpu::BindGroupLayoutDescriptor {
             label: None,
             entries: &entries,
+        };
+        device.device.create_bind_group_layout(&descriptor)
+    };
+    GROUPS.iter().enumerate().map(layout).collect()
+}
+
+/// A group of buffers, in the order of their bindings.
+pub fn bind_group(device: &Device, layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
+    let entries: Vec<wgpu::BindGroupEntry> = (0..)
+        .zip(buffers)
+        .map(|(binding, buffer)| wgpu::BindGroupEntry {
+            binding,
+            resource: buffer.as_entire_binding(),
         })
+        .collect();
+    device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout,
+        entries: &entries,
+    })
 }
 
 /// Compiles a kernel: to SPIR-V that is computed as written (`exact`), or as plain WGSL through wgpu. naga checks it
 /// on either way, so that messages are the same.
 pub fn pipeline(
     device: &Device,
-    layout: &wgpu::BindGroupLayout,
-    kernel: Kernel,
+    layouts: &[wgpu::BindGroupLayout],
+    kernel: &Kernel,
     source: &Source,
     constants: &Specialization,
     exact: Option<Rounding>,
@@ -81,7 +111,7 @@ pub fn pipeline(
                 constants.clear(); // resolved already
                 let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
                     entry_points: Cow::Owned(vec![wgpu::PassthroughShaderEntryPoint {
-                        name: Cow::Borrowed(kernel.entry_point()),
+                        name: Cow::Borrowed(kernel.entry_point),
                         workgroup_size: (WORKGROUP, WORKGROUP, 1),
                     }]),
                     spirv: Some(Cow::Owned(spirv)),
@@ -95,16 +125,17 @@ pub fn pipeline(
                 source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(&source.text)),
             }),
         };
+        let layouts: Vec<_> = layouts.iter().map(Some).collect();
         let pipeline_layout = device.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: None,
-            bind_group_layouts: &[Some(layout)],
+            bind_group_layouts: &layouts,
             immediate_size: 0,
         });
         device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: None,
             layout: Some(&pipeline_layout),
             module: &module,
-            entry_point: Some(kernel.entry_point()),
+            entry_point: Some(kernel.entry_point),
             compilation_options: wgpu::PipelineCompilationOptions {
                 constants: &constants,
                 zero_initialize_workgroup_memory: false,

@@ -2,21 +2,22 @@
 
 use std::ops::Range;
 
-use bytemuck::{Pod, bytes_of};
+use bytemuck::bytes_of;
 use glam::{UVec2, Vec4};
 use wgpu::BufferUsages;
 
 use super::bake::bake_if_small;
-use super::compose::{Kernel, Shaders};
+use super::compose::{ADAPTIVE, FIRST_HITS, Kernel, RENDER, Shaders};
 use super::device::Device;
-use super::pipeline::{WORKGROUP, bind_group_layout, pipeline};
+use super::pipeline::{WORKGROUP, bind_group, bind_group_layouts, pipeline};
 use super::rounding::Rounding;
 use super::rounds::samples_per_call;
+use super::scene::SceneBuffers;
 use super::texels::TexelParts;
 use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::job::Backend;
-use crate::pack::{BINS, Camera, FirstHit, Packed, Specialization, Work};
+use crate::pack::{Camera, FirstHit, Packed, Specialization, Work};
 
 /// How a scene is put on a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,10 +44,8 @@ pub struct Gpu {
     kernels: Kernels,
     render: wgpu::ComputePipeline,
     /// The kernel of first hits, once it was asked for.
-    aov: Option<wgpu::ComputePipeline>,
-    scene: [wgpu::Buffer; 9],
-    /// The texels that the scene's first buffer of them has no room for.
-    more_texels: Vec<wgpu::Buffer>,
+    first_hits: Option<wgpu::ComputePipeline>,
+    scene: SceneBuffers,
     work: wgpu::Buffer,
     /// The kernel's receipt of a call: as the kernel writes it, and as the host reads it.
     receipt: [wgpu::Buffer; 2],
@@ -65,12 +64,13 @@ struct Kernels {
     shaders: Shaders,
     baked: Option<String>,
     constants: Specialization,
-    layout: wgpu::BindGroupLayout,
+    /// Of the groups of bindings.
+    layouts: Vec<wgpu::BindGroupLayout>,
     exact: Option<Rounding>,
     texels: TexelParts,
 }
 
-/// A buffer with a record for each pixel of a region, bound for the kernel that writes it.
+/// A buffer with a record for each pixel of a region, and the group of bindings of the kernel that writes it.
 struct Target {
     region: Region,
     buffer: wgpu::Buffer,
@@ -119,27 +119,26 @@ impl Gpu {
             shaders: shaders.clone(),
             baked: options.baked.then(|| bake_if_small(packed)).flatten(),
             constants: packed.specialization,
-            layout: bind_group_layout(device, texels.count - 1),
+            layouts: bind_group_layouts(device, texels.count - 1),
             exact: options.exact,
             texels,
         };
         let render = match packed.adaptive {
-            true => kernels.compile(device, Kernel::Adaptive)?,
-            false => kernels.compile(device, Kernel::Render)?,
+            true => kernels.compile(device, &ADAPTIVE)?,
+            false => kernels.compile(device, &RENDER)?,
         };
-        let (scene, more_texels) = upload(device, packed, texels)?;
+        let scene = SceneBuffers::upload(device, packed, texels, &kernels.layouts)?;
         let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         let written = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let receipt = [written, BufferUsages::COPY_DST | BufferUsages::MAP_READ]
             .map(|usage| device.buffer(size_of::<[u32; 2]>() as u64, usage));
         let mut gpu = Gpu {
-            samples_per_call: samples_per_call(&kernels.constants, kernels.baked.is_some()),
+            samples_per_call: samples_per_call(packed, kernels.baked.is_some()),
             device: device.clone(),
             kernels,
             render,
-            aov: None,
+            first_hits: None,
             scene,
-            more_texels,
             work,
             receipt,
             before: None,
@@ -172,7 +171,8 @@ impl Gpu {
             && self.kernels.texels == texels;
         if same_kernel {
             self.film = None;
-            (self.scene, self.more_texels) = upload(&self.device, packed, texels)?;
+            self.scene = SceneBuffers::upload(&self.device, packed, texels, &self.kernels.layouts)?;
+            self.samples_per_call = samples_per_call(packed, false);
             self.picture = Region::whole(packed.camera.width, packed.camera.height);
         }
         Ok(same_kernel)
@@ -181,52 +181,16 @@ impl Gpu {
     /// Changes the camera. Whoever does so starts a new film.
     pub fn set_camera(&mut self, camera: &Camera) -> Result<(), RenderError> {
         self.picture = Region::whole(camera.width, camera.height);
-        self.device
-            .checked(|| self.device.queue.write_buffer(&self.scene[0], 0, bytes_of(camera)))
+        self.device.checked(|| self.scene.set_camera(&self.device, camera))
     }
 
-    fn target<T: Pod>(&self, region: Region) -> Result<Target, RenderError> {
-        let size = region.pixels() * size_of::<T>() as u64;
+    fn target(&self, kernel: &Kernel, region: Region) -> Result<Target, RenderError> {
+        let size = region.pixels() * kernel.record as u64;
         self.device.checked(|| {
             let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
             let buffer = self.device.buffer(size, usage);
-            let [
-                camera,
-                environment,
-                primitives,
-                bounds,
-                materials,
-                lights,
-                textures,
-                texels,
-                filter_table,
-            ] = &self.scene;
-            let buffers = [
-                &self.work,
-                camera,
-                environment,
-                primitives,
-                bounds,
-                materials,
-                lights,
-                textures,
-                texels,
-                filter_table,
-                &buffer,
-                &self.receipt[0],
-            ];
-            let entries: Vec<wgpu::BindGroupEntry> = (0..)
-                .zip(buffers.into_iter().chain(&self.more_texels))
-                .map(|(binding, buffer)| wgpu::BindGroupEntry {
-                    binding,
-                    resource: buffer.as_entire_binding(),
-                })
-                .collect();
-            let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: None,
-                layout: &self.kernels.layout,
-                entries: &entries,
-            });
+            let buffers = [&self.work, &buffer, &self.receipt[0]];
+            let group = bind_group(&self.device, &self.kernels.layouts[0], &buffers);
             Target { region, buffer, group }
         })
     }
@@ -259,7 +223,10 @@ impl Gpu {
             encoder.clear_buffer(written, 0, None);
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &target.group, &[]);
+            let groups_of_bindings = [&target.group].into_iter().chain(&self.scene.groups);
+            for (i, group) in (0..).zip(groups_of_bindings) {
+                pass.set_bind_group(i, group, &[]);
+            }
             pass.dispatch_workgroups(groups[0], groups[1], 1);
             drop(pass);
             encoder.copy_buffer_to_buffer(written, 0, read, 0, read.size());
@@ -322,8 +289,8 @@ impl Backend for Gpu {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
         self.film = None; // before the next one: the two together may not fit
         self.film = Some(match self.adaptive {
-            true => self.target::<[Vec4; 3]>(region)?,
-            false => self.target::<Vec4>(region)?,
+            true => self.target(&ADAPTIVE, region)?,
+            false => self.target(&RENDER, region)?,
         });
         Ok(())
     }
@@ -354,13 +321,13 @@ impl Backend for Gpu {
     }
 
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
-        let pipeline = match self.aov.take() {
+        let pipeline = match self.first_hits.take() {
             Some(pipeline) => pipeline,
-            None => self.kernels.compile(&self.device, Kernel::Aov)?,
+            None => self.kernels.compile(&self.device, &FIRST_HITS)?,
         };
-        let target = self.target::<FirstHit>(region)?;
+        let target = self.target(&FIRST_HITS, region)?;
         let whole = self.dispatch(&pipeline, &target, region, 0..0, |_| ())?;
-        self.aov = Some(pipeline);
+        self.first_hits = Some(pipeline);
         match whole {
             true => self.device.download(&target.buffer),
             false => Err(self.cut_short()),
@@ -382,9 +349,9 @@ impl Backend for Gpu {
         let info = &self.device.info;
         let bytes = info.largest_binding.min(info.largest_buffer);
         if !self.adaptive {
-            return bytes / size_of::<FirstHit>() as u64;
+            return bytes / FIRST_HITS.record as u64;
         }
-        let most = bytes / size_of::<[Vec4; 3]>() as u64;
+        let most = bytes / ADAPTIVE.record as u64;
         let beside = 2 * (u64::from(self.picture.width()) + u64::from(self.picture.height())) + 4;
         match self.picture.pixels() <= most {
             true => most,
@@ -393,38 +360,10 @@ impl Backend for Gpu {
     }
 }
 
-/// The buffers of a scene, in the order of their bindings, and the further ones of its texels.
-fn upload(
-    device: &Device,
-    packed: &Packed,
-    texels: TexelParts,
-) -> Result<([wgpu::Buffer; 9], Vec<wgpu::Buffer>), RenderError> {
-    let mut texels = texels.split(&packed.texels);
-    let first_texels = texels.next().unwrap_or_default();
-    let more = texels.map(|part| device.checked(|| device.upload(BufferUsages::STORAGE, part)));
-    let more: Vec<wgpu::Buffer> = more.collect::<Result<_, _>>()?;
-    let mut filter_table = packed.filter_table.clone();
-    filter_table.resize(BINS as usize, Vec4::ZERO);
-    let buffers = device.checked(|| {
-        [
-            device.upload(BufferUsages::UNIFORM | BufferUsages::COPY_DST, &[packed.camera]),
-            device.upload(BufferUsages::UNIFORM, &[packed.environment]),
-            device.upload(BufferUsages::STORAGE, &packed.primitives),
-            device.upload(BufferUsages::STORAGE, &packed.bounds),
-            device.upload(BufferUsages::STORAGE, &packed.materials),
-            device.upload(BufferUsages::STORAGE, &packed.lights),
-            device.upload(BufferUsages::STORAGE, &packed.textures),
-            device.upload(BufferUsages::STORAGE, first_texels),
-            device.upload(BufferUsages::UNIFORM, &filter_table),
-        ]
-    })?;
-    Ok((buffers, more))
-}
-
 impl Kernels {
-    fn compile(&self, device: &Device, kernel: Kernel) -> Result<wgpu::ComputePipeline, RenderError> {
+    fn compile(&self, device: &Device, kernel: &Kernel) -> Result<wgpu::ComputePipeline, RenderError> {
         let texels = self.texels.wgsl();
         let source = (self.shaders).compose_with_texels(kernel, self.baked.as_deref(), texels.as_deref());
-        pipeline(device, &self.layout, kernel, &source, &self.constants, self.exact)
+        pipeline(device, &self.layouts, kernel, &source, &self.constants, self.exact)
     }
 }

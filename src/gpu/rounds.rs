@@ -1,6 +1,6 @@
 //! How many samples of a pixel one call may have, so that software Vulkan runs it whole.
 
-use crate::pack::{BLOCK, LEAVES, Specialization};
+use crate::pack::{BLOCK, LEAVES, Packed};
 
 /// After so many rounds of all its loops together, Mesa 22.3's software Vulkan ends every loop of an invocation. Rounds
 /// are counted for all lanes of a vector: a round that any of them needs counts.
@@ -11,76 +11,68 @@ const CANDIDATES: f64 = 4.0;
 /// The most samples of a call that are likely to run whole. It is an estimate: few primitives may hide a light, or all.
 /// A call that is cut short nevertheless is repeated with fewer samples, so that too much costs time alone; too little
 /// costs what a call costs.
-pub fn samples_per_call(s: &Specialization, baked: bool) -> u32 {
-    let samples = MOST_ROUNDS / rounds_of_sample(s, baked);
+pub fn samples_per_call(packed: &Packed, baked: bool) -> u32 {
+    let samples = MOST_ROUNDS / rounds_of_sample(packed, baked);
     (samples as u32).max(1)
 }
 
 /// Rounds of the loops of one sample, about; at least 1.
-fn rounds_of_sample(s: &Specialization, baked: bool) -> f64 {
-    let blocking = [
-        s.blocking_rectangles,
-        s.blocking_triangles,
-        s.blocking_ellipsoids,
-        s.blocking_planes,
-    ];
-    let all = sum([s.rectangles, s.triangles, s.ellipsoids, s.planes]);
-    let lists = sum(blocking.map(|count| count.div_ceil(BLOCK)));
+fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
+    let s = &packed.specialization;
+    let all = packed.primitives.len() as f64;
+    let casting = || packed.shadow_casters().map(|(_, range)| range.len());
+    let lists = casting().map(|count| count.div_ceil(BLOCK as usize)).sum::<usize>() as f64;
+    let casters = casting().sum::<usize>() as f64;
     // A scene in buffers is read by loops, one of constants by statements.
-    let (of_hit, of_lists) = if baked {
-        (0.0, lists)
-    } else {
-        (all, lists + sum(blocking))
-    };
+    let (of_hit, of_lists) = if baked { (0.0, lists) } else { (all, lists + casters) };
     let block = |samples: u32| {
-        let shadows = CANDIDATES.min(sum(blocking)) * (1.0 + f64::from(samples));
+        let shadows = CANDIDATES.min(casters) * (1.0 + f64::from(samples));
         let lobes = f64::from(samples) * (2.0 + f64::from(s.exponent_bits));
         of_lists + shadows + lobes
     };
     let (blocks, rest) = (s.light_samples / BLOCK, s.light_samples % BLOCK);
     let area_light = f64::from(blocks) * block(BLOCK) + if rest > 0 { block(rest) } else { 0.0 };
-    let shading = f64::from(s.area_lights) * (1.0 + area_light) + f64::from(s.delta_lights) * (1.0 + block(1));
+    let (area_lights, lights) = (f64::from(packed.counts.lights.x), f64::from(packed.counts.lights.y));
+    let shading = area_lights * (1.0 + area_light) + (lights - area_lights) * (1.0 + block(1));
     let paths = if s.bounces == 0 { 1 } else { LEAVES };
     1.0 + f64::from(paths) * (shading + (f64::from(s.bounces) + 1.0) * (1.0 + of_hit))
-}
-
-fn sum(counts: [u32; 4]) -> f64 {
-    counts.map(f64::from).iter().sum()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pack::{Specialization, pack};
+    use crate::scene::{Overrides, Scene};
+
+    /// A scene of so many spheres and point lights.
+    fn scene(spheres: usize, lights: usize) -> Packed {
+        let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
+        let light = "[[lights]]\ntype = 'point'\nposition = [0, 0, 3]\ncolor = [1, 1, 1]\n";
+        let area = "[[lights]]\ntype = 'rectangle'\ncenter = [0, 0, 3]\nsize = [1, 1]\nnormal = [0, 0, -1]\n\
+                    tangent = [1, 0, 0]\ncolor = [1, 1, 1]\n";
+        let start = "image = { width = 4, height = 4 }\ncamera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }\n\
+                     materials.m = { type = 'phong', color = [1, 1, 1] }\n";
+        let text = format!("{start}{}{}{area}", sphere.repeat(spheres), light.repeat(lights));
+        pack(&Scene::parse(&text, "s", &Overrides::default()).unwrap())
+    }
 
     #[test]
     fn longer_samples_come_in_shorter_calls() {
-        let small = Specialization {
-            rectangles: 6,
-            blocking_triangles: 4,
-            triangles: 4,
-            area_lights: 1,
-            light_samples: 16,
-            ..Specialization::default()
-        };
-        let calls = |change: fn(&mut Specialization)| {
-            let mut changed = small;
-            change(&mut changed);
-            samples_per_call(&changed, false)
-        };
-        let plain = calls(|_| ());
+        let plain = samples_per_call(&scene(6, 0), false);
         assert!((100..65_535).contains(&plain), "{plain}");
-        assert!(samples_per_call(&small, true) > plain);
-        for change in [
-            (|s| s.light_samples = 256) as fn(&mut Specialization),
-            |s| s.ellipsoids = 100,
-            |s| s.delta_lights = 10,
-            |s| s.bounces = 8,
-        ] {
-            assert!(calls(change) < plain);
-        }
+        assert!(samples_per_call(&scene(6, 0), true) > plain);
+        assert!(samples_per_call(&scene(100, 0), false) < plain);
+        assert!(samples_per_call(&scene(6, 10), false) < plain);
+        let changed = |change: fn(&mut Specialization)| {
+            let mut packed = scene(6, 0);
+            change(&mut packed.specialization);
+            samples_per_call(&packed, false)
+        };
+        assert!(changed(|s| s.light_samples = 256) < plain);
+        assert!(changed(|s| s.bounces = 8) < plain);
         // the ends of the ranges
-        assert_eq!(calls(|s| s.light_samples = 65_536), 1);
-        assert_eq!(calls(|s| s.triangles = u32::MAX), 1);
-        assert!(samples_per_call(&Specialization::default(), true) > 1000);
+        assert_eq!(changed(|s| s.light_samples = 65_536), 1);
+        assert_eq!(samples_per_call(&scene(70_000, 0), false), 1);
+        assert!(samples_per_call(&scene(0, 0), true) > 500);
     }
 }

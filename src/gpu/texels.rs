@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::device::Info;
-use super::pipeline::{BINDINGS, STORAGE_BUFFERS};
+use super::pipeline::{GROUPS, SCENE, STORAGE_BUFFERS};
 use crate::error::RenderError;
 use crate::pack::Packed;
 
@@ -26,9 +26,10 @@ impl TexelParts {
         let sizes = [
             ("shapes", size_of_val(packed.primitives.as_slice())),
             ("shapes' bounds", size_of_val(packed.bounds.as_slice())),
-            ("materials", size_of_val(packed.materials.as_slice())),
-            ("lights", size_of_val(packed.lights.as_slice())),
-            ("texture records", size_of_val(packed.textures.as_slice())),
+            ("materials, lights and textures", {
+                let (materials, lights) = (packed.materials.as_slice(), packed.lights.as_slice());
+                size_of_val(materials) + size_of_val(lights) + size_of_val(packed.textures.as_slice())
+            }),
         ];
         if let Some((name, size)) = sizes.into_iter().find(|(_, size)| *size as u64 > largest) {
             let (size, largest) = (mebibytes(size as u64), mebibytes(largest));
@@ -64,10 +65,10 @@ impl TexelParts {
         }
         let mut out = String::new();
         for i in 1..self.count {
-            let binding = BINDINGS.len() + i - 1;
+            let binding = GROUPS[SCENE].len() + i - 1;
             let _ = writeln!(
                 out,
-                "@group(0) @binding({binding}) var<storage, read> texels_{i}: array<u32>;"
+                "@group({SCENE}) @binding({binding}) var<storage, read> texels_{i}: array<u32>;"
             );
         }
         let (shift, mask) = (self.shift, (1u32 << self.shift) - 1);

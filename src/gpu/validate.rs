@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::bake::bake_if_small;
 use super::compile::{Checked, check_at};
-use super::compose::{Kernel, Shaders, Source};
+use super::compose::{KERNELS, Kernel, Shaders, Source};
 use super::functions::functions;
 use super::interface;
 use super::rounding::Rounding;
@@ -33,9 +33,9 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result
     let baked = (forms == Forms::All).then(|| bake_if_small(packed)).flatten();
     let mut scenes = vec![None];
     scenes.extend(baked.as_deref().map(Some));
-    let all: Vec<(Kernel, Option<&str>)> = scenes
+    let all: Vec<(&Kernel, Option<&str>)> = scenes
         .into_iter()
-        .flat_map(|scene| Kernel::ALL.map(|kernel| (kernel, scene)))
+        .flat_map(|scene| KERNELS.map(|kernel| (kernel, scene)))
         .collect();
     let found: Vec<Vec<ShaderError>> = all
         .into_par_iter()
@@ -54,7 +54,7 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result
     }
 }
 
-fn mistakes(kernel: Kernel, source: Source, packed: &Packed) -> Vec<ShaderError> {
+fn mistakes(kernel: &Kernel, source: Source, packed: &Packed) -> Vec<ShaderError> {
     let (mut errors, rest) = mistakes_of_functions(source);
     let Some((source, checked)) = rest else { return errors };
     match interface::mistakes(kernel, &source, &checked, errors.is_empty()) {

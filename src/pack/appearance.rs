@@ -7,8 +7,8 @@ use glam::{DVec3, UVec4, Vec3};
 
 use super::pyramid::pyramid;
 use super::{
-    CHECKER, CLAMP, EWA, FLOAT, FOR_AMBIENT, FOR_DIFFUSE, FOR_NORMAL, FOR_SPECULAR, GLASS, LINEAR8, LINES, MIRROR,
-    MIRRORED, Material, NEAREST, PHONG, REPEAT, SRGB8, TRILINEAR, Texture,
+    CHECKER, CLAMP, EWA, FLOAT, FOR_AMBIENT, FOR_DIFFUSE, FOR_NORMAL, FOR_SPECULAR, FOR_TINT, GLASS, LINEAR8, LINES,
+    MIRROR, MIRRORED, Material, NEAREST, PHONG, REPEAT, SRGB8, TRILINEAR, Texture,
 };
 use crate::pack::BILINEAR;
 use crate::scene::{self, Color, Encoding, Filter, Image, Scene, Texels, TexturePattern, Wrap};
@@ -104,17 +104,17 @@ impl Appearances {
                 shininess: *shininess as f32,
                 specular: color(specular, FOR_SPECULAR),
                 exponent: *shininess as u32,
-                lookups: UVec4::ZERO,
+                ..bytemuck::Zeroable::zeroed()
             },
             scene::Material::Mirror { tint, .. } => Material {
                 kind: MIRROR,
-                specular: color(tint, FOR_SPECULAR),
+                tint: color(tint, FOR_TINT),
                 ..bytemuck::Zeroable::zeroed()
             },
             scene::Material::Glass { ior, tint, .. } => Material {
                 kind: GLASS,
-                shininess: *ior as f32,
-                specular: color(tint, FOR_SPECULAR),
+                tint: color(tint, FOR_TINT),
+                ior: *ior as f32,
                 ..bytemuck::Zeroable::zeroed()
             },
         };

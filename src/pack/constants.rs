@@ -1,99 +1,108 @@
-//! The constants of `shaders/constants.wgsl`.
+//! Constants of both sides.
 
 #[cfg(doc)]
 use super::{Camera, Material, Primitive, Texture};
 #[cfg(doc)]
 use crate::scene::Pattern;
 
-/// [`Camera::projection`] of a camera whose rays start at one point.
-pub const PERSPECTIVE: u32 = 0;
-/// [`Camera::projection`] of a camera whose rays are parallel.
-pub const ORTHOGRAPHIC: u32 = 1;
+use super::record::constants;
 
-/// [`Primitive::kind`]: |x| <= 1, |y| <= 1, z = 0 in local space.
-pub const RECTANGLE: u32 = 0;
-/// [`Primitive::kind`]: x >= 0, y >= 0, x + y <= 1, z = 0 in local space.
-pub const TRIANGLE: u32 = 1;
-/// [`Primitive::kind`]: the unit sphere of local space.
-pub const ELLIPSOID: u32 = 2;
-/// [`Primitive::kind`]: z = 0 in local space.
-pub const PLANE: u32 = 3;
+constants! {
+    /// [`Camera::projection`] of a camera whose rays start at one point.
+    pub const PERSPECTIVE: u32 = 0;
+    /// [`Camera::projection`] of a camera whose rays are parallel.
+    pub const ORTHOGRAPHIC: u32 = 1;
 
-/// [`Material::kind`]: Phong's reflection model.
-pub const PHONG: u32 = 0;
-/// [`Material::kind`]: a light's surface, of one colour.
-pub const EMITTER: u32 = 1;
-/// [`Material::kind`]: a mirror.
-pub const MIRROR: u32 = 2;
-/// [`Material::kind`]: clear glass.
-pub const GLASS: u32 = 3;
+    /// [`Primitive::kind`]: |x| <= 1, |y| <= 1, z = 0 in local space.
+    pub const RECTANGLE: u32 = 0;
+    /// [`Primitive::kind`]: x >= 0, y >= 0, x + y <= 1, z = 0 in local space.
+    pub const TRIANGLE: u32 = 1;
+    /// [`Primitive::kind`]: the unit sphere of local space.
+    pub const ELLIPSOID: u32 = 2;
+    /// [`Primitive::kind`]: z = 0 in local space.
+    pub const PLANE: u32 = 3;
 
-/// Glass splits a path at the first so many bounces.
-pub const SPLITS: u32 = 2;
-/// A path so has at most so many ends.
-pub const LEAVES: u32 = 4;
+    /// How many kinds of primitives there are.
+    pub const KINDS: u32 = 4;
 
-/// [`Texture::kind`]: two colours that alternate.
-pub const CHECKER: u32 = 0;
-/// [`Texture::kind`]: lines.
-pub const LINES: u32 = 1;
-/// [`Texture::kind`]: an image, by its nearest texel.
-pub const NEAREST: u32 = 2;
-/// [`Texture::kind`]: an image, between its texels.
-pub const BILINEAR: u32 = 3;
-/// [`Texture::kind`]: an image, between its texels and levels.
-pub const TRILINEAR: u32 = 4;
-/// [`Texture::kind`]: an image, by the elliptical weighted average.
-pub const EWA: u32 = 5;
+    /// [`Material::kind`]: Phong's reflection model.
+    pub const PHONG: u32 = 0;
+    /// [`Material::kind`]: a light's surface, of one colour.
+    pub const EMITTER: u32 = 1;
+    /// [`Material::kind`]: a mirror.
+    pub const MIRROR: u32 = 2;
+    /// [`Material::kind`]: clear glass.
+    pub const GLASS: u32 = 3;
 
-/// [`Texture::format`]: 8 bits by the sRGB curve.
-pub const SRGB8: u32 = 0;
-/// [`Texture::format`]: 8 bits.
-pub const LINEAR8: u32 = 1;
-/// [`Texture::format`]: 32-bit floats.
-pub const FLOAT: u32 = 2;
+    /// Glass splits a path at the first so many bounces.
+    pub const SPLITS: u32 = 2;
+    /// A path so has at most so many ends.
+    pub const LEAVES: u32 = 4;
 
-/// [`Texture::wrap`]: the image again and again.
-pub const REPEAT: u32 = 0;
-/// [`Texture::wrap`]: the colour of the nearest edge.
-pub const CLAMP: u32 = 1;
-/// [`Texture::wrap`]: the image again and again, every other one mirrored.
-pub const MIRRORED: u32 = 2;
+    /// [`Texture::kind`]: two colours that alternate.
+    pub const CHECKER: u32 = 0;
+    /// [`Texture::kind`]: lines.
+    pub const LINES: u32 = 1;
+    /// [`Texture::kind`]: an image, by its nearest texel.
+    pub const NEAREST: u32 = 2;
+    /// [`Texture::kind`]: an image, between its texels.
+    pub const BILINEAR: u32 = 3;
+    /// [`Texture::kind`]: an image, between its texels and levels.
+    pub const TRILINEAR: u32 = 4;
+    /// [`Texture::kind`]: an image, by the elliptical weighted average.
+    pub const EWA: u32 = 5;
 
-/// The bits of [`Material::lookups`] that are the texture's number.
-pub const TEXTURE_NUMBER: u32 = 0xff_ffff;
-/// In [`Material::lookups`]: gives [`Material::ambient`].
-pub const FOR_AMBIENT: u32 = 0x100_0000;
-/// In [`Material::lookups`]: gives [`Material::diffuse`].
-pub const FOR_DIFFUSE: u32 = 0x200_0000;
-/// In [`Material::lookups`]: gives [`Material::specular`].
-pub const FOR_SPECULAR: u32 = 0x400_0000;
-/// In [`Material::lookups`]: gives the normal.
-pub const FOR_NORMAL: u32 = 0x800_0000;
+    /// [`Texture::format`]: 8 bits by the sRGB curve.
+    pub const SRGB8: u32 = 0;
+    /// [`Texture::format`]: 8 bits.
+    pub const LINEAR8: u32 = 1;
+    /// [`Texture::format`]: 32-bit floats.
+    pub const FLOAT: u32 = 2;
 
-/// [`Pattern::Grid`].
-pub const GRID: u32 = 0;
-/// [`Pattern::Random`].
-pub const RANDOM: u32 = 1;
-/// [`Pattern::RotatedGrid`].
-pub const ROTATED_GRID: u32 = 2;
-/// [`Pattern::Jittered`].
-pub const JITTERED: u32 = 3;
-/// [`Pattern::Halton`].
-pub const HALTON: u32 = 4;
-/// [`Pattern::Sobol`].
-pub const SOBOL: u32 = 5;
+    /// [`Texture::wrap`]: the image again and again.
+    pub const REPEAT: u32 = 0;
+    /// [`Texture::wrap`]: the colour of the nearest edge.
+    pub const CLAMP: u32 = 1;
+    /// [`Texture::wrap`]: the image again and again, every other one mirrored.
+    pub const MIRRORED: u32 = 2;
 
-/// Bins between the centre and the radius of a reconstruction filter.
-pub const BINS: u32 = 128;
+    /// The bits of [`Material::lookups`] that are the texture's number.
+    pub const TEXTURE_NUMBER: u32 = 0xff_ffff;
+    /// In [`Material::lookups`]: gives [`Material::ambient`].
+    pub const FOR_AMBIENT: u32 = 0x100_0000;
+    /// In [`Material::lookups`]: gives [`Material::diffuse`].
+    pub const FOR_DIFFUSE: u32 = 0x200_0000;
+    /// In [`Material::lookups`]: gives [`Material::specular`].
+    pub const FOR_SPECULAR: u32 = 0x400_0000;
+    /// In [`Material::lookups`]: gives [`Material::tint`].
+    pub const FOR_TINT: u32 = 0x800_0000;
+    /// In [`Material::lookups`]: gives the normal.
+    pub const FOR_NORMAL: u32 = 0x1000_0000;
 
-/// No distance of a hit is larger.
-pub const FAR: f32 = f32::MAX;
-/// The number of a primitive that is none.
-pub const NOTHING: u32 = u32::MAX;
-/// Shadow rays are traced in blocks of so many, a bit of a word for each.
-pub const BLOCK: u32 = 32;
+    /// [`Pattern::Grid`].
+    pub const GRID: u32 = 0;
+    /// [`Pattern::Random`].
+    pub const RANDOM: u32 = 1;
+    /// [`Pattern::RotatedGrid`].
+    pub const ROTATED_GRID: u32 = 2;
+    /// [`Pattern::Jittered`].
+    pub const JITTERED: u32 = 3;
+    /// [`Pattern::Halton`].
+    pub const HALTON: u32 = 4;
+    /// [`Pattern::Sobol`].
+    pub const SOBOL: u32 = 5;
 
-/// How many samples an estimate must rest on to allow a pixel as many samples again as its first look has, under adaptive
-/// sampling.
-pub const EVIDENCE: f32 = 2.0;
+    /// Bins between the centre and the radius of a reconstruction filter.
+    pub const BINS: u32 = 128;
+
+    /// No distance of a hit is larger.
+    pub const FAR: f32 = f32::MAX;
+    /// The number of a primitive that is none.
+    pub const NOTHING: u32 = u32::MAX;
+    /// Shadow rays are traced in blocks of so many, a bit of a word for each.
+    pub const BLOCK: u32 = 32;
+
+    /// How many samples an estimate must rest on to allow a pixel as many samples again as its first look has, under adaptive
+    /// sampling.
+    pub const EVIDENCE: f32 = 2.0;
+}

@@ -1,185 +1,188 @@
-//! The records of `shaders/layout.wgsl`: rows of 16 bytes, a `vec3f` followed by a scalar.
+//! The records that the host uploads, on both sides: rows of 16 bytes, a `vec3f` followed by a scalar.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{UVec2, UVec4, Vec2, Vec3};
 
-#[cfg(doc)]
 use super::constants::*;
+use super::record::{Field, Record, records, words_of_row};
 
-/// A camera; rays start at `position` and pass through the image plane, which is one unit ahead (perspective) or at it.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct Camera {
-    /// The start of perspective rays, the middle of the orthographic image plane.
-    pub position: Vec3,
-    /// [`PERSPECTIVE`] or [`ORTHOGRAPHIC`].
-    pub projection: u32,
-    /// Half the image plane's width.
-    pub right: Vec3,
-    /// Width of the whole picture in pixels.
-    pub width: u32,
-    /// Half the image plane's height.
-    pub up: Vec3,
-    /// Height of the whole picture in pixels.
-    pub height: u32,
-    /// Unit vector into the scene.
-    pub forward: Vec3,
-    /// Seed of all random patterns.
-    pub seed: u32,
-}
+records! {
+    /// A camera; rays start at `position` and pass through the image plane, which is one unit ahead (perspective) or at it.
+    pub struct Camera {
+        /// The start of perspective rays, the middle of the orthographic image plane.
+        pub position: Vec3,
+        /// [`PERSPECTIVE`] or [`ORTHOGRAPHIC`].
+        pub projection: u32,
+        /// Half the image plane's width.
+        pub right: Vec3,
+        /// Width of the whole picture in pixels.
+        pub width: u32,
+        /// Half the image plane's height.
+        pub up: Vec3,
+        /// Height of the whole picture in pixels.
+        pub height: u32,
+        /// Unit vector into the scene.
+        pub forward: Vec3,
+        /// Seed of all random patterns.
+        pub seed: u32,
+    }
 
-/// What belongs to the scene as a whole.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct Environment {
-    /// Ambient light.
-    pub ambient: Vec3,
-    /// How far above a surface rays start, relative to the largest coordinate.
-    pub shadow_epsilon: f32,
-    /// Radiance of rays that leave the scene.
-    pub background: Vec3,
-    /// 1 / (samples of an area light).
-    pub light_weight: f32,
-}
+    /// What belongs to the scene as a whole.
+    pub struct Environment {
+        /// Ambient light.
+        pub ambient: Vec3,
+        /// How far above a surface rays start, relative to the largest coordinate.
+        pub shadow_epsilon: f32,
+        /// Radiance of rays that leave the scene.
+        pub background: Vec3,
+        /// 1 / (samples of an area light).
+        pub light_weight: f32,
+    }
 
-/// Any primitive: local = (x, y, z) (p - anchor) - middle, by the rows of the inverse linear map.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct Primitive {
-    /// A point of an ellipsoid near the origin; of any other primitive the origin of local space.
-    pub anchor: Vec3,
-    /// Index of its material.
-    pub material: u32,
-    /// First row.
-    pub x: Vec3,
-    /// The number of its shape in the scene file; lights follow the shapes.
-    pub shape: u32,
-    /// Second row.
-    pub y: Vec3,
-    /// [`RECTANGLE`], [`TRIANGLE`], [`ELLIPSOID`] or [`PLANE`].
-    pub kind: u32,
-    /// Third row.
-    pub z: Vec3,
-    /// Determinant of the three rows.
-    pub determinant: f32,
-    /// From the anchor to an ellipsoid's centre, by the three rows; else 0.
-    pub middle: Vec3,
-    /// |middle|² - 1, of an ellipsoid.
-    pub level: f32,
-}
+    /// Any primitive: local = (x, y, z) (p - anchor) - middle, by the rows of the inverse linear map.
+    pub struct Primitive {
+        /// A point of an ellipsoid near the origin; of any other primitive the origin of local space.
+        pub anchor: Vec3,
+        /// Index of its material.
+        pub material: u32,
+        /// First row.
+        pub x: Vec3,
+        /// The number of its shape in the scene file; lights follow the shapes.
+        pub shape: u32,
+        /// Second row.
+        pub y: Vec3,
+        /// [`RECTANGLE`], [`TRIANGLE`], [`ELLIPSOID`] or [`PLANE`].
+        pub kind: u32,
+        /// Third row.
+        pub z: Vec3,
+        /// Determinant of the three rows.
+        pub determinant: f32,
+        /// From the anchor to an ellipsoid's centre, by the three rows; else 0.
+        pub middle: Vec3,
+        /// |middle|² - 1, of an ellipsoid.
+        pub level: f32,
+    }
 
-/// A sphere around a primitive that can cast a shadow.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct Sphere {
-    /// The middle.
-    pub center: Vec3,
-    /// Infinite for a plane.
-    pub radius: f32,
-}
+    /// A sphere around a primitive that can cast a shadow.
+    pub struct Sphere {
+        /// The middle.
+        pub center: Vec3,
+        /// Infinite for a plane.
+        pub radius: f32,
+    }
 
-/// A surface's appearance.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct Material {
-    /// Factor of the ambient light; the colour of an emitter.
-    pub ambient: Vec3,
-    /// [`PHONG`], [`EMITTER`], [`MIRROR`] or [`GLASS`].
-    pub kind: u32,
-    /// Factor of the diffuse term.
-    pub diffuse: Vec3,
-    /// Exponent of the specular term; the index of refraction of glass.
-    pub shininess: f32,
-    /// Factor of the specular term; of what a mirror reflects; of what passes the surface of glass.
-    pub specular: Vec3,
-    /// The exponent, where it is a whole number.
-    pub exponent: u32,
-    /// Lookups in textures: a texture's number and the bits of what it is for, 0 for none.
-    pub lookups: UVec4,
-}
+    /// A surface's appearance: what its kind needs, and 0 elsewhere.
+    pub struct Material {
+        /// [`PHONG`]: factor of the ambient light.
+        pub ambient: Vec3,
+        /// [`PHONG`], [`EMITTER`], [`MIRROR`] or [`GLASS`].
+        pub kind: u32,
+        /// [`PHONG`]: factor of the diffuse term.
+        pub diffuse: Vec3,
+        /// [`PHONG`]: exponent of the specular term.
+        pub shininess: f32,
+        /// [`PHONG`]: factor of the specular term.
+        pub specular: Vec3,
+        /// [`PHONG`]: the exponent, where it is a whole number.
+        pub exponent: u32,
+        /// [`MIRROR`]: factor of the reflected light. [`GLASS`]: of the light that passes the surface.
+        pub tint: Vec3,
+        /// [`GLASS`]: index of refraction of what is behind the surface, relative to what is before it.
+        pub ior: f32,
+        /// [`EMITTER`]: the light's colour.
+        pub emission: Vec3,
+        /// [`EMITTER`]: which of the lights it is.
+        pub light: u32,
+        /// Lookups in textures: a texture's number and the bits of what it is for, 0 for none.
+        pub lookups: UVec4,
+    }
 
-/// A texture: first + (second - first) x, where x is what the pattern or the image gives.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct Texture {
-    /// The colour where x is 0.
-    pub first: Vec3,
-    /// [`CHECKER`], [`LINES`], [`NEAREST`], [`BILINEAR`], [`TRILINEAR`] or [`EWA`].
-    pub kind: u32,
-    /// The colour where x is 1.
-    pub second: Vec3,
-    /// The width of [`LINES`]; for [`EWA`] the largest ratio of an ellipse's axes.
-    pub parameter: f32,
-    /// First row of the map from a surface's (u, v, 1) to the texture's (u, v).
-    pub u: Vec3,
-    /// [`SRGB8`], [`LINEAR8`] or [`FLOAT`].
-    pub format: u32,
-    /// Second row of the map.
-    pub v: Vec3,
-    /// [`REPEAT`], [`CLAMP`] or [`MIRRORED`].
-    pub wrap: u32,
-    /// Where, in the scene's texels, the table of its levels' places starts.
-    pub texels: u32,
-    /// Width of its finest level in texels.
-    pub width: u32,
-    /// Height of its finest level in texels.
-    pub height: u32,
-    /// How many levels it has.
-    pub levels: u32,
-}
+    /// A texture: first + (second - first) x, where x is what the pattern or the image gives.
+    pub struct Texture {
+        /// The colour where x is 0.
+        pub first: Vec3,
+        /// [`CHECKER`], [`LINES`], [`NEAREST`], [`BILINEAR`], [`TRILINEAR`] or [`EWA`].
+        pub kind: u32,
+        /// The colour where x is 1.
+        pub second: Vec3,
+        /// The width of [`LINES`]; for [`EWA`] the largest ratio of an ellipse's axes.
+        pub parameter: f32,
+        /// First row of the map from a surface's (u, v, 1) to the texture's (u, v).
+        pub u: Vec3,
+        /// [`SRGB8`], [`LINEAR8`] or [`FLOAT`].
+        pub format: u32,
+        /// Second row of the map.
+        pub v: Vec3,
+        /// [`REPEAT`], [`CLAMP`] or [`MIRRORED`].
+        pub wrap: u32,
+        /// Where, in the scene's texels, the table of its levels' places starts.
+        pub texels: u32,
+        /// Width of its finest level in texels.
+        pub width: u32,
+        /// Height of its finest level in texels.
+        pub height: u32,
+        /// How many levels it has.
+        pub levels: u32,
+    }
 
-/// A light: the points center + a u + b v for a, b in -1..=1.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct Light {
-    /// The middle; the direction to a directional light.
-    pub center: Vec3,
-    /// Where shadow rays end, as a multiple of the way to the light's sample.
-    pub reach: f32,
-    /// Half the first edge.
-    pub u: Vec3,
-    /// 1, or 0 if the center is a direction.
-    pub finite: f32,
-    /// Half the second edge.
-    pub v: Vec3,
-    /// Its area.
-    pub area: f32,
-    /// Its colour.
-    pub color: Vec3,
-    /// Its number in the scene file.
-    pub number: u32,
-}
+    /// A light: the points center + a u + b v for a, b in -1..=1.
+    pub struct Light {
+        /// The middle; the direction to a directional light.
+        pub center: Vec3,
+        /// Where shadow rays end, as a multiple of the way to the light's sample.
+        pub reach: f32,
+        /// Half the first edge.
+        pub u: Vec3,
+        /// 1, or 0 if the center is a direction.
+        pub finite: f32,
+        /// Half the second edge.
+        pub v: Vec3,
+        /// The primitive that shines, [`NOTHING`] if there is none.
+        pub primitive: u32,
+        /// Its colour.
+        pub color: Vec3,
+        /// Its number in the scene file.
+        pub number: u32,
+    }
 
-/// What the ray through a pixel's centre meets first; depth 0 and shape [`NOTHING`] where that is nothing.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct FirstHit {
-    /// The outward normal, unit length.
-    pub normal: Vec3,
-    /// Distance along the ray.
-    pub depth: f32,
-    /// Texture coordinates.
-    pub uv: Vec2,
-    /// The number of the shape in the scene file; lights follow the shapes.
-    pub shape: u32,
-    /// Index of the material.
-    pub material: u32,
-}
+    /// How many records a scene has, and where they are; read where the scene is in buffers.
+    pub struct Counts {
+        /// The primitives of each kind, which lie together: x is the first, y one past the last that can cast a shadow, z
+        /// one past the last.
+        pub primitives: [UVec4; KINDS as usize],
+        /// The lights: x of those with an area, which come first, y of all.
+        pub lights: UVec2,
+        /// The rows where the tables of lights, x, and of textures, y, start; that of materials starts at 0.
+        pub tables: UVec2,
+    }
 
-/// One dispatch's share of the work: a rectangle of pixels and a range of their samples.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-pub struct Work {
-    /// Its first pixel, in the picture.
-    pub origin: UVec2,
-    /// Its size in pixels.
-    pub size: UVec2,
-    /// The film's first pixel, in the picture.
-    pub film_origin: UVec2,
-    /// The film's size in pixels.
-    pub film_size: UVec2,
-    /// The first sample, and one past the last.
-    pub samples: UVec2,
-    /// The range of the loop that proves a pixel whole (`shaders/receipt.wgsl`).
-    pub proof: UVec2,
+    /// What the ray through a pixel's centre meets first; depth 0 and shape [`NOTHING`] where that is nothing.
+    pub struct FirstHit {
+        /// The outward normal, unit length.
+        pub normal: Vec3,
+        /// Distance along the ray.
+        pub depth: f32,
+        /// Texture coordinates.
+        pub uv: Vec2,
+        /// The number of the shape in the scene file; lights follow the shapes.
+        pub shape: u32,
+        /// Index of the material.
+        pub material: u32,
+    }
+
+    /// One dispatch's share of the work: a rectangle of pixels and a range of their samples.
+    pub struct Work {
+        /// Its first pixel, in the picture.
+        pub origin: UVec2,
+        /// Its size in pixels.
+        pub size: UVec2,
+        /// The film's first pixel, in the picture.
+        pub film_origin: UVec2,
+        /// The film's size in pixels.
+        pub film_size: UVec2,
+        /// The first sample, and one past the last.
+        pub samples: UVec2,
+        /// The range of the loop that proves a pixel whole (`shaders/receipt.wgsl`).
+        pub proof: UVec2,
+    }
 }

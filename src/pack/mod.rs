@@ -9,14 +9,19 @@ pub mod filter;
 mod layout;
 mod origin;
 mod pyramid;
+mod record;
 mod specialization;
 
+use std::collections::BTreeMap;
+use std::ops::Range;
+
 use bytemuck::Zeroable as _;
-use glam::{DMat3, DVec3, Vec4};
+use glam::{DMat3, DVec3, UVec2, UVec4, Vec4};
 
 use self::appearance::Appearances;
 pub use self::constants::*;
 pub use self::layout::*;
+pub use self::record::{Field, Record};
 pub use self::specialization::Specialization;
 use crate::scene::{self, Geometry, Parallelogram, Pattern, PixelFilter, PixelFilterKind, Projection, Samples, Scene};
 
@@ -45,8 +50,10 @@ pub struct Packed {
     pub bounds: Vec<Sphere>,
     /// The materials of the scene, then one for each area light.
     pub materials: Vec<Material>,
-    /// The lights, rectangles first.
+    /// The lights, rectangles first; each knows the primitive that shines, whose material knows the light.
     pub lights: Vec<Light>,
+    /// How many there are of all these, and where.
+    pub counts: Counts,
     /// The textures that materials look up.
     pub textures: Vec<Texture>,
     /// Their images: tables of places, and texels.
@@ -64,8 +71,22 @@ pub struct Packed {
 impl Packed {
     /// Samples of light at every hit, over all lights; a point or directional light counts 1.
     pub fn light_samples(&self) -> u64 {
-        let s = &self.specialization;
-        u64::from(s.area_lights) * u64::from(s.light_samples) + u64::from(s.delta_lights)
+        let (area_lights, lights) = (self.counts.lights.x, self.counts.lights.y);
+        u64::from(area_lights) * u64::from(self.specialization.light_samples) + u64::from(lights - area_lights)
+    }
+
+    /// The kinds of primitives that there are, each with where its primitives are.
+    pub fn kinds(&self) -> impl Iterator<Item = (u32, Range<usize>)> {
+        let kinds = (0..).zip(self.counts.primitives);
+        let ranges = kinds.map(|(kind, range)| (kind, range.x as usize..range.z as usize));
+        ranges.filter(|(_, range)| !range.is_empty())
+    }
+
+    /// The kinds of primitives that can cast a shadow, each with where these are.
+    pub fn shadow_casters(&self) -> impl Iterator<Item = (u32, Range<usize>)> {
+        let kinds = (0..).zip(self.counts.primitives);
+        let ranges = kinds.map(|(kind, range)| (kind, range.x as usize..range.y as usize));
+        ranges.filter(|(_, range)| !range.is_empty())
     }
 }
 
@@ -84,24 +105,25 @@ pub fn pack(scene: &Scene) -> Packed {
             let shape = scene.shapes.len() as u32 + number;
             primitives.push(parallelogram(RECTANGLE, rectangle, materials.len() as u32, shape));
             materials.push(Material {
-                ambient: color.as_vec3(),
                 kind: EMITTER,
+                emission: color.as_vec3(),
                 ..Material::zeroed()
             });
         }
         lights.push(pack_light(light, number, scene.render.shadow_epsilon));
     }
-    lights.sort_by_key(|light| light.area == 0.0);
+    let has_area = |light: &Light| matches!(scene.lights[light.number as usize], scene::Light::Rectangle { .. });
+    lights.sort_by_key(|light| !has_area(light));
     let blocking = blocking::can_cast_shadow(scene, &primitives);
     let mut order: Vec<(Primitive, bool)> = primitives.into_iter().zip(blocking).collect();
     order.sort_by_key(|(primitive, blocking)| (primitive.kind, !blocking));
-    let count = |kind: u32, only_blocking: bool| {
-        order
-            .iter()
-            .filter(|(p, b)| p.kind == kind && (*b || !only_blocking))
-            .count() as u32
+    let area_lights = lights.iter().filter(|light| has_area(light)).count();
+    connect_lights(&mut lights[..area_lights], &mut materials, &order, scene.shapes.len());
+    let counts = counts(&order, area_lights, lights.len(), materials.len());
+    let kinds = |end: fn(UVec4) -> u32| {
+        let kinds = (0..).zip(counts.primitives);
+        kinds.fold(0, |bits, (kind, range)| bits | u32::from(end(range) > range.x) << kind)
     };
-    let area_lights = lights.iter().filter(|light| light.area > 0.0).count() as u32;
     let (pixels, light_samples) = (scene.render.pixel_samples, scene.render.light_samples);
     let adaptive = scene.render.adaptive;
     let filter_table = match is_pixel(scene.render.filter) {
@@ -109,16 +131,9 @@ pub fn pack(scene: &Scene) -> Packed {
         false => filter::table(scene.render.filter),
     };
     let specialization = Specialization {
-        rectangles: count(RECTANGLE, false),
-        blocking_rectangles: count(RECTANGLE, true),
-        triangles: count(TRIANGLE, false),
-        blocking_triangles: count(TRIANGLE, true),
-        ellipsoids: count(ELLIPSOID, false),
-        blocking_ellipsoids: count(ELLIPSOID, true),
-        planes: count(PLANE, false),
-        blocking_planes: count(PLANE, true),
-        area_lights,
-        delta_lights: lights.len() as u32 - area_lights,
+        primitives: kinds(|range| range.z),
+        shadow_casters: kinds(|range| range.y),
+        lights: u32::from(area_lights > 0) | u32::from(lights.len() > area_lights) << 1,
         pixel_pattern: pattern(pixels),
         pixel_side: side(pixels),
         pixel_samples: pixels.count,
@@ -157,12 +172,52 @@ pub fn pack(scene: &Scene) -> Packed {
         primitives,
         materials,
         lights,
+        counts,
         textures: appearances.textures,
         texels: appearances.texels,
         filter_table,
         pixel_samples: adaptive.map_or(pixels.count, |adaptive| adaptive.max_samples),
         adaptive: adaptive.is_some(),
         specialization,
+    }
+}
+
+/// How many primitives of each kind there are, of those that are sorted by kind and by whether they cast shadows; and how
+/// many rows the tables of records have.
+fn counts(order: &[(Primitive, bool)], area_lights: usize, lights: usize, materials: usize) -> Counts {
+    let mut first = 0;
+    let primitives = std::array::from_fn(|kind| {
+        let of_kind = order[first as usize..]
+            .iter()
+            .take_while(|(p, _)| p.kind == kind as u32);
+        let (all, casting) = of_kind.fold((0, 0), |(all, casting), (_, casts)| {
+            (all + 1, casting + u32::from(*casts))
+        });
+        let range = UVec4::new(first, first + casting, first + all, 0);
+        first += all;
+        range
+    });
+    let rows = |count: usize, size: usize| (count * size / size_of::<UVec4>()) as u32;
+    let of_materials = rows(materials, size_of::<Material>());
+    Counts {
+        primitives,
+        lights: UVec2::new(area_lights as u32, lights as u32),
+        tables: UVec2::new(of_materials, of_materials + rows(lights, size_of::<Light>())),
+    }
+}
+
+/// Tells the lights that have an area which primitives shine, and the materials of these which lights they are.
+fn connect_lights(lights: &mut [Light], materials: &mut [Material], order: &[(Primitive, bool)], shapes: usize) {
+    let mut of_number: BTreeMap<u32, u32> = BTreeMap::new();
+    for (i, light) in (0..).zip(&*lights) {
+        of_number.insert(light.number, i);
+    }
+    for (i, (primitive, _)) in (0..).zip(order) {
+        let number = primitive.shape.checked_sub(shapes as u32);
+        if let Some(light) = number.and_then(|number| of_number.get(&number)) {
+            lights[*light as usize].primitive = i;
+            materials[primitive.material as usize].light = *light;
+        }
     }
 }
 
@@ -238,6 +293,7 @@ fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
     let unit = Light {
         finite: 1.0,
         reach,
+        primitive: NOTHING,
         number,
         ..Light::zeroed()
     };
@@ -246,7 +302,6 @@ fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
             center: rectangle.center.as_vec3(),
             u: rectangle.u.as_vec3(),
             v: rectangle.v.as_vec3(),
-            area: (4.0 * rectangle.u.cross(rectangle.v).length()) as f32,
             color: color.as_vec3(),
             ..unit
         },

@@ -1,6 +1,6 @@
-//! The constants that a kernel is compiled for, those of `shaders/specialization.wgsl`.
+//! The constants that a kernel is compiled for: what its scene uses, and its settings.
 
-/// Declares [`Specialization`] with the names that the shaders' overrides have.
+/// Declares [`Specialization`] and the shaders' overrides, a field and its override side by side.
 macro_rules! specialization {
     ($($(#[$doc:meta])* $field:ident = $name:literal),* $(,)?) => {
         /// Everything that a kernel may take as constant; a kernel is compiled for one of these.
@@ -8,35 +8,26 @@ macro_rules! specialization {
         pub struct Specialization { $($(#[$doc])* pub $field: u32,)* }
 
         impl Specialization {
-            /// The values by the names of the overrides in `shaders/specialization.wgsl`.
+            /// The values by the names of the shaders' overrides.
             pub fn constants(&self) -> Vec<(&'static str, u32)> {
                 vec![$(($name, self.$field)),*]
+            }
+
+            /// The overrides in WGSL.
+            pub fn declarations() -> String {
+                concat!($("override ", $name, ": u32;\n"),*).to_string()
             }
         }
     };
 }
 
 specialization! {
-    /// Rectangles, those of lights among them.
-    rectangles = "RECTANGLES",
-    /// The first of them, which can cast a shadow.
-    blocking_rectangles = "BLOCKING_RECTANGLES",
-    /// Triangles.
-    triangles = "TRIANGLES",
-    /// The first of them, which can cast a shadow.
-    blocking_triangles = "BLOCKING_TRIANGLES",
-    /// Ellipsoids.
-    ellipsoids = "ELLIPSOIDS",
-    /// The first of them, which can cast a shadow.
-    blocking_ellipsoids = "BLOCKING_ELLIPSOIDS",
-    /// Infinite planes.
-    planes = "PLANES",
-    /// The first of them, which can cast a shadow.
-    blocking_planes = "BLOCKING_PLANES",
-    /// Rectangular lights, the first of the lights.
-    area_lights = "AREA_LIGHTS",
-    /// Point and directional lights.
-    delta_lights = "DELTA_LIGHTS",
+    /// Bit i is set if there are primitives of kind i.
+    primitives = "PRIMITIVES",
+    /// Bit i is set if any of them can cast a shadow.
+    shadow_casters = "SHADOW_CASTERS",
+    /// Bit 0 is set if there are lights with an area, bit 1 if there are others.
+    lights = "LIGHTS",
     /// How the samples of a pixel are laid out.
     pixel_pattern = "PIXEL_PATTERN",
     /// Side of their grid of cells; how many there are in patterns without cells.

@@ -1,14 +1,14 @@
 // Writes what the ray through each pixel's centre meets first.
 
-@group(0) @binding(10) var<storage, read_write> first_hits: array<FirstHit>;
+@group(0) @binding(1) var<storage, read_write> hits: array<FirstHit>;
 
 @compute @workgroup_size(8, 8)
-fn aov(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {
+fn first_hits(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {
     if id.x >= work.size.x || id.y >= work.size.y {
         return;
     }
     let pixel = work.origin + id.xy;
     let place = pixel - work.film_origin;
-    first_hits[place.y * work.film_size.x + place.x] = pixel_first_hit(pixel);
+    hits[place.y * work.film_size.x + place.x] = pixel_first_hit(pixel);
     sign(local);
 }

@@ -1,0 +1,73 @@
+// The scene from buffers, by loops over all primitives.
+
+fn load_primitive(i: u32) -> Primitive {
+    return primitives[i];
+}
+
+// How many lights there are: x of those with an area, which come first, y of all.
+fn light_counts() -> vec2u {
+    return counts.lights;
+}
+
+// The nearest primitive that a ray meets; not the one that it has left. It may start on the wall of a round one, inside
+// of it.
+fn closest_hit(ray: Ray, left: u32, wall: u32) -> Hit {
+    var hit = Hit(FAR, NOTHING);
+    if (PRIMITIVES & (1u << RECTANGLE)) != 0u {
+        hit = closest_of(RECTANGLE, hit, ray, left, wall);
+    }
+    if (PRIMITIVES & (1u << TRIANGLE)) != 0u {
+        hit = closest_of(TRIANGLE, hit, ray, left, wall);
+    }
+    if (PRIMITIVES & (1u << ELLIPSOID)) != 0u {
+        hit = closest_of(ELLIPSOID, hit, ray, left, wall);
+    }
+    if (PRIMITIVES & (1u << PLANE)) != 0u {
+        hit = closest_of(PLANE, hit, ray, left, wall);
+    }
+    return hit;
+}
+
+// Of the hit so far and the primitives of a kind.
+fn closest_of(kind: u32, before: Hit, ray: Ray, left: u32, wall: u32) -> Hit {
+    var hit = before;
+    let range = counts.primitives[kind];
+    for (var i = range.x; i < range.z; i++) {
+        hit = closer(hit, intersect(kind, primitives[i], i == wall, ray, hit.t), i, left);
+    }
+    return hit;
+}
+
+// Bit i is set where any primitive hides sample i of the block from a surface. The one that the surface is of hides none
+// that are above it, unless it is seen from inside.
+fn hidden_samples(surface: Surface, light: Light, block: Block) -> u32 {
+    let cone = cone_to_light(light, surface.start);
+    var bits = 0u;
+    if (SHADOW_CASTERS & (1u << RECTANGLE)) != 0u {
+        bits |= hidden_by(RECTANGLE, counts.primitives[RECTANGLE].xy, surface, cone, light, block);
+    }
+    if (SHADOW_CASTERS & (1u << TRIANGLE)) != 0u {
+        bits |= hidden_by(TRIANGLE, counts.primitives[TRIANGLE].xy, surface, cone, light, block);
+    }
+    if (SHADOW_CASTERS & (1u << ELLIPSOID)) != 0u {
+        bits |= hidden_by(ELLIPSOID, counts.primitives[ELLIPSOID].xy, surface, cone, light, block);
+    }
+    if (SHADOW_CASTERS & (1u << PLANE)) != 0u {
+        bits |= hidden_by(PLANE, counts.primitives[PLANE].xy, surface, cone, light, block);
+    }
+    return bits;
+}
+
+// Which of the primitives from `first` to before `end` may hide a light: bit i stands for first + i, up to 32 of them.
+fn shadow_candidates(first: u32, end: u32, cone: Cone) -> u32 {
+    var candidates = 0u;
+    for (var i = 0u; i < 32u && first + i < end; i++) {
+        candidates |= select(0u, 1u << i, may_block(bounds[first + i], cone));
+    }
+    return candidates;
+}
+
+// One of those that can cast a shadow, of a kind that is known when compiled.
+fn load_blocker(kind: u32, i: u32) -> Primitive {
+    return primitives[i];
+}

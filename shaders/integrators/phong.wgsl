@@ -1,0 +1,113 @@
+// The integrator `phong`: direct light by Phong's model, seen directly or through mirrors and glass.
+
+// The radiance that comes along a camera's ray. The paths through glass form a tree; it is walked depth first, each
+// path as far as its end, and the branches that wait are fewer than LEAVES. A path that meets a mirror or glass after
+// BOUNCES bounces is cut off: there it sees the background.
+fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> vec3f {
+    var path = Path(ray, differential, vec3f(1.0), 0u, 0u, NOTHING, NOTHING);
+    if BOUNCES == 0u {
+        return radiance_from(closest_hit(path.ray, NOTHING, NOTHING), path, pixel, sample);
+    }
+    var sum = vec3f(0.0);
+    var pending: array<Path, SPLITS>;
+    var waiting = 0u;
+    for (var leaf = 0u; leaf < LEAVES; leaf++) {
+        var hit = Hit(FAR, NOTHING);
+        while path.depth <= BOUNCES {
+            hit = closest_hit(path.ray, path.left, path.wall);
+            if !is_specular(hit) {
+                break;
+            }
+            if path.depth == BOUNCES {
+                hit.primitive = NOTHING;
+                break;
+            }
+            let scattered = scatter(hit, path, pixel, sample);
+            path = scattered.onward;
+            if scattered.splits {
+                pending[waiting] = scattered.other;
+                waiting++;
+            }
+        }
+        sum += path.throughput * radiance_from(hit, path, pixel, sample);
+        if waiting == 0u {
+            break;
+        }
+        waiting--;
+        path = pending[waiting];
+    }
+    return sum;
+}
+
+// Whether light is mirrored or refracted there.
+fn is_specular(hit: Hit) -> bool {
+    if hit.primitive == NOTHING {
+        return false;
+    }
+    let kind = material_of(hit).kind;
+    return (kind == MIRROR) | (kind == GLASS);
+}
+
+fn scatter(hit: Hit, path: Path, pixel: vec2u, sample: u32) -> Scattered {
+    var surface = surface_of(hit, path.ray);
+    let at = arrival_of(hit, surface, path.ray, path.differential);
+    let look = appearance(hit, material_of(hit), surface, at, SPECULAR_LOOKUPS);
+    let material = look.material;
+    surface.shading_normal = usable_normal(surface, look.normal);
+    if material.kind == MIRROR {
+        return mirrored_path(path, surface, at, material);
+    }
+    let bits = decision_bits(pixel, camera.seed, sample, path.depth * LEAVES + path.branch, NOTHING);
+    return glass_path(path, surface, at, material, unit_float(bits.x));
+}
+
+// The radiance of what a path ends at.
+fn radiance_from(hit: Hit, path: Path, pixel: vec2u, sample: u32) -> vec3f {
+    if hit.primitive == NOTHING {
+        return environment.background;
+    }
+    let plain = material_of(hit);
+    if plain.kind == EMITTER {
+        return plain.emission;
+    }
+    var surface = surface_of(hit, path.ray);
+    let look = appearance(hit, plain, surface, arrival_of(hit, surface, path.ray, path.differential), LOOKUPS);
+    let material = look.material;
+    surface.shading_normal = look.normal;
+    var sum = environment.ambient * material.ambient;
+    let lights = light_counts();
+    if (LIGHTS & 1u) != 0u {
+        for (var i = 0u; i < lights.x; i++) {
+            let light = load_light(i);
+            let lobes = lobes_of_light(surface, material, light, LIGHT_PATTERN, LIGHT_SIDE, LIGHT_SAMPLES, pixel, sample);
+            sum += phong_radiance(material, light, lobes, environment.light_weight);
+        }
+    }
+    if (LIGHTS & 2u) != 0u {
+        for (var i = lights.x; i < lights.y; i++) {
+            let light = load_light(i);
+            let lobes = lobes_of_light(surface, material, light, GRID, 1u, 1u, pixel, sample);
+            sum += phong_radiance(material, light, lobes, 1.0);
+        }
+    }
+    return sum;
+}
+
+// Phong's lobes, summed over all samples of a light.
+fn lobes_of_light(surface: Surface, material: Material, light: Light, pattern: u32, side: u32, count: u32,
+                  pixel: vec2u, sample: u32) -> Lobes {
+    let to = segments_to_light(light, surface.position);
+    let key = sample_key(pixel, camera.seed, 1u + light.number);
+    var lobes = Lobes(0.0, 0.0);
+    for (var first = 0u; first < count; first += BLOCK) {
+        let block = Block(pattern, side, first, select(BLOCK, count - first, count - first < BLOCK), sample, key);
+        let hidden = hidden_samples(surface, light, block);
+        lobes = phong_block(surface, material, to, block, hidden, EXPONENT_BITS, lobes);
+    }
+    return lobes;
+}
+
+fn phong_radiance(material: Material, light: Light, lobes: Lobes, weight: f32) -> vec3f {
+    let light_color = light.color * weight;
+    return light_color * (material.diffuse * lobes.diffuse + material.specular * lobes.specular);
+}

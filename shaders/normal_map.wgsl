@@ -1,0 +1,15 @@
+// The normals that normal maps give.
+
+// The unit normal of a normal map's vector n, whose x points along the texture's u, y along its v and z outwards; on
+// the side of the surface's normal. It never points into the surface.
+fn mapped_normal(surface: Surface, t: Texture, n: vec3f) -> vec3f {
+    // By the texture's own coordinates: the inverse of its map, up to a positive factor.
+    let sign = select(-1.0, 1.0, t.u.x * t.v.y - t.u.y * t.v.x > 0.0);
+    let along_u = (surface.du * t.v.y - surface.dv * t.v.x) * sign;
+    let along_v = (surface.dv * t.u.x - surface.du * t.u.y) * sign;
+    let outward = surface.normal * surface.side;
+    let tangent = normalize(along_u - outward * dot(outward, along_u));
+    let across = cross(outward, tangent);
+    let bitangent = across * select(-1.0, 1.0, dot(across, along_v) > 0.0);
+    return normalize(tangent * n.x + bitangent * n.y + outward * max(n.z, 0.001)) * surface.side;
+}

@@ -1,0 +1,95 @@
+// What is different from one kind of primitives to the next. A kind has a file of its own for how rays meet it; all else
+// is here. `kind` is known when compiled, or is the primitive's own.
+
+// The distance of the nearest hit in (0, limit), else `limit`. `wall` says that the ray starts on the primitive and goes
+// through its inside.
+fn intersect(kind: u32, q: Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
+    if kind == RECTANGLE {
+        return intersect_rectangle(q, ray, limit);
+    }
+    if kind == TRIANGLE {
+        return intersect_triangle(q, ray, limit);
+    }
+    if kind == ELLIPSOID {
+        return intersect_ellipsoid(q, wall, ray, limit);
+    }
+    return intersect_plane(q, ray, limit);
+}
+
+// Whether it cuts the segment o + s d, s in (0, reach), of local space; `start` is how far o is outside of what has an
+// inside.
+fn blocks(kind: u32, o: vec3f, d: vec3f, start: f32, reach: f32) -> bool {
+    if kind == RECTANGLE {
+        return rectangle_blocks(o, d, reach);
+    }
+    if kind == TRIANGLE {
+        return triangle_blocks(o, d, reach);
+    }
+    if kind == ELLIPSOID {
+        return ellipsoid_blocks(o, d, start, reach);
+    }
+    return plane_blocks(o, d, reach);
+}
+
+// Whether it has an inside, and is met again by a ray that leaves it through that.
+fn is_round(kind: u32) -> bool {
+    return kind == ELLIPSOID;
+}
+
+// The gradient, at a point of local space, of what is 0 on a primitive: of z, or of (x^2 + y^2 + z^2 - 1) / 2.
+fn primitive_gradient(q: Primitive, local: vec3f) -> vec3f {
+    let round = q.x * local.x + q.y * local.y + q.z * local.z;
+    return select(q.z, round, is_round(q.kind));
+}
+
+fn primitive_normal(q: Primitive, local: vec3f) -> vec3f {
+    return normalize(primitive_gradient(q, local));
+}
+
+// Texture coordinates of a point of local space. Rectangle: 0 to 1 along tangent and bitangent. Triangle: barycentric
+// coordinates of the second and third vertex. Plane: lengths along tangent and bitangent. Ellipsoid: longitude from
+// the first towards the second axis and latitude from the third axis' foot, each from 0 to 1.
+fn primitive_uv(q: Primitive, local: vec3f) -> vec2f {
+    if q.kind == RECTANGLE {
+        return vec2f(0.5 * local.x + 0.5, 0.5 * local.y + 0.5);
+    }
+    if q.kind == ELLIPSOID {
+        let longitude = atan2(local.y, local.x) * 0.15915494309189535;
+        let latitude = atan2(sqrt(local.x * local.x + local.y * local.y), -local.z) * 0.3183098861837907;
+        return vec2f(select(longitude, longitude + 1.0, longitude < 0.0), latitude);
+    }
+    return local.xy;
+}
+
+// Of `primitive_uv`, where the local point has the derivative d.
+fn uv_derivative(q: Primitive, local: vec3f, d: vec3f) -> vec2f {
+    if q.kind == RECTANGLE {
+        return d.xy * 0.5;
+    }
+    if q.kind == ELLIPSOID {
+        let r2 = max(local.x * local.x + local.y * local.y, 1e-12); // 0 at the poles
+        let du = (local.x * d.y - local.y * d.x) / r2;
+        let r = sqrt(r2);
+        let dv = r * d.z - local.z * ((local.x * d.x + local.y * d.y) / r);
+        return vec2f(du * 0.15915494309189535, dv * 0.3183098861837907);
+    }
+    return d.xy;
+}
+
+// The derivatives of a point by u and by v.
+struct Tangents {
+    u: vec3f,
+    v: vec3f,
+}
+
+// Those of the local point. Where an ellipsoid's u has no direction, at its poles, that of the nearest meridian is taken.
+fn local_tangents(q: Primitive, local: vec3f) -> Tangents {
+    if q.kind == ELLIPSOID {
+        let r = sqrt(max(local.x * local.x + local.y * local.y, 1e-12));
+        let u = vec3f(-local.y, local.x, 0.0) * 6.283185307179586;
+        let v = vec3f(-local.z * local.x / r, -local.z * local.y / r, r) * 3.141592653589793;
+        return Tangents(u, v);
+    }
+    let scale = select(1.0, 2.0, q.kind == RECTANGLE);
+    return Tangents(vec3f(scale, 0.0, 0.0), vec3f(0.0, scale, 0.0));
+}

@@ -1,0 +1,170 @@
+//! Twin of `shaders/integrators/phong.wgsl`: the integrator `phong`.
+
+use glam::{UVec2, Vec3};
+
+use crate::cpu::differential::Differential;
+use crate::cpu::geometry::{arrival_of, material_of, surface_of};
+use crate::cpu::light::segments_to_light;
+use crate::cpu::path::{Path, Scattered, glass_path, mirrored_path, usable_normal};
+use crate::cpu::phong::{Lobes, phong_block};
+use crate::cpu::ray::{Hit, Ray};
+use crate::cpu::rng::unit_float;
+use crate::cpu::sampling::{decision_bits, sample_key};
+use crate::cpu::shadow::Block;
+use crate::cpu::surface::Surface;
+use crate::cpu::texture::appearance;
+use crate::cpu::traverse::{closest_hit, hidden_samples};
+use crate::pack::{BLOCK, EMITTER, FAR, GLASS, GRID, LEAVES, Light, MIRROR, Material, NOTHING, Packed, SPLITS};
+
+pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVec2, sample: u32) -> Vec3 {
+    let bounces = scene.specialization.bounces;
+    let mut path = Path {
+        ray,
+        differential,
+        throughput: Vec3::ONE,
+        depth: 0,
+        branch: 0,
+        left: NOTHING,
+        wall: NOTHING,
+    };
+    if bounces == 0 {
+        return radiance_from(
+            scene,
+            closest_hit(scene, path.ray, NOTHING, NOTHING),
+            path,
+            pixel,
+            sample,
+        );
+    }
+    let mut sum = Vec3::ZERO;
+    let mut pending = [path; SPLITS as usize];
+    let mut waiting = 0;
+    for _ in 0..LEAVES {
+        let mut hit = Hit {
+            t: FAR,
+            primitive: NOTHING,
+        };
+        while path.depth <= bounces {
+            hit = closest_hit(scene, path.ray, path.left, path.wall);
+            if !is_specular(scene, hit) {
+                break;
+            }
+            if path.depth == bounces {
+                hit.primitive = NOTHING;
+                break;
+            }
+            let scattered = scatter(scene, hit, path, pixel, sample);
+            path = scattered.onward;
+            if scattered.splits {
+                pending[waiting] = scattered.other;
+                waiting += 1;
+            }
+        }
+        sum += path.throughput * radiance_from(scene, hit, path, pixel, sample);
+        if waiting == 0 {
+            break;
+        }
+        waiting -= 1;
+        path = pending[waiting];
+    }
+    sum
+}
+
+pub fn is_specular(scene: &Packed, hit: Hit) -> bool {
+    if hit.primitive == NOTHING {
+        return false;
+    }
+    let kind = material_of(scene, hit).kind;
+    (kind == MIRROR) | (kind == GLASS)
+}
+
+pub fn scatter(scene: &Packed, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Scattered {
+    let mut surface = surface_of(scene, hit, path.ray);
+    let at = arrival_of(scene, hit, surface, path.ray, path.differential);
+    let lookups = scene.specialization.specular_lookups;
+    let look = appearance(scene, hit, material_of(scene, hit), surface, at, lookups);
+    let material = &look.material;
+    surface.shading_normal = usable_normal(surface, look.normal);
+    if material.kind == MIRROR {
+        return mirrored_path(path, surface, at, material);
+    }
+    let bounce = path.depth * LEAVES + path.branch;
+    let bits = decision_bits(pixel, scene.camera.seed, sample, bounce, NOTHING);
+    glass_path(path, surface, at, material, unit_float(bits.x))
+}
+
+pub fn radiance_from(scene: &Packed, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Vec3 {
+    let s = &scene.specialization;
+    if hit.primitive == NOTHING {
+        return scene.environment.background;
+    }
+    let plain = material_of(scene, hit);
+    if plain.kind == EMITTER {
+        return plain.emission;
+    }
+    let mut surface = surface_of(scene, hit, path.ray);
+    let at = arrival_of(scene, hit, surface, path.ray, path.differential);
+    let look = appearance(scene, hit, plain, surface, at, s.lookups);
+    let material = &look.material;
+    surface.shading_normal = look.normal;
+    let mut sum = scene.environment.ambient * material.ambient;
+    let (area_lights, delta_lights) = scene.lights.split_at(scene.counts.lights.x as usize);
+    for light in area_lights {
+        let (pattern, side, count) = (s.light_pattern, s.light_side, s.light_samples);
+        let lobes = lobes_of_light(scene, surface, material, light, pattern, side, count, pixel, sample);
+        sum += phong_radiance(material, light, lobes, scene.environment.light_weight);
+    }
+    for light in delta_lights {
+        let lobes = lobes_of_light(scene, surface, material, light, GRID, 1, 1, pixel, sample);
+        sum += phong_radiance(material, light, lobes, 1.0);
+    }
+    sum
+}
+
+#[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
+pub fn lobes_of_light(
+    scene: &Packed,
+    surface: Surface,
+    material: &Material,
+    light: &Light,
+    pattern: u32,
+    side: u32,
+    count: u32,
+    pixel: UVec2,
+    sample: u32,
+) -> Lobes {
+    let to = segments_to_light(light, surface.position);
+    let key = sample_key(pixel, scene.camera.seed, 1 + light.number);
+    let mut lobes = Lobes {
+        diffuse: 0.0,
+        specular: 0.0,
+    };
+    let mut first = 0;
+    while first < count {
+        let block = Block {
+            pattern,
+            side,
+            first,
+            count: BLOCK.min(count - first),
+            group: sample,
+            key,
+        };
+        let hidden = hidden_samples(scene, surface, light, block);
+        lobes = phong_block(
+            surface,
+            material,
+            to,
+            block,
+            hidden,
+            scene.specialization.exponent_bits,
+            lobes,
+        );
+        first += BLOCK;
+    }
+    lobes
+}
+
+pub fn phong_radiance(material: &Material, light: &Light, lobes: Lobes, weight: f32) -> Vec3 {
+    let light_color = light.color * weight;
+    light_color * (material.diffuse * lobes.diffuse + material.specular * lobes.specular)
+}

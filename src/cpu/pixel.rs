@@ -1,0 +1,41 @@
+//! Twin of `shaders/pixel.wgsl`: the samples of a pixel.
+
+use glam::{UVec2, Vec2, Vec3, Vec4};
+
+use super::camera::{camera_differential, camera_ray};
+use super::differential::Differential;
+use super::filter::{filter_bin, filter_offset};
+use super::integrators::phong::radiance;
+use super::sampling::{sample_key, sample_square};
+use crate::pack::Packed;
+
+pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> Vec4 {
+    let s = &scene.specialization;
+    let (round, index) = (sample / s.pixel_samples, sample % s.pixel_samples);
+    let key = sample_key(pixel, scene.camera.seed, 0);
+    let u = sample_square(s.pixel_pattern, s.pixel_side, index, round, key);
+    let at = filtered(scene, u);
+    let place = pixel.as_vec2() + at.truncate();
+    let (ray, differential) = (camera_ray(&scene.camera, place), differential_at(scene, place));
+    (radiance(scene, ray, differential, pixel, sample) * at.z).extend(at.z)
+}
+
+pub fn differential_at(scene: &Packed, place: Vec2) -> Differential {
+    let s = &scene.specialization;
+    if s.differentials == 0 {
+        return Differential::default();
+    }
+    camera_differential(&scene.camera, place, 1.0 / (s.pixel_samples as f32).sqrt())
+}
+
+pub fn filtered(scene: &Packed, u: Vec2) -> Vec3 {
+    let (bins, table) = (scene.specialization.filter_bins, &scene.filter_table);
+    if bins == 0 {
+        return u.extend(1.0);
+    }
+    let (i, j) = (filter_bin(u.x, bins), filter_bin(u.y, bins));
+    let (of_x, of_y) = (table[i as usize], table[j as usize]);
+    let x = filter_offset(u.x, i, bins, of_x.x, of_x.y);
+    let y = filter_offset(u.y, j, bins, of_y.x, of_y.y);
+    Vec3::new(0.5 + x, 0.5 + y, of_x.z * of_y.z)
+}

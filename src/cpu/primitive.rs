@@ -1,0 +1,100 @@
+//! Twin of `shaders/primitive.wgsl`: what is different from one kind of primitives to the next.
+
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+
+use glam::{Vec2, Vec3};
+
+use super::ellipsoid::{ellipsoid_blocks, intersect_ellipsoid};
+use super::math::{atan2, max, normalize};
+use super::plane::{intersect_plane, plane_blocks};
+use super::ray::Ray;
+use super::rectangle::{intersect_rectangle, rectangle_blocks};
+use super::triangle::{intersect_triangle, triangle_blocks};
+use crate::pack::{ELLIPSOID, Primitive, RECTANGLE, TRIANGLE};
+
+#[inline(always)] // compiled for each kind
+pub fn intersect(kind: u32, q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
+    if kind == RECTANGLE {
+        return intersect_rectangle(q, ray, limit);
+    }
+    if kind == TRIANGLE {
+        return intersect_triangle(q, ray, limit);
+    }
+    if kind == ELLIPSOID {
+        return intersect_ellipsoid(q, wall, ray, limit);
+    }
+    intersect_plane(q, ray, limit)
+}
+
+#[inline(always)] // compiled for each kind
+pub fn blocks(kind: u32, o: Vec3, d: Vec3, start: f32, reach: f32) -> bool {
+    if kind == RECTANGLE {
+        return rectangle_blocks(o, d, reach);
+    }
+    if kind == TRIANGLE {
+        return triangle_blocks(o, d, reach);
+    }
+    if kind == ELLIPSOID {
+        return ellipsoid_blocks(o, d, start, reach);
+    }
+    plane_blocks(o, d, reach)
+}
+
+pub fn is_round(kind: u32) -> bool {
+    kind == ELLIPSOID
+}
+
+pub fn primitive_gradient(q: &Primitive, local: Vec3) -> Vec3 {
+    let round = q.x * local.x + q.y * local.y + q.z * local.z;
+    if is_round(q.kind) { round } else { q.z }
+}
+
+pub fn primitive_normal(q: &Primitive, local: Vec3) -> Vec3 {
+    normalize(primitive_gradient(q, local))
+}
+
+pub fn primitive_uv(q: &Primitive, local: Vec3) -> Vec2 {
+    if q.kind == RECTANGLE {
+        return Vec2::new(0.5 * local.x + 0.5, 0.5 * local.y + 0.5);
+    }
+    if q.kind == ELLIPSOID {
+        let longitude = atan2(local.y, local.x) * (0.5 * FRAC_1_PI);
+        let latitude = atan2((local.x * local.x + local.y * local.y).sqrt(), -local.z) * FRAC_1_PI;
+        return Vec2::new(if longitude < 0.0 { longitude + 1.0 } else { longitude }, latitude);
+    }
+    Vec2::new(local.x, local.y)
+}
+
+pub fn uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2 {
+    if q.kind == RECTANGLE {
+        return Vec2::new(d.x, d.y) * 0.5;
+    }
+    if q.kind == ELLIPSOID {
+        let r2 = max(local.x * local.x + local.y * local.y, 1e-12);
+        let du = (local.x * d.y - local.y * d.x) / r2;
+        let r = r2.sqrt();
+        let dv = r * d.z - local.z * ((local.x * d.x + local.y * d.y) / r);
+        return Vec2::new(du * (0.5 * FRAC_1_PI), dv * FRAC_1_PI);
+    }
+    Vec2::new(d.x, d.y)
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tangents {
+    pub u: Vec3,
+    pub v: Vec3,
+}
+
+pub fn local_tangents(q: &Primitive, local: Vec3) -> Tangents {
+    if q.kind == ELLIPSOID {
+        let r = max(local.x * local.x + local.y * local.y, 1e-12).sqrt();
+        let u = Vec3::new(-local.y, local.x, 0.0) * TAU;
+        let v = Vec3::new(-local.z * local.x / r, -local.z * local.y / r, r) * PI;
+        return Tangents { u, v };
+    }
+    let scale = if q.kind == RECTANGLE { 2.0 } else { 1.0 };
+    Tangents {
+        u: Vec3::new(scale, 0.0, 0.0),
+        v: Vec3::new(0.0, scale, 0.0),
+    }
+}

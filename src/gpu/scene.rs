@@ -1,0 +1,58 @@
+//! A scene's buffers on a device.
+
+use bytemuck::bytes_of;
+use glam::Vec4;
+use wgpu::BufferUsages;
+
+use super::bake::rows;
+use super::device::Device;
+use super::pipeline::bind_group;
+use super::texels::TexelParts;
+use crate::error::RenderError;
+use crate::pack::{BINS, Camera, Packed};
+
+/// What kernels read of a scene.
+pub struct SceneBuffers {
+    camera: wgpu::Buffer,
+    /// The groups of `shaders/bindings.wgsl` behind the first: what changes with the scene, and with its shapes.
+    pub groups: [wgpu::BindGroup; 2],
+}
+
+impl SceneBuffers {
+    /// Uploads a scene whose texels lie in these parts.
+    pub fn upload(
+        device: &Device,
+        packed: &Packed,
+        texels: TexelParts,
+        layouts: &[wgpu::BindGroupLayout],
+    ) -> Result<SceneBuffers, RenderError> {
+        let storage = BufferUsages::STORAGE;
+        let texels = texels.split(&packed.texels);
+        let texels = texels.map(|part| device.checked(|| device.upload(storage, part)));
+        let texels: Vec<wgpu::Buffer> = texels.collect::<Result<_, _>>()?;
+        let mut filter_table = packed.filter_table.clone();
+        filter_table.resize(BINS as usize, Vec4::ZERO);
+        device.checked(|| {
+            let camera = device.upload(BufferUsages::UNIFORM | BufferUsages::COPY_DST, &[packed.camera]);
+            let of_scene = [
+                device.upload(BufferUsages::UNIFORM, &[packed.environment]),
+                device.upload(BufferUsages::UNIFORM, &[packed.counts]),
+                device.upload(BufferUsages::UNIFORM, &filter_table),
+                device.upload(storage, &rows(packed)),
+            ];
+            let of_scene: Vec<_> = [&camera].into_iter().chain(&of_scene).chain(&texels).collect();
+            let primitives = device.upload(storage, &packed.primitives);
+            let bounds = device.upload(storage, &packed.bounds);
+            let groups = [
+                bind_group(device, &layouts[1], &of_scene),
+                bind_group(device, &layouts[2], &[&primitives, &bounds]),
+            ];
+            SceneBuffers { camera, groups }
+        })
+    }
+
+    /// Changes the camera.
+    pub fn set_camera(&self, device: &Device, camera: &Camera) {
+        device.queue.write_buffer(&self.camera, 0, bytes_of(camera));
+    }
+}

@@ -1,0 +1,121 @@
+//! Records that the host and the shaders share, each stated once: a Rust struct, and from the same list of fields what
+//! WGSL says of it. `layout.rs` has the records, `constants.rs` and `specialization.rs` the numbers.
+
+use super::KINDS;
+use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
+
+/// A type that a record's field may have.
+pub trait Field: Copy {
+    /// Its name in WGSL.
+    const WGSL: &'static str;
+    /// A constant of it in WGSL.
+    fn constant(self) -> String;
+    /// WGSL that reads it from `words`, the part of a row that it takes.
+    fn from_row(words: &str) -> String;
+}
+
+macro_rules! fields {
+    ($($ty:ty: $wgsl:literal, |$value:ident| $constant:expr, |$words:ident| $from_row:expr;)*) => {
+        $(impl Field for $ty {
+            const WGSL: &'static str = $wgsl;
+            fn constant(self) -> String {
+                let $value = self;
+                $constant
+            }
+            fn from_row($words: &str) -> String {
+                $from_row
+            }
+        })*
+    };
+}
+
+fields! {
+    f32: "f32", |x| format!("{x:?}f"), |words| format!("bitcast<f32>({words})");
+    u32: "u32", |n| format!("{n}u"), |words| words.to_string();
+    Vec2: "vec2f", |v| format!("vec2f({:?}f, {:?}f)", v.x, v.y), |words| format!("bitcast<vec2f>({words})");
+    Vec3: "vec3f", |v| format!("vec3f({:?}f, {:?}f, {:?}f)", v.x, v.y, v.z), |words| format!("bitcast<vec3f>({words})");
+    Vec4: "vec4f", |v| format!("vec4f({:?}f, {:?}f, {:?}f, {:?}f)", v.x, v.y, v.z, v.w),
+        |words| format!("bitcast<vec4f>({words})");
+    UVec2: "vec2u", |v| format!("vec2u({}u, {}u)", v.x, v.y), |words| words.to_string();
+    [UVec4; KINDS as usize]: "array<vec4u, KINDS>",
+        |all| format!("array({})", all.map(Field::constant).join(", ")), |words| words.to_string();
+    UVec4: "vec4u", |v| format!("vec4u({}u, {}u, {}u, {}u)", v.x, v.y, v.z, v.w), |words| words.to_string();
+}
+
+/// A record that the shaders know by the same name.
+pub trait Record: bytemuck::Pod {
+    /// Its name.
+    const NAME: &'static str;
+    /// Its declaration in WGSL.
+    fn declaration() -> String;
+    /// A constant of it in WGSL.
+    fn constant(&self) -> String;
+    /// WGSL's value of it from the rows of 16 bytes `r0`, `r1` and so on.
+    fn from_rows() -> String;
+}
+
+/// A field's words in the rows that its record is made of, where it starts at this byte.
+pub fn words_of_row(offset: usize, size: usize) -> String {
+    let (row, first, count) = (offset / 16, offset % 16 / 4, size / 4);
+    match count {
+        4 => format!("r{row}"),
+        _ => format!("r{row}.{}", &"xyzw"[first..first + count]),
+    }
+}
+
+/// Declares records as Rust structs and implements [`Record`] for each; `WGSL` is the list of their declarations.
+macro_rules! records {
+    ($($(#[$doc:meta])* pub struct $name:ident { $($(#[$field_doc:meta])* pub $field:ident: $ty:ty,)* })*) => {
+        $(
+            $(#[$doc])*
+            #[repr(C)]
+            #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+            pub struct $name { $($(#[$field_doc])* pub $field: $ty,)* }
+
+            impl Record for $name {
+                const NAME: &'static str = stringify!($name);
+
+                fn declaration() -> String {
+                    let fields = [$(format!("    {}: {},\n", stringify!($field), <$ty as Field>::WGSL)),*];
+                    format!("struct {} {{\n{}}}\n", stringify!($name), fields.concat())
+                }
+
+                fn constant(&self) -> String {
+                    let fields = [$(Field::constant(self.$field)),*];
+                    format!("{}({})", stringify!($name), fields.join(", "))
+                }
+
+                fn from_rows() -> String {
+                    let fields = [$({
+                        let offset = std::mem::offset_of!($name, $field);
+                        <$ty as Field>::from_row(&words_of_row(offset, size_of::<$ty>()))
+                    }),*];
+                    format!("{}({})", stringify!($name), fields.join(", "))
+                }
+            }
+        )*
+
+        /// The declarations of all records in WGSL.
+        pub fn declarations() -> String {
+            [$($name::declaration()),*].join("\n")
+        }
+    };
+}
+
+/// Declares constants for both sides; `constant_declarations` gives those of WGSL.
+macro_rules! constants {
+    ($($(#[$doc:meta])* pub const $name:ident: $ty:ty = $value:expr;)*) => {
+        $($(#[$doc])* pub const $name: $ty = $value;)*
+
+        /// The same constants in WGSL.
+        pub fn constant_declarations() -> String {
+            let all = [$(format!(
+                "const {}: {} = {};\n",
+                stringify!($name), <$ty as super::record::Field>::WGSL, super::record::Field::constant($value)
+            )),*];
+            all.concat()
+        }
+    };
+}
+
+pub(super) use {constants, records};
