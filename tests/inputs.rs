@@ -12,7 +12,7 @@ use wgray::cpu::phong::Lobes;
 use wgray::cpu::ray::{Hit, Ray};
 use wgray::cpu::shadow::{Block, cone_to_light};
 use wgray::cpu::surface::Surface;
-use wgray::pack::{Camera, ELLIPSOID, FAR, Light, Material, NOTHING, Primitive, Sphere, Texture};
+use wgray::pack::{Camera, ELLIPSOID, FAR, KINDS, Light, Material, NOTHING, Primitive, Sphere, Texture};
 
 use crate::kernel::{Function, scalars};
 use crate::random::Random;
@@ -118,7 +118,7 @@ impl Situation {
             columns = DMat3::from_diagonal(DVec3::splat(scale)); // parallel to the axes, as scenes often are
         }
         let rows = columns.inverse().transpose();
-        let kind = random.below(4);
+        let kind = random.below(KINDS);
         // an ellipsoid's anchor is on it, or near
         let (mut middle, mut level) = (DVec3::ZERO, -1.0);
         if kind == ELLIPSOID && random.once_in(2) {
@@ -159,7 +159,7 @@ impl Situation {
             u: (vector(random) * size).as_vec3(),
             finite: if directional { 0.0 } else { 1.0 },
             v: (vector(random) * size).as_vec3(),
-            area: (size * size) as f32,
+            primitive: NOTHING,
             color: color(random),
             number: random.below(4),
         };
@@ -270,12 +270,15 @@ impl Situation {
         Surface {
             position,
             normal,
+            shading_normal: random.pick(&[normal, vector(random).normalize().as_vec3()]),
             wo,
             start: position + normal * 1e-5,
             side: random.pick(&[1.0, -1.0]),
-            facing: random.pick(&[normal, vector(random).normalize().as_vec3()]),
             above: random.pick(&[NOTHING, 3]),
             below: random.pick(&[NOTHING, 3]),
+            uv: self.local.truncate().as_vec2(),
+            du: vector(random).as_vec3(),
+            dv: vector(random).as_vec3(),
         }
     }
 
@@ -455,6 +458,8 @@ fn material(random: &Random) -> Material {
     material.kind = random.below(4);
     material.diffuse = color(random);
     material.specular = color(random);
+    material.tint = color(random);
+    material.ior = random.magnitude(-1.0, 1.0) as f32;
     material.exponent = exponent;
     material.shininess = if random.once_in(2) {
         exponent as f32

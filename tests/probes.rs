@@ -13,13 +13,12 @@ use wgray::cpu::differential::{
 };
 use wgray::cpu::ellipsoid::{ellipsoid_blocks, ellipsoid_discriminant, ellipsoid_level, intersect_ellipsoid};
 use wgray::cpu::filter::{filter_bin, filter_offset};
-use wgray::cpu::footprint::{
-    Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint, uv_derivative,
-};
+use wgray::cpu::footprint::{Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint};
 use wgray::cpu::light::{Segments, segment, segments_to_light, segments_to_local};
 use wgray::cpu::math::{
     atan2, cross, dot, exp2, floor, log2, max, min, normalize, positive_zero, power, power_whole, sine,
 };
+use wgray::cpu::normal_map::mapped_normal;
 use wgray::cpu::path::{Path, Scattered, glass_path, mirrored_path, reflected_path, refracted_path, usable_normal};
 use wgray::cpu::pattern::{
     along_edge, around_footprint, far_product, nearest_step, pattern_share, phase, sine_ratio, wave_integral,
@@ -27,21 +26,22 @@ use wgray::cpu::pattern::{
 };
 use wgray::cpu::phong::{Lobes, phong_block, phong_lobes, phong_power};
 use wgray::cpu::plane::{intersect_plane, plane_blocks};
+use wgray::cpu::primitive::{
+    Tangents, blocks, intersect, is_round, local_tangents, primitive_gradient, primitive_normal, primitive_uv,
+    uv_derivative,
+};
 use wgray::cpu::ray::{
-    Hit, Ray, closer, crosses_plane, plane_distance, point_to_local, scaled_crossing, vector_to_local,
+    Hit, Ray, closer, crosses_plane, plane_distance, point_to_local, scaled_crossing, vector_to_local, vector_to_world,
 };
 use wgray::cpu::rectangle::{intersect_rectangle, rectangle_blocks};
 use wgray::cpu::rng::{hash4, unit_float};
 use wgray::cpu::sampling::{
-    grid_sample, jittered_sample, random_sample, rotated_grid_sample, sample_key, sample_square, wrap,
+    decision_bits, grid_sample, jittered_sample, random_sample, rotated_grid_sample, sample_key, sample_square, wrap,
 };
 use wgray::cpu::sequence::{halton_sample, radical_inverse_3, scramble, shuffled_index, sobol_reversed, sobol_sample};
-use wgray::cpu::shadow::{Block, Cone, block_sample, blocks, cone_to_light, may_block, shadow_bits};
+use wgray::cpu::shadow::{Block, Cone, block_sample, cone_to_light, may_block, shadow_bits};
 use wgray::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
-use wgray::cpu::surface::{
-    Surface, first_hit, largest, primitive_gradient, primitive_normal, primitive_uv, surface_at,
-};
-use wgray::cpu::tangent::{Tangents, local_tangents, mapped_normal, vector_to_world};
+use wgray::cpu::surface::{Surface, first_hit, largest, surface_at, with_coordinates};
 use wgray::cpu::texel::{gaussian_weight, level_size, near_coordinate, srgb_to_linear, unpacked_color, wrapped_index};
 use wgray::cpu::triangle::{intersect_triangle, triangle_blocks};
 use wgray::gpu::Device;
@@ -106,6 +106,7 @@ probes! {
     jittered_sample(side: u32, index: u32, group: u32, key: UVec2) -> Vec2;
     random_sample(index: u32, group: u32, key: UVec2) -> Vec2;
     sample_key(pixel: UVec2, seed: u32, purpose: u32) -> UVec2;
+    decision_bits(pixel: UVec2, seed: u32, sample: u32, bounce: u32, purpose: u32) -> UVec4;
     sobol_sample(index: u32, key: UVec2) -> Vec2;
     sobol_reversed(i: u32) -> u32;
     scramble(digits: u32, seed: u32) -> u32;
@@ -144,6 +145,9 @@ probes! {
     primitive_normal(q: &Primitive, local: Vec3) -> Vec3;
     largest(v: Vec3) -> f32;
     surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface;
+    with_coordinates(surface: Surface, q: &Primitive) -> Surface;
+    intersect(kind: u32, q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32;
+    is_round(kind: u32) -> bool;
     primitive_uv(q: &Primitive, local: Vec3) -> Vec2;
     first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit;
     segments_to_light(light: &Light, p: Vec3) -> Segments;
@@ -154,9 +158,9 @@ probes! {
     blocks(kind: u32, o: Vec3, d: Vec3, start: f32, reach: f32) -> bool;
     cone_to_light(light: &Light, p: Vec3) -> Cone;
     may_block(sphere: &Sphere, cone: &Cone) -> bool;
-    phong_lobes(surface: Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes;
+    phong_lobes(surface: &Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes;
     phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32;
-    phong_block(surface: Surface, material: &Material, to: Segments, block: Block, hidden: u32, exponent_bits: u32,
+    phong_block(surface: &Surface, material: &Material, to: Segments, block: Block, hidden: u32, exponent_bits: u32,
                 sum: Lobes) -> Lobes;
     camera_differential(camera: &Camera, at: Vec2, spacing: f32) -> Differential;
     camera_derivative(camera: &Camera, at: Vec2, step: Vec3) -> Derivative;
@@ -178,7 +182,7 @@ probes! {
     reflected_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3) -> Path;
     refracted_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3, eta: f32, cosine_i: f32,
                    cosine_t: f32) -> Path;
-    surface_footprint(q: &Primitive, local: Vec3, dx: Vec3, dy: Vec3) -> Footprint;
+    surface_footprint(q: &Primitive, surface: Surface, dx: Vec3, dy: Vec3) -> Footprint;
     uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2;
     texture_footprint(t: &Texture, f: Footprint) -> Footprint;
     footprint_ellipse(dx: Vec2, dy: Vec2, anisotropy: f32) -> Ellipse;
@@ -202,7 +206,7 @@ probes! {
     gaussian_weight(r2: f32) -> f32;
     vector_to_world(q: &Primitive, v: Vec3) -> Vec3;
     local_tangents(q: &Primitive, local: Vec3) -> Tangents;
-    mapped_normal(q: &Primitive, local: Vec3, surface: Surface, t: &Texture, n: Vec3) -> Vec3;
+    mapped_normal(surface: Surface, t: &Texture, n: Vec3) -> Vec3;
 }
 
 /// Shared functions that are not probed, and why.

@@ -3,16 +3,13 @@
 
 use std::collections::BTreeSet;
 
-use wgray::gpu::compose::{Kernel, SHARED, Source};
+use wgray::gpu::compose::{KERNELS, Kernel, RENDER, SHARED, Source};
 use wgray::gpu::spirv::instructions;
 use wgray::gpu::{Rounding, bake, check};
 use wgray::pack::Packed;
 
 use crate::scenes;
 use crate::sources::{self, Signature, differences, parse, rust_functions, rust_records, shared_source};
-
-/// Files of records and constants, whose other side is in `src/pack/`: `layout` compares them.
-const RECORDS: &[&str] = &["layout.wgsl", "constants.wgsl"];
 
 /// Files without a twin, and why.
 const WITHOUT_TWIN: &[(&str, &str)] = &[
@@ -22,23 +19,27 @@ const WITHOUT_TWIN: &[(&str, &str)] = &[
         "rounding.wgsl",
         "Rust's own quotients and square roots are rounded correctly",
     ),
-    ("specialization.wgsl", "overrides only"),
     ("texels.wgsl", "the CPU has all texels in one list"),
     (
-        "scene.wgsl",
+        "buffers.wgsl",
         "how a kernel reads the scene; baked kernels have the same functions with constants",
     ),
 ];
 
 /// Files of `src/cpu` that are no file's twin.
-const NO_TWIN: &[&str] = &["mod.rs", "renderer.rs"];
+const NO_TWIN: &[&str] = &["mod.rs", "renderer.rs", "integrators"];
 
 /// Functions and records that only one side has, or that differ, and why: file, name, reason.
 const ONE_SIDED: &[(&str, &str, &str)] = &[
     (
         "traverse.wgsl",
         "closest_hit",
-        "in WGSL it is in scene.wgsl, as it reads the scene",
+        "in WGSL it is in buffers.wgsl, as it reads the scene",
+    ),
+    (
+        "traverse.wgsl",
+        "hidden_samples",
+        "in WGSL it is in buffers.wgsl, as it reads the scene",
     ),
     (
         "traverse.wgsl",
@@ -77,10 +78,10 @@ fn twin_of(file: &str) -> syn::File {
 #[test]
 fn functions_and_records_are_the_same() {
     let shared = shared_source();
-    let kernel = sources::shaders().compose(Kernel::Render, None);
+    let kernel = sources::shaders().compose(&RENDER, None);
     let mut problems = Vec::new();
     for (file, _) in wgray::gpu::compose::BUILT_IN {
-        if file.starts_with("kernels/") || RECORDS.contains(file) || WITHOUT_TWIN.iter().any(|(f, _)| f == file) {
+        if file.starts_with("kernels/") || WITHOUT_TWIN.iter().any(|(f, _)| f == file) {
             continue;
         }
         // What reads overrides or bindings, in the kernel: its twins take the scene first.
@@ -234,7 +235,7 @@ fn only_made_integer(module: &[u32], result: u32) -> bool {
     users.all(|(op, _)| opcode::FLOAT_TO_INTEGER.contains(&op))
 }
 
-fn spirv(source: &Source, kernel: Kernel, packed: &Packed, rounding: Rounding) -> Vec<u32> {
+fn spirv(source: &Source, kernel: &Kernel, packed: &Packed, rounding: Rounding) -> Vec<u32> {
     let checked =
         check(source).unwrap_or_else(|error| panic!("{error}\n{}", error.excerpt.clone().unwrap_or_default()));
     checked
@@ -246,7 +247,7 @@ fn spirv(source: &Source, kernel: Kernel, packed: &Packed, rounding: Rounding) -
 fn kernels_hold_no_operation_that_devices_may_compute_differently() {
     let mut operations = 0;
     for (name, packed) in scenes::all() {
-        for kernel in sources::KERNELS {
+        for kernel in KERNELS {
             for (baked, rounding) in [
                 (None, Rounding::Device),
                 (Some(bake(&packed)), Rounding::Device),
@@ -260,7 +261,8 @@ fn kernels_hold_no_operation_that_devices_may_compute_differently() {
                 let problems = violations(&module);
                 assert!(
                     problems.is_empty(),
-                    "{name}, {kernel:?}, baked {}, {rounding:?}: {problems:?}",
+                    "{name}, {}, baked {}, {rounding:?}: {problems:?}",
+                    kernel.entry_point,
                     baked.is_some()
                 );
             }
@@ -272,7 +274,7 @@ fn kernels_hold_no_operation_that_devices_may_compute_differently() {
 #[test]
 fn an_operation_that_devices_may_compute_differently_is_found() {
     let (_, packed) = scenes::all().remove(0);
-    let source = sources::shaders().compose(Kernel::Render, None);
+    let source = sources::shaders().compose(&RENDER, None);
     let from = "    var sum = environment.ambient * material.ambient;\n";
     assert!(source.text.contains(from));
     for to in [
@@ -291,11 +293,11 @@ fn an_operation_that_devices_may_compute_differently_is_found() {
         let mut changed = Source::default();
         changed.append("changed", &source.text.replacen(from, to, 1));
         assert!(
-            !violations(&spirv(&changed, Kernel::Render, &packed, Rounding::Device)).is_empty(),
+            !violations(&spirv(&changed, &RENDER, &packed, Rounding::Device)).is_empty(),
             "{to}"
         );
     }
-    let module = spirv(&source, Kernel::Render, &packed, Rounding::Device);
+    let module = spirv(&source, &RENDER, &packed, Rounding::Device);
     assert_eq!(violations(&module), Vec::<String>::new());
     let decorations: Vec<usize> = positions(&module)
         .filter(|at| module[*at] as u16 == opcode::DECORATE && module[at + 2] == opcode::NO_CONTRACTION)

@@ -6,10 +6,10 @@ use wgray::cpu::footprint::{Ellipse, Footprint};
 use wgray::cpu::light::Segments;
 use wgray::cpu::path::{Path, Scattered};
 use wgray::cpu::phong::Lobes;
+use wgray::cpu::primitive::Tangents;
 use wgray::cpu::ray::{Hit, Ray};
 use wgray::cpu::shadow::{Block, Cone};
 use wgray::cpu::surface::Surface;
-use wgray::cpu::tangent::Tangents;
 use wgray::pack::{Camera, Environment, FirstHit, Light, Material, Primitive, Sphere, Texture};
 
 pub trait Words: Sized {
@@ -87,7 +87,7 @@ macro_rules! records {
 records! {
     Ray { origin, direction }
     Hit { t, primitive }
-    Surface { position, normal, wo, start, side, facing, above, below }
+    Surface { position, normal, shading_normal, wo, start, side, above, below, uv, du, dv }
     Derivative { position, direction }
     Differential { x, y }
     Arrival { x, y, normal_x, normal_y }
@@ -125,4 +125,14 @@ macro_rules! by_reference {
         }
     )*};
 }
-by_reference![Camera, Environment, Primitive, Material, Light, Sphere, Cone, Texture];
+by_reference![
+    Camera,
+    Environment,
+    Primitive,
+    Material,
+    Light,
+    Sphere,
+    Surface,
+    Cone,
+    Texture
+];

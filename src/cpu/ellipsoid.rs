@@ -58,8 +58,8 @@ mod tests {
 
     use super::*;
     use crate::cpu::math::normalize;
+    use crate::cpu::primitive::primitive_normal;
     use crate::cpu::ray::point_to_local;
-    use crate::cpu::surface::primitive_normal;
     use crate::pack::{ELLIPSOID, FAR, primitive};
 
     fn ellipsoid(center: DVec3, axes: DMat3) -> Primitive {

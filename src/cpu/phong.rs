@@ -14,7 +14,8 @@ pub struct Lobes {
     pub specular: f32,
 }
 
-pub fn phong_lobes(surface: Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes {
+#[inline]
+pub fn phong_lobes(surface: &Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes {
     let inverse_length = 1.0 / dot(to, to).sqrt();
     let n_l = dot(surface.shading_normal, to);
     let n_v = dot(surface.shading_normal, surface.wo);
@@ -27,6 +28,7 @@ pub fn phong_lobes(surface: Surface, material: &Material, to: Vec3, exponent_bit
     }
 }
 
+#[inline]
 pub fn phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32 {
     if exponent_bits > 0 {
         return power_whole(x, material.exponent, exponent_bits);
@@ -35,7 +37,7 @@ pub fn phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32 {
 }
 
 pub fn phong_block(
-    surface: Surface,
+    surface: &Surface,
     material: &Material,
     to: Segments,
     block: Block,

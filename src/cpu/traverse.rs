@@ -38,7 +38,7 @@ pub fn closest_hit(scene: &Packed, ray: Ray, left: u32, wall: u32) -> Hit {
     hit
 }
 
-pub fn hidden_samples(scene: &Packed, surface: Surface, light: &Light, block: Block) -> u32 {
+pub fn hidden_samples(scene: &Packed, surface: &Surface, light: &Light, block: Block) -> u32 {
     let cone = cone_to_light(light, surface.start);
     let mut bits = 0;
     for_each_kind!(scene.shadow_casters(), |kind, range| {
@@ -52,7 +52,7 @@ fn hidden_by(
     scene: &Packed,
     kind: u32,
     range: Range<usize>,
-    surface: Surface,
+    surface: &Surface,
     cone: &Cone,
     light: &Light,
     block: Block,

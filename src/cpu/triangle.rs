@@ -25,7 +25,7 @@ mod tests {
     use glam::{DMat3, DVec3};
 
     use super::*;
-    use crate::cpu::surface::primitive_normal;
+    use crate::cpu::primitive::primitive_normal;
     use crate::pack::{FAR, TRIANGLE, primitive};
 
     const CORNERS: [DVec3; 3] = [

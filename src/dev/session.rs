@@ -251,9 +251,10 @@ mod tests {
     fn a_lost_device_is_opened_anew() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
-        fs::create_dir_all(path("shaders/kernels")).unwrap();
         for (name, text) in BUILT_IN {
-            fs::write(path("shaders").join(name), text).unwrap();
+            let file = path("shaders").join(name);
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+            fs::write(file, text).unwrap();
         }
         fs::write(path("scene.toml"), SCENE).unwrap();
         let (told, reports) = std::sync::mpsc::channel();

@@ -152,7 +152,7 @@ mod tests {
     }
 
     const RENDER: &str = "kernels/render.wgsl";
-    const AOV: &str = "kernels/aov.wgsl";
+    const FIRST_HITS: &str = "kernels/first_hits.wgsl";
     const ADAPTIVE: &str = "kernels/adaptive.wgsl";
 
     #[test]
@@ -165,7 +165,7 @@ mod tests {
         says(
             &[
                 (RENDER, "sample++", "sample+"),
-                (AOV, "pixel_first_hit(pixel)", "pixel_first_hit(pixels)"),
+                (FIRST_HITS, "pixel_first_hit(pixel)", "pixel_first_hit(pixels)"),
                 (ADAPTIVE, "= moments;", "= moments.xyz;"),
                 ("phong.wgsl", "", "fn one() -> f32 { return missing; }"),
                 ("phong.wgsl", "", "fn two() -> f32 { return vec2f(1.0); }"),
@@ -177,7 +177,7 @@ mod tests {
             ],
             &[
                 "kernels/render.wgsl: expected",
-                "kernels/aov.wgsl:12: `pixels`",
+                "kernels/first_hits.wgsl:12: `pixels`",
                 "kernels/adaptive.wgsl: in `adaptive`: `moments.xyz` of type `vec3<f32>` cannot be stored in .. `vec4<f32>`",
                 "phong.wgsl: `missing`",
                 "phong.wgsl: in `two`: `vec2f(1.0)` of type `vec2<f32>` is returned where `f32` is declared",
@@ -193,36 +193,36 @@ mod tests {
             &["kernels/render.wgsl: workgroup size of `render` is (4, 4) .. (8, 8)"],
         );
         says(
-            &[(RENDER, "@workgroup_size(8, 8)", "@workgroup_size(PLANES, 8)")],
+            &[(RENDER, "@workgroup_size(8, 8)", "@workgroup_size(BOUNCES, 8)")],
             &["kernels/render.wgsl: workgroup size of `render` is set by an override"],
         );
         says(
-            &[(AOV, "fn aov", "fn ova")],
-            &["kernels/aov.wgsl: must be called `aov`, not `ova`"],
+            &[(FIRST_HITS, "fn first_hits", "fn hits_first")],
+            &["kernels/first_hits.wgsl: must be called `first_hits`, not `hits_first`"],
         );
         let built_in = Shaders::built_in();
-        let text = built_in.text(AOV);
+        let text = built_in.text(FIRST_HITS);
         let start = text.find("@compute").unwrap();
         says(
-            &[(AOV, &text[start..], "")],
-            &["kernels/aov.wgsl:1:1: there is no entry point: @compute @workgroup_size(8, 8) fn aov"],
+            &[(FIRST_HITS, &text[start..], "")],
+            &["kernels/first_hits.wgsl:1:1: there is no entry point: @compute @workgroup_size(8, 8) fn first_hits"],
         );
         says(
             &[
-                (AOV, "@compute @workgroup_size(8, 8)", ""),
-                (AOV, "@builtin(global_invocation_id) ", ""),
-                (AOV, "@builtin(local_invocation_index) ", ""),
+                (FIRST_HITS, "@compute @workgroup_size(8, 8)", ""),
+                (FIRST_HITS, "@builtin(global_invocation_id) ", ""),
+                (FIRST_HITS, "@builtin(local_invocation_index) ", ""),
             ],
-            &["kernels/aov.wgsl: `aov` must be the entry point: @compute"],
+            &["kernels/first_hits.wgsl: `first_hits` must be the entry point: @compute"],
         );
     }
 
     #[test]
     fn bindings_must_be_what_the_program_binds() {
-        let film = "@group(0) @binding(10) var<storage, read_write> film: array<vec4f>;";
+        let film = "@group(0) @binding(1) var<storage, read_write> film: array<vec4f>;";
         says(
-            &[(RENDER, "@binding(10)", "@binding(40)")],
-            &["kernels/render.wgsl: `film` must be at @group(0) @binding(10)"],
+            &[(RENDER, "@binding(1)", "@binding(40)")],
+            &["kernels/render.wgsl: `film` must be at @group(0) @binding(1)"],
         );
         says(
             &[
@@ -231,7 +231,7 @@ mod tests {
                 (RENDER, "film[index]", "vec4f()"),
             ],
             &[
-                "kernels/render.wgsl:1:1: @group(0) @binding(10) .. `var<storage, read_write>` film: array<vec4<f32>> is missing",
+                "kernels/render.wgsl:1:1: @group(0) @binding(1) .. `var<storage, read_write>` film: array<vec4<f32>> is missing",
             ],
         );
         says(
@@ -252,7 +252,7 @@ mod tests {
         );
         says(
             &[("bindings.wgsl", "var<uniform> camera", "var<storage, read> camera")],
-            &["bindings.wgsl: `camera` is `var<storage, read>`; @group(0) @binding(1) must be `var<uniform>`"],
+            &["bindings.wgsl: `camera` is `var<storage, read>`; @group(1) @binding(0) must be `var<uniform>`"],
         );
         says(
             &[("bindings.wgsl", "texels: array<u32>", "texels: array<u32, 16>")],
@@ -263,51 +263,39 @@ mod tests {
     }
 
     #[test]
-    fn records_must_be_laid_out_as_the_program_writes_them() {
+    fn bindings_must_be_laid_out_as_the_program_writes_them() {
+        let rows = "struct Rows { light_counts: vec4u, more: vec4u }\n";
         says(
-            &[("layout.wgsl", "    right: vec3f,", "    more: f32, right: vec3f,")],
-            &["bindings.wgsl: `camera` is not laid out .. `camera.more` is `f32` and must be `vec3<f32>`"],
+            &[
+                ("bindings.wgsl", "receipt: Receipt", "receipt: Receipts"),
+                (
+                    "receipt.wgsl",
+                    "",
+                    "struct Receipts { ended: atomic<u32>, more: f32, cut: atomic<u32> }",
+                ),
+            ],
+            &["bindings.wgsl: `receipt` is not laid out .. `receipt.more` is `f32`"],
         );
         says(
             &[
-                ("layout.wgsl", "    width: u32,", "    height: u32,"),
+                ("bindings.wgsl", "", rows),
                 (
-                    "layout.wgsl",
-                    "    height: u32,\n    forward",
-                    "    width: u32,\n    forward",
+                    "bindings.wgsl",
+                    "filter_table: array<vec4f, BINS>",
+                    "filter_table: array<vec4f, 64>",
                 ),
             ],
-            &["bindings.wgsl: `camera.height` is at byte 28 and must be at byte 44"],
-        );
-        says(
-            &[("layout.wgsl", "    seed: u32,", "    seed: u32, more: vec4f,")],
-            &["bindings.wgsl: `camera.more` is not there"],
+            &["bindings.wgsl: `filter_table` is `array<vec4<f32>, 64>` and must be `array<vec4<f32>, 128>`"],
         );
     }
 
     #[test]
-    fn constants_must_be_those_that_the_program_sets() {
+    fn constants_of_a_shader_must_have_values() {
         says(
-            &[(
-                "specialization.wgsl",
-                "override NORMAL_MAPS: u32;",
-                "const NORMAL_MAPS = 0u;",
-            )],
-            &["specialization.wgsl: `override NORMAL_MAPS: u32;` is missing"],
+            &[("math.wgsl", "", "override MINE: f32;")],
+            &["math.wgsl: `MINE` has no value"],
         );
-        says(
-            &[(
-                "specialization.wgsl",
-                "override NORMAL_MAPS",
-                "@id(7) override NORMAL_MAPS",
-            )],
-            &["specialization.wgsl: `NORMAL_MAPS` must be `override NORMAL_MAPS: u32;`"],
-        );
-        says(
-            &[("specialization.wgsl", "", "override MINE: f32;")],
-            &["specialization.wgsl: `MINE` has no value"],
-        );
-        says(&[("specialization.wgsl", "", "override MINE: f32 = 2.0;")], &[]);
+        says(&[("math.wgsl", "", "override MINE: f32 = 2.0;")], &[]);
     }
 
     #[test]
@@ -319,8 +307,8 @@ mod tests {
             ],
         );
         says(
-            &[(AOV, "first_hits[place.y * work.film_size.x + place.x] =", "let hit =")],
-            &["kernels/aov.wgsl: `aov` never writes `first_hits`"],
+            &[(FIRST_HITS, "hits[place.y * work.film_size.x + place.x] =", "let hit =")],
+            &["kernels/first_hits.wgsl: `first_hits` never writes `hits`"],
         );
     }
 
@@ -356,8 +344,8 @@ mod tests {
             ),
             ("let x = vec3f(1.0, 2u, 3.0);", "value 2 has a type that does not fit"),
             ("let x = n << 40u;", "a shift by more bits than `u32` has"),
-            ("let x = lights[a].area;", "Accessing with index `a`"),
-            ("materials[0].shininess = a;", "`materials[0].shininess`"),
+            ("let x = records[a].x;", "Accessing with index `a`"),
+            ("primitives[0].level = a;", "`primitives[0].level`"),
             ("break;", "outside of a `loop`"),
             ("let x = all(b);", "`b`"),
             ("let x = b == camera;", "`camera` of type `Camera` do not go together"),
@@ -376,7 +364,7 @@ mod tests {
                 .windows(2)
                 .any(|pair| pair[0] == b'[' && pair[1].is_ascii_digit());
             assert!(
-                (!numbered || message.contains("materials[0]")) && !message.contains("Some("),
+                (!numbered || message.contains("primitives[0]")) && !message.contains("Some("),
                 "{line}"
             );
         }

@@ -4,7 +4,7 @@ use wgray::dev::{Command, Move, View};
 
 use super::running::{Files, KERNEL, RADIANCE, Running, SCENE};
 
-const AOV: &str = "shaders/kernels/aov.wgsl";
+const FIRST_HITS: &str = "shaders/kernels/first_hits.wgsl";
 const ADAPTIVE: &str = "shaders/kernels/adaptive.wgsl";
 
 fn problems(running: &Running) -> Vec<String> {
@@ -23,14 +23,14 @@ fn mistakes_in_kernels_that_are_not_used_are_told_at_once() {
     let running = files.start();
     running.wait_rendered(&files);
     let good = running.colors();
-    files.edit(AOV, "fn aov", "fn avo");
+    files.edit(FIRST_HITS, "fn first_hits", "fn hits_first");
     files.edit(ADAPTIVE, "= moments;", "= moments.xyz;");
     files.edit(KERNEL, "@workgroup_size(8, 8)", "@workgroup_size(4, 4)");
     let told = running.wait("all problems", |running| {
         Some(problems(running)).filter(|all| all.len() == 3)
     });
     for (file, words) in [
-        (AOV, "must be called `aov`"),
+        (FIRST_HITS, "must be called `first_hits`"),
         (ADAPTIVE, "`moments.xyz`"),
         (KERNEL, "(4, 4)"),
     ] {
@@ -54,7 +54,7 @@ fn mistakes_in_kernels_that_are_not_used_are_told_at_once() {
     assert_eq!(problems(&running).len(), 3);
     running.session.send(Command::View(View::Color));
     running.session.send(Command::ResetCamera);
-    files.edit(AOV, "fn avo", "fn aov");
+    files.edit(FIRST_HITS, "fn hits_first", "fn first_hits");
     files.edit(ADAPTIVE, "= moments.xyz;", "= moments;");
     files.edit(KERNEL, "(4, 4)", "(8, 8)");
     running.wait_rendered(&files);
@@ -109,7 +109,7 @@ fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
     running.wait_rendered(&files);
 
     // In a kernel of another view: that view is told, the picture is there.
-    long_loop(&files, AOV, "let pixel = work.origin");
+    long_loop(&files, FIRST_HITS, "let pixel = work.origin");
     running.wait_well();
     running.session.send(Command::View(View::Normal));
     running.wait("a problem or the normals", |running| {
@@ -122,6 +122,9 @@ fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
     running.session.send(Command::View(View::Color));
     running.wait_rendered(&files);
     files.tint(0.25);
-    files.write(AOV, wgray::gpu::compose::Shaders::built_in().text("kernels/aov.wgsl"));
+    files.write(
+        FIRST_HITS,
+        wgray::gpu::compose::Shaders::built_in().text("kernels/first_hits.wgsl"),
+    );
     running.wait_rendered(&files);
 }

@@ -25,7 +25,7 @@ fn the_first_picture_is_what_render_makes() {
 }
 
 #[test]
-fn a_saved_scene_is_uploaded_and_a_changed_count_is_compiled() {
+fn a_saved_scene_is_uploaded_and_what_it_did_not_use_is_compiled() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
@@ -34,11 +34,19 @@ fn a_saved_scene_is_uploaded_and_a_changed_count_is_compiled() {
     running.wait_rendered(&files);
     assert_ne!(running.colors(), before);
     assert_eq!(running.state().compile_seconds, compiled, "nothing was compiled");
-    files.edit(
-        "scene.toml",
-        "[[shapes]]",
-        "[[shapes]]\ntype = 'sphere'\nmaterial = 'red'\ncenter = [1, 0, 1]\nradius = 0.3\n\n[[shapes]]",
+    let before = running.colors();
+    let more = |shape: &str| format!("[[shapes]]\nmaterial = 'red'\n{shape}\n\n[[shapes]]");
+    let sphere = more("type = 'sphere'\ncenter = [1, 0, 1]\nradius = 0.3");
+    files.edit("scene.toml", "[[shapes]]", &sphere);
+    running.wait_rendered(&files);
+    assert_ne!(running.colors(), before);
+    assert_eq!(
+        running.state().compile_seconds,
+        compiled,
+        "one more is another count alone"
     );
+    let triangle = more("type = 'triangle'\nvertices = [[1, 0, 1], [1, 0, 2], [1, 1, 1]]");
+    files.edit("scene.toml", "[[shapes]]", &triangle);
     running.wait_rendered(&files);
     assert_ne!(running.state().compile_seconds, compiled, "another kernel was compiled");
     files.edit("scene.toml", "width = 40", "width = 33");
@@ -234,10 +242,7 @@ fn deleted_files_are_told_and_seen_again() {
         running.wait_well();
     }
     fs::remove_dir_all(files.path("shaders")).unwrap();
-    fs::create_dir_all(files.path("shaders/kernels")).unwrap();
-    for (name, text) in BUILT_IN {
-        files.write(&format!("shaders/{name}"), text);
-    }
+    files.write_shaders();
     files.tint(0.125);
     running.wait_rendered(&files);
     files.edit(

@@ -77,12 +77,18 @@ impl Files {
         let files = Files {
             folder: tempfile::tempdir().unwrap(),
         };
-        fs::create_dir_all(files.path("shaders/kernels")).unwrap();
-        for (name, text) in BUILT_IN {
-            files.write(&format!("shaders/{name}"), text);
-        }
+        files.write_shaders();
         files.write("scene.toml", scene);
         files
+    }
+
+    /// All shaders as they are in the program.
+    pub fn write_shaders(&self) {
+        for (name, text) in BUILT_IN {
+            let file = self.path(&format!("shaders/{name}"));
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+            fs::write(file, text).unwrap();
+        }
     }
 
     pub fn path(&self, name: &str) -> PathBuf {

@@ -300,10 +300,10 @@ test("all mistakes are shown at once, those of kernels that are not used now too
   const seen = await shown(page);
   studio.breakShader();
   studio.edit("shaders/kernels/render.wgsl", "@workgroup_size(8, 8)", "@workgroup_size(4, 4)");
-  studio.edit("shaders/kernels/aov.wgsl", "fn aov", "fn avo");
+  studio.edit("shaders/kernels/first_hits.wgsl", "fn first_hits", "fn hits_first");
   studio.edit("shaders/kernels/adaptive.wgsl", "= moments;", "= moments.xyz;");
   const problem = (words) => page.locator("#problems article", { hasText: words }).waitFor();
-  for (const words of ["simple", "(4, 4)", "must be called `aov`", "`moments.xyz` of type `vec3<f32>`"]) await problem(words);
+  for (const words of ["simple", "(4, 4)", "must be called `first_hits`", "`moments.xyz` of type `vec3<f32>`"]) await problem(words);
   assert.equal(await page.locator("#problems article").count(), 4);
   assert.deepEqual(await shown(page), seen);
   // The session goes on.

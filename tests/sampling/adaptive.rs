@@ -3,7 +3,7 @@
 
 use glam::{DVec3, UVec2, Vec4};
 use wgray::cpu::adaptive::{display_slope_squared, display_variance, moments_with, samples_wanted, variance_of_mean};
-use wgray::cpu::integrator::pixel_radiance;
+use wgray::cpu::pixel::pixel_radiance;
 use wgray::film::Region;
 use wgray::job::Cut;
 use wgray::pack::Packed;

@@ -1,7 +1,7 @@
 //! Reconstruction filters: integrals and moments of their tables, the positions and weights that come of them, and pictures.
 
 use glam::Vec4;
-use wgray::cpu::integrator::filtered;
+use wgray::cpu::pixel::filtered;
 use wgray::cpu::sequence::sobol_sample;
 use wgray::film::mean;
 use wgray::pack::filter::{height, table};
@@ -156,9 +156,7 @@ fn a_constant_picture_stays_so_under_every_filter() {
         let mut packed = filtered_scene(kind, 1.5);
         packed.primitives.clear();
         packed.bounds.clear();
-        let s = &mut packed.specialization;
-        (s.rectangles, s.triangles, s.ellipsoids) = (0, 0, 0);
-        (s.blocking_rectangles, s.blocking_triangles, s.blocking_ellipsoids) = (0, 0, 0);
+        packed.counts.primitives = Default::default();
         packed.environment.background = glam::Vec3::new(0.25, 0.5, 0.75);
         for sum in render(&packed, Way::Cpu).sums {
             let [r, g, b] = mean(sum);

@@ -6,10 +6,10 @@ use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3};
 use wgray::cpu::camera::{camera_differential, camera_ray};
 use wgray::cpu::differential::{Arrival, reflected_derivative};
 use wgray::cpu::footprint::surface_footprint;
-use wgray::cpu::integrator::{arrival_of, is_specular, scatter};
+use wgray::cpu::geometry::{arrival_of, surface_of};
+use wgray::cpu::integrators::phong::{is_specular, scatter};
 use wgray::cpu::path::Path;
-use wgray::cpu::ray::point_to_local;
-use wgray::cpu::surface::{Surface, surface_at};
+use wgray::cpu::surface::{Surface, with_coordinates};
 use wgray::cpu::traverse::closest_hit;
 use wgray::pack::{NOTHING, Packed, Primitive};
 
@@ -144,8 +144,9 @@ fn arrive(scene: &Packed, at: Vec2) -> Option<(Primitive, Surface, Arrival, u32)
             path = scatter(scene, hit, path, UVec2::ZERO, 0).onward;
             continue;
         }
-        let surface = surface_at(q, hit.primitive, path.ray, hit.t, scene.environment.shadow_epsilon);
-        return Some((*q, surface, arrival_of(scene, q, path, hit.t, surface), path.depth));
+        let surface = with_coordinates(surface_of(scene, hit, path.ray), q);
+        let at = arrival_of(scene, hit, surface, path.ray, path.differential);
+        return Some((*q, surface, at, path.depth));
     }
 }
 
@@ -236,8 +237,7 @@ fn texture_coordinates_on_an_ellipsoid_change_as_on_neighbouring_rays() {
             if q.kind != wgray::pack::ELLIPSOID {
                 continue;
             }
-            let local = point_to_local(&q, surface.position);
-            let found = surface_footprint(&q, local, arrival.x.position, arrival.y.position);
+            let found = surface_footprint(&q, surface, arrival.x.position, arrival.y.position);
             let h = 1e-3;
             for (step, found) in [(DVec2::X, found.dx), (DVec2::Y, found.dy)] {
                 let at = at.as_dvec2();
@@ -271,18 +271,8 @@ fn a_curved_mirror_needs_its_curvature() {
     let differential = camera_differential(&scene.camera, at, 1.0);
     let ray = camera_ray(&scene.camera, at);
     let hit = closest_hit(&scene, ray, NOTHING, NOTHING);
-    let q = &scene.primitives[hit.primitive as usize];
-    let surface = surface_at(q, hit.primitive, ray, hit.t, 1e-5);
-    let path = Path {
-        ray,
-        differential,
-        throughput: Vec3::ONE,
-        depth: 0,
-        branch: 0,
-        left: NOTHING,
-        wall: NOTHING,
-    };
-    let arrival = arrival_of(&scene, q, path, hit.t, surface);
+    let surface = surface_of(&scene, hit, ray);
+    let arrival = arrival_of(&scene, hit, surface, ray, differential);
     let mirrored = |at: DVec2| {
         let (o, d) = exact.camera(at);
         let (center, m) = Exact::rows();

@@ -2,9 +2,10 @@
 
 use glam::Vec3;
 use wgray::cpu::differential::Arrival;
+use wgray::cpu::geometry::{material_of, surface_of};
 use wgray::cpu::path::usable_normal;
 use wgray::cpu::phong::phong_lobes;
-use wgray::cpu::ray::Ray;
+use wgray::cpu::ray::{Hit, Ray};
 use wgray::cpu::surface::surface_at;
 use wgray::cpu::texture::appearance;
 use wgray::pack::Packed;
@@ -52,21 +53,16 @@ fn shapes(normal: Vec3, keys: &str, strength: f32) -> Packed {
 
 /// The normal that a ray sees on the primitive.
 fn normal(scene: &Packed, primitive: usize, origin: Vec3, target: Vec3) -> Vec3 {
-    let q = &scene.primitives[primitive];
     let ray = Ray {
         origin,
         direction: (target - origin).normalize(),
     };
-    let surface = surface_at(q, 0, ray, (target - origin).length(), 1e-5);
-    let look = appearance(
-        scene,
-        q,
-        &scene.materials[q.material as usize],
-        surface,
-        Arrival::default(),
-        1,
-    );
-    look.normal
+    let hit = Hit {
+        t: (target - origin).length(),
+        primitive: primitive as u32,
+    };
+    let surface = surface_of(scene, hit, ray);
+    appearance(scene, hit, material_of(scene, hit), surface, Arrival::default(), 1).normal
 }
 
 fn near(a: Vec3, b: Vec3) -> bool {
@@ -169,9 +165,16 @@ fn a_bent_normal_sees_no_light_from_behind() {
         direction: Vec3::NEG_Z,
     };
     let mut surface = surface_at(q, 0, ray, 3.0, 1e-5);
-    surface.normal = normal(&map, 0, ray.origin, Vec3::new(0.3, 0.2, 0.0));
+    surface.shading_normal = normal(&map, 0, ray.origin, Vec3::new(0.3, 0.2, 0.0));
     let material = &map.materials[q.material as usize];
-    let lobes = |height: f32| phong_lobes(surface, material, Vec3::new(surface.normal.x.signum(), 0.0, height), 0);
-    assert!(surface.normal.x.abs() > 0.5 && lobes(0.1).diffuse > 0.5);
+    let lobes = |height: f32| {
+        phong_lobes(
+            &surface,
+            material,
+            Vec3::new(surface.shading_normal.x.signum(), 0.0, height),
+            0,
+        )
+    };
+    assert!(surface.shading_normal.x.abs() > 0.5 && lobes(0.1).diffuse > 0.5);
     assert_eq!((lobes(-0.1).diffuse, lobes(-0.1).specular), (0.0, 0.0));
 }

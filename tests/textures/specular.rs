@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use glam::UVec4;
 use wgray::cpu::specular::{fresnel, refracted_cosine};
-use wgray::pack::Packed;
+use wgray::pack::{ELLIPSOID, Packed};
 
 use super::{cpu_picture, scene};
 
@@ -127,13 +128,10 @@ fn clear_glass_of_index_1_is_invisible() {
     // Without the ball at all: the same text with the ball out of the picture.
     let nothing = {
         let mut scene = ball("[0.1, 0.2, 0.3]", "type = 'glass'\nior = 1", ROOM);
-        let keep = scene.specialization.rectangles as usize;
+        let keep = scene.counts.primitives[ELLIPSOID as usize].x as usize;
         scene.primitives.truncate(keep);
         scene.bounds.truncate(keep);
-        (
-            scene.specialization.ellipsoids,
-            scene.specialization.blocking_ellipsoids,
-        ) = (0, 0);
+        scene.counts.primitives[ELLIPSOID as usize] = UVec4::ZERO;
         cpu_picture(&scene)
     };
     let visible = |picture: &[[f32; 3]]| farthest(picture, &nothing).iter().filter(|d| **d > 1e-3).count();

@@ -111,11 +111,11 @@ pub fn radiance_from(scene: &Packed, hit: Hit, path: Path, pixel: UVec2, sample:
     let (area_lights, delta_lights) = scene.lights.split_at(scene.counts.lights.x as usize);
     for light in area_lights {
         let (pattern, side, count) = (s.light_pattern, s.light_side, s.light_samples);
-        let lobes = lobes_of_light(scene, surface, material, light, pattern, side, count, pixel, sample);
+        let lobes = lobes_of_light(scene, &surface, material, light, pattern, side, count, pixel, sample);
         sum += phong_radiance(material, light, lobes, scene.environment.light_weight);
     }
     for light in delta_lights {
-        let lobes = lobes_of_light(scene, surface, material, light, GRID, 1, 1, pixel, sample);
+        let lobes = lobes_of_light(scene, &surface, material, light, GRID, 1, 1, pixel, sample);
         sum += phong_radiance(material, light, lobes, 1.0);
     }
     sum
@@ -124,7 +124,7 @@ pub fn radiance_from(scene: &Packed, hit: Hit, path: Path, pixel: UVec2, sample:
 #[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
 pub fn lobes_of_light(
     scene: &Packed,
-    surface: Surface,
+    surface: &Surface,
     material: &Material,
     light: &Light,
     pattern: u32,
