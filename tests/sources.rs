@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use naga::{ArraySize, Module, ScalarKind, TypeInner};
 use syn::{FnArg, Item, Pat, ReturnType, Type};
-use wgray::gpu::compose::{KERNELS, Shaders, Source};
+use wgray::gpu::compose::{KERNELS, Shaders, Source, built_in};
 
 /// A folder of shaders to test in place of the ones in the program: what `scripts/mutate` has changed.
 const SHADERS: &str = "WGRAY_TEST_SHADERS";
@@ -44,10 +44,10 @@ pub fn shaders_with(file: &str, text: &str) -> Shaders {
 /// Other shaders with another text of a file.
 pub fn with(shaders: &Shaders, file: &str, text: &str) -> Shaders {
     let folder = tempfile::tempdir().expect("a folder");
-    for (name, _) in wgray::gpu::compose::BUILT_IN {
+    for (name, _) in built_in() {
         let path = folder.path().join(name);
         fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
-        let text = if *name == file { text } else { shaders.text(name) };
+        let text = if name == file { text } else { shaders.text(name) };
         fs::write(path, text).expect("a copy of a shader");
     }
     Shaders::read(folder.path()).expect("the copies")
@@ -252,9 +252,12 @@ pub fn differences(place: &str, wgsl: &[Signature], rust: &[Signature]) -> Vec<S
 
 #[test]
 fn every_kernel_is_tested() {
-    for (file, _) in wgray::gpu::compose::BUILT_IN {
+    for (file, _) in built_in() {
         if file.starts_with("kernels/") {
-            assert!(KERNELS.iter().any(|kernel| kernel.file == *file), "{file} is no kernel");
+            assert!(
+                KERNELS.iter().any(|kernel| kernel.file() == file),
+                "{file} is no kernel"
+            );
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use wgray::gpu::compose::{KERNELS, Kernel, RENDER, SHARED, Source};
+use wgray::gpu::compose::{KERNELS, Kernel, RENDER, SHARED, Source, built_in};
 use wgray::gpu::spirv::instructions;
 use wgray::gpu::{Rounding, bake, check};
 use wgray::pack::Packed;
@@ -57,7 +57,7 @@ fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String
         .filter(two_sided)
         .collect();
     let mut twins: Vec<_> = rust_functions(twin).into_iter().filter(two_sided).collect();
-    if !SHARED.contains(&file) {
+    if !is_shared(file) {
         for twin in &mut twins {
             if twin.parts.first().is_some_and(|(_, ty)| ty == "Packed") {
                 twin.parts.remove(0);
@@ -71,6 +71,10 @@ fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String
     problems
 }
 
+fn is_shared(file: &str) -> bool {
+    SHARED.iter().any(|(name, _)| *name == file)
+}
+
 fn twin_of(file: &str) -> syn::File {
     sources::rust(&format!("src/cpu/{}", file.replace(".wgsl", ".rs")))
 }
@@ -80,12 +84,12 @@ fn functions_and_records_are_the_same() {
     let shared = shared_source();
     let kernel = sources::shaders().compose(&RENDER, None);
     let mut problems = Vec::new();
-    for (file, _) in wgray::gpu::compose::BUILT_IN {
-        if file.starts_with("kernels/") || WITHOUT_TWIN.iter().any(|(f, _)| f == file) {
+    for (file, _) in built_in() {
+        if file.starts_with("kernels/") || WITHOUT_TWIN.iter().any(|(f, _)| *f == file) {
             continue;
         }
         // What reads overrides or bindings, in the kernel: its twins take the scene first.
-        let source = if SHARED.contains(file) { &shared } else { &kernel };
+        let source = if is_shared(file) { &shared } else { &kernel };
         let count = sources::wgsl_functions(&parse(source), source, file).len();
         assert!(count > 0, "{file}: no function was found");
         problems.extend(twin_differences(source, file, &twin_of(file)));
@@ -142,7 +146,7 @@ fn every_twin_is_some_files() {
             .into_string()
             .expect("a plain name");
         let wgsl = name.replace(".rs", ".wgsl");
-        let twin = wgray::gpu::compose::BUILT_IN.iter().any(|(file, _)| *file == wgsl);
+        let twin = built_in().any(|(file, _)| file == wgsl);
         assert!(
             twin || NO_TWIN.contains(&name.as_str()),
             "src/cpu/{name} is no file's twin"

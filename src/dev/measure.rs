@@ -14,7 +14,7 @@ use super::picture::Frame;
 use super::session::{Session, Settings};
 use super::source::Sources;
 use crate::gpu::Choice;
-use crate::gpu::compose::{BUILT_IN, Shaders};
+use crate::gpu::compose::{self, Shaders};
 
 /// Saves of each kind.
 const ROUNDS: usize = 7;
@@ -61,7 +61,7 @@ pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Resul
         None => Shaders::built_in(),
     };
     let copies = tempfile::tempdir().map_err(told)?;
-    for (name, _) in BUILT_IN {
+    for (name, _) in compose::built_in() {
         let path = copies.path().join(name);
         fs::create_dir_all(path.parent().unwrap_or(copies.path())).map_err(told)?;
         fs::write(path, shaders.text(name)).map_err(told)?;

@@ -211,7 +211,7 @@ mod tests {
     use super::*;
     use crate::dev::camera::Move;
     use crate::dev::picture::Content;
-    use crate::gpu::compose::{BUILT_IN, Shaders};
+    use crate::gpu::compose::{Shaders, built_in};
     use crate::image::Pixels;
     use crate::scene::Overrides;
 
@@ -251,7 +251,7 @@ mod tests {
     fn a_lost_device_is_opened_anew() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
-        for (name, text) in BUILT_IN {
+        for (name, text) in built_in() {
             let file = path("shaders").join(name);
             fs::create_dir_all(file.parent().unwrap()).unwrap();
             fs::write(file, text).unwrap();

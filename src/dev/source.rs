@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 use super::diagnostic::Diagnostic;
-use crate::gpu::compose::{BUILT_IN, Shaders};
+use crate::gpu::compose::{self, Shaders};
 use crate::pack::{Packed, Specialization, pack};
 use crate::scene::{CameraDescription, Description, Overrides, Scene, TextureDescription};
 
@@ -155,6 +155,6 @@ impl Sources {
     /// The shader files' paths.
     pub fn shader_files(&self) -> impl Iterator<Item = PathBuf> {
         let folder = self.shaders.iter();
-        folder.flat_map(|folder| BUILT_IN.iter().map(move |(name, _)| folder.join(name)))
+        folder.flat_map(|folder| compose::built_in().map(move |(name, _)| folder.join(name)))
     }
 }

@@ -8,55 +8,20 @@ use glam::Vec4;
 use super::bake::tables;
 use crate::pack::{self, FirstHit, Specialization};
 
+/// The file of quotients and square roots by software.
+pub const ROUNDING: &str = "rounding.wgsl";
+
+/// A shader file: its name in `shaders/`, and its text as it was when the program was built.
+pub type File = (&'static str, &'static str);
+
 macro_rules! files {
     ($($name:literal),* $(,)?) => {
         &[$(($name, include_str!(concat!("../../shaders/", $name)))),*]
     };
 }
 
-/// Every file of `shaders/`, as it was when the program was built.
-pub const BUILT_IN: &[(&str, &str)] = files![
-    "adaptive.wgsl",
-    "bindings.wgsl",
-    "buffers.wgsl",
-    "camera.wgsl",
-    "differential.wgsl",
-    "ellipsoid.wgsl",
-    "filter.wgsl",
-    "footprint.wgsl",
-    "geometry.wgsl",
-    "integrators/phong.wgsl",
-    "kernels/adaptive.wgsl",
-    "kernels/first_hits.wgsl",
-    "kernels/render.wgsl",
-    "light.wgsl",
-    "math.wgsl",
-    "normal_map.wgsl",
-    "path.wgsl",
-    "pattern.wgsl",
-    "phong.wgsl",
-    "pixel.wgsl",
-    "plane.wgsl",
-    "primitive.wgsl",
-    "ray.wgsl",
-    "receipt.wgsl",
-    "rectangle.wgsl",
-    "rng.wgsl",
-    "rounding.wgsl",
-    "sampling.wgsl",
-    "sequence.wgsl",
-    "shadow.wgsl",
-    "specular.wgsl",
-    "surface.wgsl",
-    "texel.wgsl",
-    "texels.wgsl",
-    "texture.wgsl",
-    "traverse.wgsl",
-    "triangle.wgsl",
-];
-
 /// The files of the shared mathematics: pure functions and records, each with a twin in `src/cpu/`.
-pub const SHARED: &[&str] = &[
+pub static SHARED: &[File] = files![
     "math.wgsl",
     "rng.wgsl",
     "sampling.wgsl",
@@ -82,28 +47,36 @@ pub const SHARED: &[&str] = &[
     "filter.wgsl",
     "adaptive.wgsl",
 ];
-
 /// What may take the place of quotients and square roots. It comes first, as naga wants functions before their calls.
-pub const ROUNDING: &str = "rounding.wgsl";
-
+static ROUNDING_FILE: &[File] = files!["rounding.wgsl"];
 /// What every kernel adds to [`SHARED`]: its buffers, and the way through the scene.
-const KERNEL: &[&str] = &["bindings.wgsl", "receipt.wgsl", "traverse.wgsl", "geometry.wgsl"];
+static KERNEL: &[File] = files!["bindings.wgsl", "receipt.wgsl", "traverse.wgsl", "geometry.wgsl"];
 /// What takes samples of a pixel.
-const SAMPLES: &[&str] = &["texture.wgsl", "pixel.wgsl", "integrators/phong.wgsl"];
+static SAMPLES: &[File] = files!["texture.wgsl", "pixel.wgsl"];
+/// An integrator: what light a sample sees.
+static PHONG: &[File] = files!["integrators/phong.wgsl"];
 /// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.
-const FROM_BUFFERS: &str = "buffers.wgsl";
+static FROM_BUFFERS: &[File] = files!["buffers.wgsl"];
 /// The texels in one buffer.
-const TEXELS: &str = "texels.wgsl";
+static TEXELS: &[File] = files!["texels.wgsl"];
+static RENDER_FILE: &[File] = files!["kernels/render.wgsl"];
+static ADAPTIVE_FILE: &[File] = files!["kernels/adaptive.wgsl"];
+static FIRST_HITS_FILE: &[File] = files!["kernels/first_hits.wgsl"];
+
+/// Every file of `shaders/`.
+pub fn built_in() -> impl Iterator<Item = File> {
+    let scene = [ROUNDING_FILE, SHARED, KERNEL, SAMPLES, PHONG, FROM_BUFFERS, TEXELS];
+    let kernels = [RENDER_FILE, ADAPTIVE_FILE, FIRST_HITS_FILE];
+    scene.into_iter().chain(kernels).flatten().copied()
+}
 
 /// A compute shader.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Kernel {
     /// The entry point's name.
     pub entry_point: &'static str,
-    /// The file that has it, and declares what it writes.
-    pub file: &'static str,
-    /// What it is made of besides [`SHARED`] and the scene.
-    pub files: &'static [&'static [&'static str]],
+    /// What it is made of besides [`SHARED`] and the scene. The last file has the entry point, and declares what it writes.
+    pub files: &'static [&'static [File]],
     /// The size in bytes of what it writes for a pixel.
     pub record: usize,
 }
@@ -111,26 +84,30 @@ pub struct Kernel {
 /// Accumulates samples in the film.
 pub static RENDER: Kernel = Kernel {
     entry_point: "render",
-    file: "kernels/render.wgsl",
-    files: &[KERNEL, SAMPLES],
+    files: &[KERNEL, SAMPLES, PHONG, RENDER_FILE],
     record: size_of::<Vec4>(),
 };
 /// Accumulates samples as long as a pixel needs them.
 pub static ADAPTIVE: Kernel = Kernel {
     entry_point: "adaptive",
-    file: "kernels/adaptive.wgsl",
-    files: &[KERNEL, SAMPLES],
+    files: &[KERNEL, SAMPLES, PHONG, ADAPTIVE_FILE],
     record: size_of::<[Vec4; 3]>(),
 };
 /// Writes what the ray through each pixel's centre meets first.
 pub static FIRST_HITS: Kernel = Kernel {
     entry_point: "first_hits",
-    file: "kernels/first_hits.wgsl",
-    files: &[KERNEL],
+    files: &[KERNEL, FIRST_HITS_FILE],
     record: size_of::<FirstHit>(),
 };
 /// Every kernel.
 pub static KERNELS: [&Kernel; 3] = [&RENDER, &ADAPTIVE, &FIRST_HITS];
+
+impl Kernel {
+    /// The file that has the entry point.
+    pub fn file(&self) -> &'static str {
+        self.files.iter().copied().flatten().last().map_or("", |(name, _)| name)
+    }
+}
 
 /// The texts of all shader files.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -142,8 +119,7 @@ impl Shaders {
     /// The ones in the program.
     pub fn built_in() -> Shaders {
         Shaders {
-            files: BUILT_IN
-                .iter()
+            files: built_in()
                 .map(|(name, text)| (name.to_string(), text.to_string()))
                 .collect(),
         }
@@ -158,7 +134,7 @@ impl Shaders {
             Ok((name.to_string(), text))
         };
         Ok(Shaders {
-            files: BUILT_IN.iter().map(|(name, _)| read(name)).collect::<io::Result<_>>()?,
+            files: built_in().map(|(name, _)| read(name)).collect::<io::Result<_>>()?,
         })
     }
 
@@ -175,9 +151,7 @@ impl Shaders {
         let mut source = Source::default();
         source.append("src/pack/constants.rs", &pack::constant_declarations());
         source.append("src/pack/layout.rs", &pack::declarations());
-        for name in SHARED {
-            source.append(name, self.text(name));
-        }
+        self.append(&mut source, SHARED);
         source
     }
 
@@ -190,24 +164,30 @@ impl Shaders {
     /// [`Shaders::compose`] where `texels` is the text of the function that reads texels from several buffers.
     pub fn compose_with_texels(&self, kernel: &Kernel, baked: Option<&str>, texels: Option<&str>) -> Source {
         let mut source = Source::default();
-        source.append(ROUNDING, self.text(ROUNDING));
+        self.append(&mut source, ROUNDING_FILE);
         source.extend(&self.shared());
         source.append("src/pack/specialization.rs", &Specialization::declarations());
-        for name in kernel.files.iter().copied().flatten().chain([&kernel.file]) {
-            source.append(name, self.text(name));
+        for files in kernel.files {
+            self.append(&mut source, files);
         }
         match baked {
             Some(text) => source.append("(the scene as constants)", text),
             None => {
-                source.append(FROM_BUFFERS, self.text(FROM_BUFFERS));
+                self.append(&mut source, FROM_BUFFERS);
                 source.append("(the tables of records)", &tables());
             }
         }
         match texels {
             Some(text) => source.append("(the texels' buffers)", text),
-            None => source.append(TEXELS, self.text(TEXELS)),
+            None => self.append(&mut source, TEXELS),
         }
         source
+    }
+
+    fn append(&self, source: &mut Source, files: &[File]) {
+        for (name, _) in files {
+            source.append(name, self.text(name));
+        }
     }
 
     /// The text of a file.

@@ -135,7 +135,7 @@ impl Sides<'_> {
                     (None, Some(other)) => format!("the entry point must be called `{name}`, not `{other}`"),
                     (None, None) => format!("there is no entry point: {attributes} fn {name}"),
                 };
-                let file = self.source.start_of(self.kernel.file);
+                let file = self.source.start_of(self.kernel.file());
                 let file = file.map(|start| Span::from(start..start + 1));
                 (place(name).or_else(|| place(other?)).or(file), message)
             }

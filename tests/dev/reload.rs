@@ -4,7 +4,7 @@ use std::fs;
 use std::time::Duration;
 
 use wgray::dev::{Command, Move};
-use wgray::gpu::compose::{BUILT_IN, Shaders};
+use wgray::gpu::compose::Shaders;
 
 use super::running::{Files, KERNEL, RADIANCE, SCENE, SETTLED};
 

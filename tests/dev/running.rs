@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use wgray::dev::{Content, Diagnostic, Frame, Session, Settings, Sources, State};
 use wgray::film::Region;
-use wgray::gpu::compose::{BUILT_IN, Shaders};
+use wgray::gpu::compose::{Shaders, built_in};
 use wgray::gpu::{Choice, Gpu, Options, choose};
 use wgray::image::Pixels;
 use wgray::job::{self, Cut};
@@ -84,7 +84,7 @@ impl Files {
 
     /// All shaders as they are in the program.
     pub fn write_shaders(&self) {
-        for (name, text) in BUILT_IN {
+        for (name, text) in built_in() {
             let file = self.path(&format!("shaders/{name}"));
             fs::create_dir_all(file.parent().unwrap()).unwrap();
             fs::write(file, text).unwrap();
