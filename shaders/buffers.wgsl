@@ -25,6 +25,9 @@ fn closest_hit(ray: Ray, left: u32, wall: u32) -> Hit {
     if (PRIMITIVES & (1u << PLANE)) != 0u {
         hit = closest_of(PLANE, hit, ray, left, wall);
     }
+    if (PRIMITIVES & (1u << DISK)) != 0u {
+        hit = closest_of(DISK, hit, ray, left, wall);
+    }
     return hit;
 }
 
@@ -54,6 +57,9 @@ fn hidden_samples(surface: Surface, light: Light, block: Block) -> u32 {
     }
     if (SHADOW_CASTERS & (1u << PLANE)) != 0u {
         bits |= hidden_by(PLANE, counts.primitives[PLANE].xy, surface, cone, light, block);
+    }
+    if (SHADOW_CASTERS & (1u << DISK)) != 0u {
+        bits |= hidden_by(DISK, counts.primitives[DISK].xy, surface, cone, light, block);
     }
     return bits;
 }

@@ -13,6 +13,9 @@ fn intersect(kind: u32, q: Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
     if kind == ELLIPSOID {
         return intersect_ellipsoid(q, wall, ray, limit);
     }
+    if kind == DISK {
+        return intersect_disk(q, ray, limit);
+    }
     return intersect_plane(q, ray, limit);
 }
 
@@ -28,12 +31,20 @@ fn blocks(kind: u32, o: vec3f, d: vec3f, start: f32, reach: f32) -> bool {
     if kind == ELLIPSOID {
         return ellipsoid_blocks(o, d, start, reach);
     }
+    if kind == DISK {
+        return disk_blocks(o, d, reach);
+    }
     return plane_blocks(o, d, reach);
 }
 
 // Whether it has an inside, and is met again by a ray that leaves it through that.
 fn is_round(kind: u32) -> bool {
     return kind == ELLIPSOID;
+}
+
+// Whether its local space goes from -1 to 1 where its texture coordinates go from 0 to 1.
+fn is_centered(kind: u32) -> bool {
+    return (kind == RECTANGLE) | (kind == DISK);
 }
 
 // The gradient, at a point of local space, of what is 0 on a primitive: of z, or of (x^2 + y^2 + z^2 - 1) / 2.
@@ -46,11 +57,11 @@ fn primitive_normal(q: Primitive, local: vec3f) -> vec3f {
     return normalize(primitive_gradient(q, local));
 }
 
-// Texture coordinates of a point of local space. Rectangle: 0 to 1 along tangent and bitangent. Triangle: barycentric
+// Texture coordinates of a point of local space. Rectangle and disk: 0 to 1 along tangent and bitangent. Triangle: barycentric
 // coordinates of the second and third vertex. Plane: lengths along tangent and bitangent. Ellipsoid: longitude from
 // the first towards the second axis and latitude from the third axis' foot, each from 0 to 1.
 fn primitive_uv(q: Primitive, local: vec3f) -> vec2f {
-    if q.kind == RECTANGLE {
+    if is_centered(q.kind) {
         return vec2f(0.5 * local.x + 0.5, 0.5 * local.y + 0.5);
     }
     if q.kind == ELLIPSOID {
@@ -63,7 +74,7 @@ fn primitive_uv(q: Primitive, local: vec3f) -> vec2f {
 
 // Of `primitive_uv`, where the local point has the derivative d.
 fn uv_derivative(q: Primitive, local: vec3f, d: vec3f) -> vec2f {
-    if q.kind == RECTANGLE {
+    if is_centered(q.kind) {
         return d.xy * 0.5;
     }
     if q.kind == ELLIPSOID {
@@ -90,6 +101,6 @@ fn local_tangents(q: Primitive, local: vec3f) -> Tangents {
         let v = vec3f(-local.z * local.x / r, -local.z * local.y / r, r) * 3.141592653589793;
         return Tangents(u, v);
     }
-    let scale = select(1.0, 2.0, q.kind == RECTANGLE);
+    let scale = select(1.0, 2.0, is_centered(q.kind));
     return Tangents(vec3f(scale, 0.0, 0.0), vec3f(0.0, scale, 0.0));
 }

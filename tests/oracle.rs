@@ -4,8 +4,8 @@
 
 use glam::{DMat4, DVec2, DVec3, DVec4, Vec2Swizzles};
 use wgray::scene::{
-    CameraDescription, ColorDescription, Description, LightDescription, MaterialDescription, PhongDescription, Shadows,
-    ShapeDescription, TextureDescription,
+    CameraDescription, ColorDescription, Description, DiskDescription, LightDescription, MaterialDescription,
+    PhongDescription, Shadows, ShapeDescription, TextureDescription,
 };
 
 /// A mistake that the tests of the tests make on purpose.
@@ -52,12 +52,14 @@ enum Form {
         from_local: DMat4,
     },
     Triangle([DVec3; 3]),
-    /// Centre, unit tangent and bitangent, and half the sizes along them; endless if there are no sizes.
+    /// Centre, unit tangent and bitangent, and half the sizes along them; endless if there are no sizes; `round` if only
+    /// what is no farther from the centre than that.
     Flat {
         center: DVec3,
         tangent: DVec3,
         bitangent: DVec3,
         half: Option<DVec2>,
+        round: bool,
     },
 }
 
@@ -389,6 +391,20 @@ fn flat(center: DVec3, normal: DVec3, tangent: DVec3, size: Option<[f64; 2]>, fl
         tangent,
         bitangent,
         half,
+        round: false,
+    }
+}
+
+/// A disk; its u goes along x, or y where x is nearly its normal, unless the scene says otherwise.
+fn disk(d: &DiskDescription) -> Form {
+    let across = d.normal.normalize().x.abs() >= 0.9;
+    let (tangent, bitangent) = frame(d.normal, d.tangent.unwrap_or(if across { DVec3::Y } else { DVec3::X }));
+    Form::Flat {
+        center: d.center,
+        tangent,
+        bitangent,
+        half: Some(DVec2::splat(d.radius)),
+        round: true,
     }
 }
 
@@ -410,6 +426,7 @@ fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
             r.material.clone(),
             vec![flat(r.center, r.normal, r.tangent, Some(r.size), flaw)],
         ),
+        ShapeDescription::Disk(d) => (d.material.clone(), vec![disk(d)]),
         ShapeDescription::Plane(p) => (p.material.clone(), vec![flat(p.point, p.normal, p.tangent, None, flaw)]),
         ShapeDescription::Ellipsoid(e) => (e.material.clone(), vec![quadric(e.center, [e.a, e.b, e.c])]),
         ShapeDescription::Sphere(s) => {
@@ -464,12 +481,15 @@ fn crossings(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
             tangent,
             bitangent,
             half,
+            round,
         } => {
             let normal = tangent.cross(*bitangent);
             let t = (*center - origin).dot(normal) / direction.dot(normal);
             let place = origin + direction * t - *center;
-            let inside =
-                half.is_none_or(|half| place.dot(*tangent).abs() <= half.x && place.dot(*bitangent).abs() <= half.y);
+            let inside = half.is_none_or(|half| match round {
+                true => place.length() <= half.x,
+                false => place.dot(*tangent).abs() <= half.x && place.dot(*bitangent).abs() <= half.y,
+            });
             if inside && t.is_finite() { vec![t] } else { Vec::new() }
         }
     }

@@ -11,6 +11,7 @@ use wgray::cpu::differential::{
     Arrival, Derivative, Differential, arrival, normal_derivative, reflected_derivative, reflected_differential,
     refracted_derivative, refracted_differential, transferred,
 };
+use wgray::cpu::disk::{disk_blocks, intersect_disk};
 use wgray::cpu::ellipsoid::{ellipsoid_blocks, ellipsoid_discriminant, ellipsoid_level, intersect_ellipsoid};
 use wgray::cpu::filter::{filter_bin, filter_offset};
 use wgray::cpu::footprint::{Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint};
@@ -27,8 +28,8 @@ use wgray::cpu::pattern::{
 use wgray::cpu::phong::{Lobes, phong_block, phong_lobes, phong_power};
 use wgray::cpu::plane::{intersect_plane, plane_blocks};
 use wgray::cpu::primitive::{
-    Tangents, blocks, intersect, is_round, local_tangents, primitive_gradient, primitive_normal, primitive_uv,
-    uv_derivative,
+    Tangents, blocks, intersect, is_centered, is_round, local_tangents, primitive_gradient, primitive_normal,
+    primitive_uv, uv_derivative,
 };
 use wgray::cpu::ray::{
     Hit, Ray, closer, crosses_plane, plane_distance, point_to_local, scaled_crossing, vector_to_local, vector_to_world,
@@ -132,6 +133,8 @@ probes! {
     closer(hit: Hit, t: f32, i: u32, left: u32) -> Hit;
     intersect_rectangle(q: &Primitive, ray: Ray, limit: f32) -> f32;
     rectangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
+    intersect_disk(q: &Primitive, ray: Ray, limit: f32) -> f32;
+    disk_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
     intersect_triangle(q: &Primitive, ray: Ray, limit: f32) -> f32;
     triangle_blocks(o: Vec3, d: Vec3, reach: f32) -> bool;
     ellipsoid_level(q: &Primitive, from_anchor: Vec3) -> f32;
@@ -148,6 +151,7 @@ probes! {
     with_coordinates(surface: Surface, q: &Primitive) -> Surface;
     intersect(kind: u32, q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32;
     is_round(kind: u32) -> bool;
+    is_centered(kind: u32) -> bool;
     primitive_uv(q: &Primitive, local: Vec3) -> Vec2;
     first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit;
     segments_to_light(light: &Light, p: Vec3) -> Segments;

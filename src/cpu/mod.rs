@@ -7,6 +7,7 @@
 pub mod adaptive;
 pub mod camera;
 pub mod differential;
+pub mod disk;
 pub mod ellipsoid;
 pub mod filter;
 pub mod footprint;

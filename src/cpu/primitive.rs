@@ -4,13 +4,14 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::{Vec2, Vec3};
 
+use super::disk::{disk_blocks, intersect_disk};
 use super::ellipsoid::{ellipsoid_blocks, intersect_ellipsoid};
 use super::math::{atan2, max, normalize};
 use super::plane::{intersect_plane, plane_blocks};
 use super::ray::Ray;
 use super::rectangle::{intersect_rectangle, rectangle_blocks};
 use super::triangle::{intersect_triangle, triangle_blocks};
-use crate::pack::{ELLIPSOID, Primitive, RECTANGLE, TRIANGLE};
+use crate::pack::{DISK, ELLIPSOID, Primitive, RECTANGLE, TRIANGLE};
 
 #[inline(always)] // compiled for each kind
 pub fn intersect(kind: u32, q: &Primitive, wall: bool, ray: Ray, limit: f32) -> f32 {
@@ -22,6 +23,9 @@ pub fn intersect(kind: u32, q: &Primitive, wall: bool, ray: Ray, limit: f32) -> 
     }
     if kind == ELLIPSOID {
         return intersect_ellipsoid(q, wall, ray, limit);
+    }
+    if kind == DISK {
+        return intersect_disk(q, ray, limit);
     }
     intersect_plane(q, ray, limit)
 }
@@ -37,11 +41,18 @@ pub fn blocks(kind: u32, o: Vec3, d: Vec3, start: f32, reach: f32) -> bool {
     if kind == ELLIPSOID {
         return ellipsoid_blocks(o, d, start, reach);
     }
+    if kind == DISK {
+        return disk_blocks(o, d, reach);
+    }
     plane_blocks(o, d, reach)
 }
 
 pub fn is_round(kind: u32) -> bool {
     kind == ELLIPSOID
+}
+
+pub fn is_centered(kind: u32) -> bool {
+    (kind == RECTANGLE) | (kind == DISK)
 }
 
 pub fn primitive_gradient(q: &Primitive, local: Vec3) -> Vec3 {
@@ -54,7 +65,7 @@ pub fn primitive_normal(q: &Primitive, local: Vec3) -> Vec3 {
 }
 
 pub fn primitive_uv(q: &Primitive, local: Vec3) -> Vec2 {
-    if q.kind == RECTANGLE {
+    if is_centered(q.kind) {
         return Vec2::new(0.5 * local.x + 0.5, 0.5 * local.y + 0.5);
     }
     if q.kind == ELLIPSOID {
@@ -66,7 +77,7 @@ pub fn primitive_uv(q: &Primitive, local: Vec3) -> Vec2 {
 }
 
 pub fn uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2 {
-    if q.kind == RECTANGLE {
+    if is_centered(q.kind) {
         return Vec2::new(d.x, d.y) * 0.5;
     }
     if q.kind == ELLIPSOID {
@@ -92,7 +103,7 @@ pub fn local_tangents(q: &Primitive, local: Vec3) -> Tangents {
         let v = Vec3::new(-local.z * local.x / r, -local.z * local.y / r, r) * PI;
         return Tangents { u, v };
     }
-    let scale = if q.kind == RECTANGLE { 2.0 } else { 1.0 };
+    let scale = if is_centered(q.kind) { 2.0 } else { 1.0 };
     Tangents {
         u: Vec3::new(scale, 0.0, 0.0),
         v: Vec3::new(0.0, scale, 0.0),

@@ -6,7 +6,7 @@ use super::primitive::intersect;
 use super::ray::{Hit, Ray, closer};
 use super::shadow::{Block, Cone, cone_to_light, may_block, shadow_bits};
 use super::surface::Surface;
-use crate::pack::{ELLIPSOID, FAR, Light, NOTHING, PLANE, Packed, RECTANGLE, TRIANGLE};
+use crate::pack::{DISK, ELLIPSOID, FAR, Light, NOTHING, PLANE, Packed, RECTANGLE, TRIANGLE};
 
 /// Calls a function with each kind of primitives as a constant, so that it is compiled for each.
 macro_rules! for_each_kind {
@@ -16,7 +16,8 @@ macro_rules! for_each_kind {
                 RECTANGLE => for_each_kind!(@ RECTANGLE, $kind, $body),
                 TRIANGLE => for_each_kind!(@ TRIANGLE, $kind, $body),
                 ELLIPSOID => for_each_kind!(@ ELLIPSOID, $kind, $body),
-                _ => for_each_kind!(@ PLANE, $kind, $body),
+                PLANE => for_each_kind!(@ PLANE, $kind, $body),
+                _ => for_each_kind!(@ DISK, $kind, $body),
             }
         }
     };

@@ -31,6 +31,7 @@ pub static SHARED: &[File] = files![
     "triangle.wgsl",
     "ellipsoid.wgsl",
     "plane.wgsl",
+    "disk.wgsl",
     "primitive.wgsl",
     "camera.wgsl",
     "surface.wgsl",

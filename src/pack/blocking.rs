@@ -119,7 +119,7 @@ impl Extent for Places<'_> {
 
     fn normal(&self, i: usize) -> DVec3 {
         match self.0.shapes.get(i).map(|shape| &shape.geometry) {
-            Some(Geometry::Rectangle(rectangle)) => rectangle.u.cross(rectangle.v),
+            Some(Geometry::Rectangle(shape) | Geometry::Disk(shape)) => shape.u.cross(shape.v),
             Some(Geometry::Triangles(triangles)) => match triangles.first() {
                 Some([v0, v1, v2]) => (v1 - v0).cross(v2 - v0),
                 None => DVec3::ZERO,
@@ -155,6 +155,12 @@ fn each_place(scene: &Scene, i: usize, normal: DVec3, mut point: impl FnMut(DVec
     };
     match scene.shapes.get(i).map(|shape| &shape.geometry) {
         Some(Geometry::Rectangle(rectangle)) => parallelogram(rectangle),
+        Some(Geometry::Disk(disk)) => {
+            let (a, b) = (disk.u.dot(normal), disk.v.dot(normal));
+            let half = (a * a + b * b).sqrt();
+            point(disk.center + normal * half);
+            point(disk.center - normal * half);
+        }
         Some(Geometry::Ellipsoid { center, axes }) => {
             let half = axes
                 .map(|axis| axis.dot(normal))

@@ -1,8 +1,8 @@
 //! Spheres around primitives.
 
-use glam::{DMat3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 
-use super::{ELLIPSOID, Primitive, RECTANGLE, Sphere, TRIANGLE};
+use super::{DISK, ELLIPSOID, Primitive, RECTANGLE, Sphere, TRIANGLE};
 
 /// Room for the rounding of the records, relative to the radius.
 const EXTRA: f64 = 1.0 + 1e-5;
@@ -23,6 +23,7 @@ pub fn sphere(primitive: &Primitive) -> Sphere {
             )
         }
         ELLIPSOID => (center, largest_stretch(axes)),
+        DISK => (center, largest_stretch(DMat3::from_cols(a, b, DVec3::ZERO))),
         _ => (center, UNBOUNDED),
     };
     Sphere {

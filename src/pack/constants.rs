@@ -22,8 +22,10 @@ constants! {
     /// [`Primitive::kind`]: z = 0 in local space.
     pub const PLANE: u32 = 3;
 
+    /// [`Primitive::kind`]: x² + y² <= 1, z = 0 in local space.
+    pub const DISK: u32 = 4;
     /// How many kinds of primitives there are.
-    pub const KINDS: u32 = 4;
+    pub const KINDS: u32 = 5;
 
     /// [`Material::kind`]: Phong's reflection model.
     pub const PHONG: u32 = 0;

@@ -328,6 +328,7 @@ fn pack_shapes(scene: &Scene) -> Vec<Primitive> {
             Geometry::Rectangle(rectangle) => {
                 primitives.push(parallelogram(RECTANGLE, rectangle, material, number));
             }
+            Geometry::Disk(disk) => primitives.push(parallelogram(DISK, disk, material, number)),
             Geometry::Ellipsoid { center, axes } => {
                 let [a, b, c] = *axes;
                 primitives.push(primitive(

@@ -29,7 +29,7 @@ pub fn seen_from(scene: &Scene, origin: DVec3) -> Cow<'_, Scene> {
     }
     for shape in &mut scene.shapes {
         match &mut shape.geometry {
-            Geometry::Rectangle(rectangle) => rectangle.center -= origin,
+            Geometry::Rectangle(shape) | Geometry::Disk(shape) => shape.center -= origin,
             Geometry::Ellipsoid { center, .. } => *center -= origin,
             Geometry::Triangles(triangles) => triangles.iter_mut().flatten().for_each(|v| *v -= origin),
             Geometry::Plane { point, .. } => *point -= origin,

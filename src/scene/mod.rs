@@ -260,6 +260,8 @@ pub struct Shape {
 pub enum Geometry {
     /// A rectangle; its normal is u x v.
     Rectangle(Parallelogram),
+    /// A disk: of the points of a parallelogram those with x² + y² <= 1; its normal is u x v.
+    Disk(Parallelogram),
     /// An ellipsoid (a sphere among them): the points `center + x a + y b + z c` with x² + y² + z² = 1.
     Ellipsoid {
         /// The middle.

@@ -142,6 +142,17 @@ fn shape() -> impl Strategy<Value = ShapeDescription> {
             })
         },
     );
+    let disk = (material.clone(), point(), frame(), length(), any::<bool>()).prop_map(
+        |(material, center, [normal, tangent], radius, turned)| {
+            ShapeDescription::Disk(DiskDescription {
+                material,
+                center,
+                radius,
+                normal,
+                tangent: turned.then_some(tangent),
+            })
+        },
+    );
     let sphere = (material.clone(), point(), length()).prop_map(|(material, center, radius)| {
         ShapeDescription::Sphere(SphereDescription {
             material,
@@ -180,6 +191,7 @@ fn shape() -> impl Strategy<Value = ShapeDescription> {
     });
     prop_oneof![
         2 => rectangle,
+        1 => disk,
         2 => sphere,
         2 => ellipsoid,
         1 => triangle,

@@ -11,6 +11,8 @@ tagged! {
     ShapeDescription {
         /// A rectangle.
         "rectangle" => Rectangle(RectangleDescription),
+        /// A disk.
+        "disk" => Disk(DiskDescription),
         /// An ellipsoid by its half axes.
         "ellipsoid" => Ellipsoid(EllipsoidDescription),
         /// A sphere.
@@ -38,6 +40,23 @@ pub struct RectangleDescription {
     pub normal: DVec3,
     /// Along the first edge; any length.
     pub tangent: DVec3,
+}
+
+/// A disk.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct DiskDescription {
+    /// Name of its material.
+    pub material: String,
+    /// The middle.
+    pub center: DVec3,
+    /// Its radius.
+    pub radius: f64,
+    /// Perpendicular to the disk; any length.
+    pub normal: DVec3,
+    /// Direction of the texture coordinate u; any length. If absent, x, or y where the normal is nearly along x.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tangent: Option<DVec3>,
 }
 
 /// An ellipsoid: the image of the unit sphere under the linear map with the columns a, b, c.

@@ -1,0 +1,16 @@
+// The disk: x^2 + y^2 <= 1, z = 0 in local space.
+
+// The distance of the hit if it lies in (0, limit), else `limit`.
+fn intersect_disk(q: Primitive, ray: Ray, limit: f32) -> f32 {
+    let t = plane_distance(q, ray);
+    let p = ray.origin + ray.direction * t - q.anchor;
+    let x = dot(q.x, p);
+    let y = dot(q.y, p);
+    return select(limit, t, (t > 0.0) & (t < limit) & (x * x + y * y <= 1.0));
+}
+
+// Whether it cuts the segment o + s d, s in (0, reach), of local space.
+fn disk_blocks(o: vec3f, d: vec3f, reach: f32) -> bool {
+    let p = scaled_crossing(o, d);
+    return crosses_plane(o, d, reach) & (p.x * p.x + p.y * p.y <= d.z * d.z);
+}

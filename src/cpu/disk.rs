@@ -1,0 +1,63 @@
+//! Twin of `shaders/disk.wgsl`: x² + y² <= 1, z = 0 in local space.
+
+use glam::Vec3;
+
+use super::math::dot;
+use super::ray::{Ray, crosses_plane, plane_distance, scaled_crossing};
+use crate::pack::Primitive;
+
+pub fn intersect_disk(q: &Primitive, ray: Ray, limit: f32) -> f32 {
+    let t = plane_distance(q, ray);
+    let p = ray.origin + ray.direction * t - q.anchor;
+    let x = dot(q.x, p);
+    let y = dot(q.y, p);
+    if (t > 0.0) & (t < limit) & (x * x + y * y <= 1.0) {
+        t
+    } else {
+        limit
+    }
+}
+
+pub fn disk_blocks(o: Vec3, d: Vec3, reach: f32) -> bool {
+    let p = scaled_crossing(o, d);
+    crosses_plane(o, d, reach) & (p.x * p.x + p.y * p.y <= d.z * d.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DMat3, DVec3};
+
+    use super::*;
+    use crate::pack::{DISK, FAR, primitive};
+
+    /// Of radius 2 around (1, 1, 3), seen from above.
+    fn from_above(x: f32, y: f32) -> f32 {
+        let columns = DMat3::from_cols(DVec3::X * 2.0, DVec3::Y * 2.0, DVec3::Z);
+        let disk = primitive(DISK, DVec3::new(1.0, 1.0, 3.0), columns, 0, 0);
+        let ray = Ray {
+            origin: Vec3::new(x, y, 5.0),
+            direction: Vec3::NEG_Z,
+        };
+        intersect_disk(&disk, ray, FAR)
+    }
+
+    #[test]
+    fn hits_are_inside_the_circle() {
+        for (x, y) in [(1.0, 1.0), (2.99, 1.0), (1.0, -0.99), (2.41, 2.41)] {
+            assert_eq!(from_above(x, y), 2.0, "{x} {y}");
+        }
+        for (x, y) in [(3.01, 1.0), (1.0, -1.01), (2.42, 2.42), (-0.9, -0.9)] {
+            assert_eq!(from_above(x, y), FAR, "{x} {y}");
+        }
+    }
+
+    #[test]
+    fn segments_are_blocked_where_they_cross() {
+        let blocks = |x: f32, y: f32, reach| disk_blocks(Vec3::new(x, y, 1.0), Vec3::new(0.0, 0.0, -3.0), reach);
+        assert!(blocks(0.0, 0.0, 1.0) && blocks(0.7, -0.7, 1.0) && blocks(-1.0, 0.0, 1.0));
+        assert!(!blocks(0.72, 0.72, 1.0) && !blocks(1.01, 0.0, 1.0));
+        assert!(!blocks(0.0, 0.0, 0.3), "ends before");
+        let slanted = |x: f32| disk_blocks(Vec3::new(x, 0.0, 1.0), Vec3::new(2.0, 0.0, -2.0), 1.0);
+        assert!(slanted(-0.1) && !slanted(0.1), "crosses at x + 1");
+    }
+}
