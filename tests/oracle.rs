@@ -524,6 +524,7 @@ fn facing(form: &Form, point: DVec3) -> (DVec3, DVec2) {
             tangent,
             bitangent,
             half,
+            ..
         } => {
             let place = DVec2::new((point - *center).dot(*tangent), (point - *center).dot(*bitangent));
             let uv = half.map_or(place, |half| place / (2.0 * half) + 0.5);
