@@ -126,3 +126,17 @@ fn known_differences_that_no_longer_apply_or_have_grown_fail() {
         assert!(judge(entry, what, 0.0).is_ok());
     }
 }
+
+/// What the drivers can be asked for is told by them, so that a question that goes wrong is not taken for "nothing".
+#[test]
+fn software_vulkan_can_be_asked_for_float_controls() {
+    let Some(device) = device().filter(|device| bit_exact(device)) else {
+        return;
+    };
+    let controls = device.info.float_controls;
+    assert!(controls.signed_zeros, "{controls:?}");
+    assert!(
+        controls.rounding || !device.info.name.contains("llvmpipe"),
+        "{controls:?}"
+    );
+}

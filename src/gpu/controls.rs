@@ -50,11 +50,16 @@ impl FloatControls {
                 .raw_instance()
                 .get_physical_device_properties2(vulkan.raw_physical_device(), &mut properties);
         }
+        // Lavapipe of Mesa 22.3.6 makes finite numbers of infinities and NaN once it is asked to keep them, and keeps them
+        // unasked.
+        let lavapipe = vulkan
+            .physical_device_capabilities()
+            .is_driver(vk::DriverId::MESA_LLVMPIPE);
         // Without independence the widths of floats must all be asked for the same, and kernels ask for 32 bits alone.
         let alone = |independence| independence != vk::ShaderFloatControlsIndependence::NONE;
         FloatControls {
             rounding: found.shader_rounding_mode_rte_float32 == vk::TRUE && alone(found.rounding_mode_independence),
-            signed_zeros: found.shader_signed_zero_inf_nan_preserve_float32 == vk::TRUE,
+            signed_zeros: found.shader_signed_zero_inf_nan_preserve_float32 == vk::TRUE && !lavapipe,
             denormals: found.shader_denorm_preserve_float32 == vk::TRUE && alone(found.denorm_behavior_independence),
         }
     }
