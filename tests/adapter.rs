@@ -51,7 +51,7 @@ pub fn bit_exact(device: &Device) -> bool {
 pub struct Known {
     /// Part of the adapter's name or driver.
     pub adapter: &'static str,
-    /// Which check: the name of a shared function, or `picture`.
+    /// Which check: the name of a shared function, `denormal numbers` of all of them, `picture` or `first hits`.
     pub what: &'static str,
     /// Why.
     pub reason: &'static str,
@@ -60,7 +60,26 @@ pub struct Known {
 }
 
 /// All of them.
-pub const KNOWN: &[Known] = &[];
+pub const KNOWN: &[Known] = &[
+    swiftshader("denormal numbers", "zero taken for denormal numbers", 0.009),
+    swiftshader("grid_sample", ROUNDED_TWICE, 0.0008),
+    swiftshader("rotated_grid_sample", ROUNDED_TWICE, 0.0005),
+    swiftshader("jittered_sample", ROUNDED_TWICE, 0.0065),
+    swiftshader("sample_square", ROUNDED_TWICE, 0.0005),
+    swiftshader("filter_offset", ROUNDED_TWICE, 0.0093),
+];
+
+/// An integer that is made a float in two steps, each of which rounds. No picture has an index as large.
+const ROUNDED_TWICE: &str = "unsigned integers from 2^31 on, which are rounded twice";
+
+const fn swiftshader(what: &'static str, reason: &'static str, share: f64) -> Known {
+    Known {
+        adapter: "SwiftShader",
+        what,
+        reason,
+        share,
+    }
+}
 
 /// What the table allows a check on this device.
 pub fn allowed<'a>(known: &'a [Known], name: &str, driver: &str, what: &str) -> Option<&'a Known> {
@@ -105,5 +124,19 @@ fn known_differences_that_no_longer_apply_or_have_grown_fail() {
         assert!(entry.is_none());
         assert!(judge(entry, what, 1e-6).is_err(), "an unknown difference");
         assert!(judge(entry, what, 0.0).is_ok());
+    }
+}
+
+/// What the drivers can be asked for is told by them, so that a question that goes wrong is not taken for "nothing".
+#[test]
+fn software_vulkan_can_be_asked_for_float_controls() {
+    let Some(device) = device().filter(|device| bit_exact(device)) else {
+        return;
+    };
+    let controls = device.info.float_controls;
+    if device.info.name.contains("llvmpipe") {
+        assert!(controls.rounding && !controls.signed_zeros, "{controls:?}");
+    } else if device.info.name.contains("SwiftShader") {
+        assert!(controls.signed_zeros, "{controls:?}");
     }
 }

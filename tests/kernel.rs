@@ -196,7 +196,7 @@ fn run(device: &Device, source: &Source, rounding: Rounding, input: &[u32], call
         check(source).unwrap_or_else(|error| panic!("{error}\n{}", error.excerpt.clone().unwrap_or_default()));
     let module = if device.info.exact {
         let spirv = checked
-            .exact_entry("probe", &[], rounding)
+            .exact_entry("probe", &[], rounding, device.info.float_controls)
             .expect("SPIR-V of a kernel that naga accepts");
         let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
             entry_points: vec![wgpu::PassthroughShaderEntryPoint {

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use wgray::gpu::compose::{KERNELS, Kernel, RENDER, SHARED, Source, built_in};
 use wgray::gpu::spirv::instructions;
-use wgray::gpu::{Rounding, bake, check};
+use wgray::gpu::{FloatControls, Rounding, bake, check};
 use wgray::pack::Packed;
 
 use crate::scenes;
@@ -243,7 +243,7 @@ fn spirv(source: &Source, kernel: &Kernel, packed: &Packed, rounding: Rounding) 
     let checked =
         check(source).unwrap_or_else(|error| panic!("{error}\n{}", error.excerpt.clone().unwrap_or_default()));
     checked
-        .exact_spirv(kernel, &packed.specialization, rounding)
+        .exact_spirv(kernel, &packed.specialization, rounding, FloatControls::ALL)
         .expect("a kernel")
 }
 

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use wgray::gpu::{self, Info};
+use wgray::gpu::{self, FloatControls, Info};
 
 pub fn run() -> ExitCode {
     super::ended(list(&gpu::adapters()), ExitCode::SUCCESS)
@@ -18,6 +18,7 @@ fn list(adapters: &[Info]) -> io::Result<()> {
             backend,
             kind,
             exact,
+            float_controls,
             largest_binding,
             storage_buffers,
             largest_buffer,
@@ -34,6 +35,9 @@ fn list(adapters: &[Info]) -> io::Result<()> {
                 "as the driver likes it"
             }
         )?;
+        if *exact {
+            writeln!(out, "    float controls  {}", names(*float_controls))?;
+        }
         writeln!(out, "    largest binding {}", mebibytes(*largest_binding))?;
         writeln!(out, "    buffers         {storage_buffers} in a shader")?;
         writeln!(out, "    largest buffer  {}", mebibytes(*largest_buffer))?;
@@ -47,6 +51,26 @@ fn list(adapters: &[Info]) -> io::Result<()> {
         writeln!(out, "{}", gpu::HOW_TO_GET_VULKAN)?;
     }
     Ok(())
+}
+
+/// What a device's arithmetic is asked to keep to, in words.
+fn names(controls: FloatControls) -> String {
+    let FloatControls {
+        rounding,
+        signed_zeros,
+        denormals,
+    } = controls;
+    let all = [
+        (rounding, "rounding to nearest"),
+        (signed_zeros, "signed zeros"),
+        (denormals, "denormals"),
+    ];
+    let names: Vec<&str> = all.iter().filter(|(has, _)| *has).map(|(_, name)| *name).collect();
+    if names.is_empty() {
+        "none".to_owned()
+    } else {
+        names.join(", ")
+    }
 }
 
 fn mebibytes(bytes: u64) -> String {

@@ -7,6 +7,7 @@ use naga::valid::{Capabilities, GlobalUse, ModuleInfo, ValidationError, Validati
 use naga::{GlobalVariable, Handle, Module, Span, WithSpan};
 
 use super::compose::{Kernel, ROUNDING, Source};
+use super::controls::FloatControls;
 use super::prune::prune;
 use super::rounding::{Rounding, round_in_software};
 use super::spirv;
@@ -65,8 +66,9 @@ impl Checked {
         kernel: &Kernel,
         constants: &Specialization,
         rounding: Rounding,
+        controls: FloatControls,
     ) -> Result<Vec<u32>, ShaderError> {
-        self.exact_entry(kernel.entry_point, &constants.constants(), rounding)
+        self.exact_entry(kernel.entry_point, &constants.constants(), rounding, controls)
     }
 
     /// The same for any compute entry point, with the values of its overrides.
@@ -75,6 +77,7 @@ impl Checked {
         entry: &str,
         constants: &[(&str, u32)],
         rounding: Rounding,
+        controls: FloatControls,
     ) -> Result<Vec<u32>, ShaderError> {
         let rounded = match rounding {
             Rounding::Device => None,
@@ -110,7 +113,7 @@ impl Checked {
         };
         let words = spv::write_vec(&module, &info, &options, Some(&pipeline))
             .map_err(|error| ShaderError::other("SPIR-V", &error))?;
-        Ok(spirv::forbid_contraction(&words))
+        Ok(spirv::ask_for(controls, &spirv::forbid_contraction(&words)))
     }
 
     /// The same kernel with quotients and square roots by `shaders/rounding.wgsl`.

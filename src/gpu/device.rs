@@ -4,6 +4,7 @@ use bytemuck::{Pod, bytes_of, cast_slice};
 use wgpu::util::DeviceExt;
 use wgpu::{Backends, BufferUsages, DeviceType};
 
+use super::controls::FloatControls;
 use crate::error::RenderError;
 
 /// What to do where there is no adapter.
@@ -35,6 +36,8 @@ pub struct Info {
     pub kind: &'static str,
     /// Whether shaders run on it exactly as they are written.
     pub exact: bool,
+    /// What its arithmetic is asked to keep to where they do.
+    pub float_controls: FloatControls,
     /// The largest storage buffer that a shader can see, in bytes.
     pub largest_binding: u64,
     /// The largest buffer, in bytes.
@@ -122,14 +125,26 @@ fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, String> {
 fn enumerate() -> Vec<wgpu::Adapter> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
     let mut adapters = pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY));
-    adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
+    adapters.sort_by_key(|adapter| preference(&adapter.get_info()));
+    adapters
+}
+
+/// The place of an adapter among others: the least is the best. Of software Vulkan lavapipe is the first, many times
+/// faster than SwiftShader. Other adapters of one type stay in the order that the system has them in.
+fn preference(info: &wgpu::AdapterInfo) -> (u8, bool) {
+    let kind = match info.device_type {
         DeviceType::DiscreteGpu => 0,
         DeviceType::IntegratedGpu => 1,
         DeviceType::VirtualGpu => 2,
         DeviceType::Other => 3,
         DeviceType::Cpu => 4,
-    });
-    adapters
+    };
+    (kind, !is_lavapipe(&info.name))
+}
+
+/// Mesa's software Vulkan calls itself llvmpipe.
+fn is_lavapipe(name: &str) -> bool {
+    name.starts_with("llvmpipe")
 }
 
 fn info(adapter: &wgpu::Adapter) -> Info {
@@ -146,6 +161,7 @@ fn info(adapter: &wgpu::Adapter) -> Info {
         },
         exact: adapter.features().contains(wgpu::Features::PASSTHROUGH_SHADERS)
             && info.backend == wgpu::Backend::Vulkan,
+        float_controls: FloatControls::of(adapter),
         largest_binding: limits.max_storage_buffer_binding_size,
         largest_buffer: limits.max_buffer_size,
         storage_buffers: limits.max_storage_buffers_per_shader_stage,
@@ -153,14 +169,10 @@ fn info(adapter: &wgpu::Adapter) -> Info {
     }
 }
 
-/// Whether a name that a person types means this adapter. Mesa's software Vulkan calls itself llvmpipe.
+/// Whether a name that a person types means this adapter.
 fn matches(info: &Info, name: &str) -> bool {
     let name = name.to_lowercase();
-    let lavapipe = if info.name.starts_with("llvmpipe") {
-        "lavapipe"
-    } else {
-        ""
-    };
+    let lavapipe = if is_lavapipe(&info.name) { "lavapipe" } else { "" };
     [info.name.as_str(), info.driver.as_str(), info.kind, lavapipe]
         .iter()
         .any(|known| known.to_lowercase().contains(&name))
@@ -299,10 +311,48 @@ mod tests {
             backend: "vulkan".to_string(),
             kind,
             exact: true,
+            float_controls: FloatControls::NONE,
             largest_binding: 1,
             largest_buffer: 1,
             storage_buffers: 8,
         }
+    }
+
+    #[test]
+    fn lavapipe_goes_before_other_software_and_real_gpus_before_both() {
+        let (swiftshader, lavapipe) = ("SwiftShader Device (Subzero)", "llvmpipe (LLVM 15.0.6, 256 bits)");
+        let in_order = |adapters: &[(&'static str, DeviceType)]| {
+            let mut infos: Vec<wgpu::AdapterInfo> = adapters
+                .iter()
+                .map(|(name, kind)| wgpu::AdapterInfo {
+                    name: name.to_string(),
+                    ..wgpu::AdapterInfo::new(*kind, wgpu::Backend::Vulkan)
+                })
+                .collect();
+            infos.sort_by_key(preference);
+            infos.into_iter().map(|info| info.name).collect::<Vec<_>>()
+        };
+        let cpu = DeviceType::Cpu;
+        assert_eq!(
+            in_order(&[(swiftshader, cpu), (lavapipe, cpu)]),
+            [lavapipe, swiftshader]
+        );
+        assert_eq!(
+            in_order(&[(lavapipe, cpu), (swiftshader, cpu)]),
+            [lavapipe, swiftshader]
+        );
+        assert_eq!(
+            in_order(&[
+                (swiftshader, cpu),
+                (lavapipe, cpu),
+                ("Radeon", DeviceType::IntegratedGpu),
+                ("virtio", DeviceType::VirtualGpu),
+                ("GeForce B", DeviceType::DiscreteGpu),
+                ("GeForce A", DeviceType::DiscreteGpu),
+            ]),
+            ["GeForce B", "GeForce A", "Radeon", "virtio", lavapipe, swiftshader],
+            "the two of one type as they came"
+        );
     }
 
     #[test]

@@ -3,6 +3,7 @@
 mod bake;
 mod compile;
 pub mod compose;
+mod controls;
 mod device;
 mod functions;
 mod interface;
@@ -19,6 +20,7 @@ pub(crate) mod wording;
 
 pub use bake::bake;
 pub use compile::{Checked, check};
+pub use controls::FloatControls;
 pub use device::{Choice, Device, HOW_TO_GET_VULKAN, Info, adapters, choose};
 pub use renderer::{Gpu, Options};
 pub use rounding::Rounding;

@@ -101,7 +101,7 @@ pub fn pipeline(
 ) -> Result<wgpu::ComputePipeline, RenderError> {
     let checked = check(source)?;
     let exact = exact
-        .map(|rounding| checked.exact_spirv(kernel, constants, rounding))
+        .map(|rounding| checked.exact_spirv(kernel, constants, rounding, device.info.float_controls))
         .transpose()?;
     let constants = constants.constants();
     let mut constants: Vec<(&str, f64)> = constants.iter().map(|(name, v)| (*name, f64::from(*v))).collect();

@@ -1,4 +1,6 @@
-//! SPIR-V whose floating-point arithmetic no driver may fuse or reorder.
+//! SPIR-V whose floating-point arithmetic no driver may fuse or reorder, nor round as it likes.
+
+use super::controls::FloatControls;
 
 /// Opcodes of float arithmetic that naga writes: negate, add, subtract, multiply, divide, vector times scalar, dot.
 pub const ARITHMETIC: [u16; 7] = [127, 129, 131, 133, 136, 142, 148];
@@ -12,6 +14,19 @@ const FIRST_TYPE: u16 = 19; // OpTypeVoid
 const LAST_TYPE: u16 = 39; // OpTypeForwardPointer
 const HEADER: usize = 5;
 
+// The opcodes of the first sections of a module, in their order (SPIR-V 1.6, section 2.4).
+const OP_CAPABILITY: u16 = 17;
+const OP_EXTENSION: u16 = 10;
+const OP_EXT_INST_IMPORT: u16 = 11;
+const OP_MEMORY_MODEL: u16 = 14;
+const OP_ENTRY_POINT: u16 = 15;
+const OP_EXECUTION_MODE: u16 = 16;
+
+/// The extension that float controls are of below SPIR-V 1.4.
+const FLOAT_CONTROLS: &[u8] = b"SPV_KHR_float_controls";
+/// Width of the floats that are asked about, in bits.
+const WIDTH: u32 = 32;
+
 /// The instructions of a module: opcode and words, the first of which holds opcode and length.
 pub fn instructions(module: &[u32]) -> impl Iterator<Item = (u16, &[u32])> {
     let mut rest = module.get(HEADER..).unwrap_or(&[]);
@@ -23,6 +38,12 @@ pub fn instructions(module: &[u32]) -> impl Iterator<Item = (u16, &[u32])> {
     })
 }
 
+/// Where the instructions that a module starts with, as long as they are of these kinds, come to their end.
+fn end_of(module: &[u32], kind: impl Fn(u16) -> bool) -> usize {
+    let first = instructions(module).take_while(|(opcode, _)| kind(*opcode));
+    HEADER + first.map(|(_, words)| words.len()).sum::<usize>()
+}
+
 /// Decorates the result of every float operation with `NoContraction` (SPIR-V 1.6, section 3.20): it is then computed
 /// as written, each operation rounded by itself. So with conversions: Mesa would make f32(i32(x)) a truncation, which
 /// keeps the sign of -0.
@@ -30,14 +51,187 @@ pub fn forbid_contraction(module: &[u32]) -> Vec<u32> {
     let decorations = instructions(module)
         .filter(|(opcode, _)| ARITHMETIC.contains(opcode) || CONVERSIONS.contains(opcode))
         .flat_map(|(_, words)| [3 << 16 | OP_DECORATE, words[2], NO_CONTRACTION]);
-    let before_types: usize = instructions(module)
-        .take_while(|(opcode, _)| !(FIRST_TYPE..=LAST_TYPE).contains(opcode))
-        .map(|(_, words)| words.len())
-        .sum();
-    let (head, tail) = module.split_at(HEADER + before_types);
+    let before_types = end_of(module, |opcode| !(FIRST_TYPE..=LAST_TYPE).contains(&opcode));
+    let (head, tail) = module.split_at(before_types);
     head.iter()
         .copied()
         .chain(decorations)
         .chain(tail.iter().copied())
         .collect()
+}
+
+/// Asks for float controls of 32 bits in every entry point of a module: for each its capability and its execution mode
+/// (SPIR-V 1.6, sections 3.31 and 3.6), and for all of them the extension.
+pub fn ask_for(controls: FloatControls, module: &[u32]) -> Vec<u32> {
+    let wanted: Vec<(u32, u32)> = [
+        (controls.denormals, (4464, 4459)),
+        (controls.signed_zeros, (4466, 4461)),
+        (controls.rounding, (4467, 4462)),
+    ]
+    .into_iter()
+    .filter_map(|(wanted, numbers)| wanted.then_some(numbers))
+    .collect();
+    if wanted.is_empty() {
+        return module.to_vec();
+    }
+    let capabilities = wanted
+        .iter()
+        .flat_map(|(capability, _)| [instruction(OP_CAPABILITY, 2), *capability]);
+    let entry_points = instructions(module).filter(|(opcode, _)| *opcode == OP_ENTRY_POINT);
+    let modes = entry_points.flat_map(|(_, words)| {
+        let modes = wanted.iter().map(|(_, mode)| *mode);
+        modes.flat_map(|mode| [instruction(OP_EXECUTION_MODE, 4), words[2], mode, WIDTH])
+    });
+    let sections = [
+        OP_CAPABILITY,
+        OP_EXTENSION,
+        OP_EXT_INST_IMPORT,
+        OP_MEMORY_MODEL,
+        OP_ENTRY_POINT,
+        OP_EXECUTION_MODE,
+    ];
+    let end = |count: usize| end_of(module, |opcode| sections[..count].contains(&opcode));
+    let ends = [end(1), end(2), end(sections.len())];
+    let mut out = module[..ends[0]].to_vec();
+    out.extend(capabilities);
+    out.extend_from_slice(&module[ends[0]..ends[1]]);
+    out.extend(extension(FLOAT_CONTROLS));
+    out.extend_from_slice(&module[ends[1]..ends[2]]);
+    out.extend(modes);
+    out.extend_from_slice(&module[ends[2]..]);
+    out
+}
+
+/// The first word of an instruction of so many words.
+fn instruction(opcode: u16, words: usize) -> u32 {
+    (words as u32) << 16 | u32::from(opcode)
+}
+
+/// `OpExtension` with a name, which ends with a zero byte and is filled up to whole words with more of them.
+fn extension(name: &[u8]) -> Vec<u32> {
+    let mut bytes = name.to_vec();
+    bytes.resize((name.len() / 4 + 1) * 4, 0);
+    let name = bytes
+        .chunks_exact(4)
+        .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
+    std::iter::once(instruction(OP_EXTENSION, 1 + bytes.len() / 4))
+        .chain(name)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::compose::Source;
+    use crate::gpu::{Rounding, check};
+
+    const KERNEL: &str = "
+        @group(0) @binding(0) var<storage, read_write> out: array<f32>;
+        @compute @workgroup_size(4) fn half(@builtin(global_invocation_id) at: vec3u) {
+            out[at.x] = sqrt(out[at.x]) / 2.0;
+        }";
+
+    fn module(controls: FloatControls) -> Vec<u32> {
+        let mut source = Source::default();
+        source.append("half", KERNEL);
+        let checked = check(&source).unwrap_or_else(|error| panic!("{error}"));
+        checked.exact_entry("half", &[], Rounding::Device, controls).unwrap()
+    }
+
+    /// The place of an instruction's section in a module, as SPIR-V orders them; `None` for those of functions, and for
+    /// what stands among types.
+    fn section(opcode: u16) -> Option<usize> {
+        let sections: [&[u16]; 9] = [
+            &[17],
+            &[10],
+            &[11],
+            &[14],
+            &[15],
+            &[16, 331],
+            &[3, 4, 5, 6, 7],
+            &[71, 72],
+            &[19, 20, 21, 22, 23, 24, 28, 29, 30, 32, 33, 43, 44, 59],
+        ];
+        sections.iter().position(|opcodes| opcodes.contains(&opcode))
+    }
+
+    fn in_order(module: &[u32]) -> bool {
+        let before_functions = instructions(module).take_while(|(opcode, _)| *opcode != 54);
+        before_functions.map(|(opcode, _)| section(opcode)).is_sorted()
+    }
+
+    /// What a module asks for: its capabilities and its execution modes with their operands, of those that are of float
+    /// controls; and whether it names the extension.
+    fn asked(module: &[u32]) -> (Vec<u32>, Vec<Vec<u32>>, bool) {
+        let of = |wanted: u16| instructions(module).filter(move |(opcode, _)| *opcode == wanted);
+        let controls = 4459..=4468;
+        let entry = of(15).next().expect("an entry point").1[2];
+        let capabilities = of(17)
+            .map(|(_, words)| words[1])
+            .filter(|number| controls.contains(number));
+        let modes = of(16).filter(|(_, words)| words[1] == entry && controls.contains(&words[2]));
+        let named = of(10).any(|(_, words)| {
+            let bytes: Vec<u8> = words[1..].iter().flat_map(|word| word.to_le_bytes()).collect();
+            bytes == *b"SPV_KHR_float_controls\0\0"
+        });
+        let modes = modes.map(|(_, words)| words[2..].to_vec());
+        (capabilities.collect(), modes.collect(), named)
+    }
+
+    #[test]
+    fn what_is_asked_for_is_there_in_its_section() {
+        let one = |capability: u32, mode: u32| (vec![capability], vec![vec![mode, 32]], true);
+        let (denormals, signed_zeros, rounding) = (one(4464, 4459), one(4466, 4461), one(4467, 4462));
+        let none = FloatControls::NONE;
+        for (controls, wanted) in [
+            (none, (vec![], vec![], false)),
+            (
+                FloatControls {
+                    denormals: true,
+                    ..none
+                },
+                denormals,
+            ),
+            (
+                FloatControls {
+                    signed_zeros: true,
+                    ..none
+                },
+                signed_zeros,
+            ),
+            (FloatControls { rounding: true, ..none }, rounding),
+            (
+                FloatControls::ALL,
+                (
+                    vec![4464, 4466, 4467],
+                    vec![vec![4459, 32], vec![4461, 32], vec![4462, 32]],
+                    true,
+                ),
+            ),
+        ] {
+            let module = module(controls);
+            assert_eq!(asked(&module), wanted, "{controls:?}");
+            assert!(in_order(&module), "{controls:?}");
+        }
+        let (plain, all) = (module(none), module(FloatControls::ALL));
+        let left = |module: &[u32]| -> Vec<Vec<u32>> {
+            let of_controls = |words: &[u32]| words[1..].iter().any(|word| (4459..=4468).contains(word));
+            let others = instructions(module).filter(|(opcode, words)| *opcode != 10 && !of_controls(words));
+            others.map(|(_, words)| words.to_vec()).collect()
+        };
+        assert_eq!(left(&plain), left(&all), "nothing else is changed");
+        assert_eq!(plain[..HEADER], all[..HEADER]);
+    }
+
+    #[test]
+    fn instructions_out_of_order_are_found() {
+        let module = module(FloatControls::ALL);
+        let mut wrong = module.clone();
+        let capabilities = end_of(&module, |opcode| opcode == OP_CAPABILITY);
+        let first: Vec<u32> = wrong.drain(HEADER..HEADER + 2).collect();
+        let behind = capabilities + extension(FLOAT_CONTROLS).len() - 2;
+        wrong.splice(behind..behind, first);
+        assert_eq!(asked(&wrong).2, asked(&module).2);
+        assert!(!in_order(&wrong), "a capability behind an extension");
+    }
 }

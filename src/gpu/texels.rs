@@ -99,6 +99,7 @@ mod tests {
             backend: String::new(),
             kind: "other",
             exact: false,
+            float_controls: crate::gpu::FloatControls::NONE,
             largest_binding,
             largest_buffer: 1 << 31,
             storage_buffers,

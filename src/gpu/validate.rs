@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::bake::bake_if_small;
 use super::compile::{Checked, check_at};
 use super::compose::{KERNELS, Kernel, Shaders, Source};
+use super::controls::FloatControls;
 use super::functions::functions;
 use super::interface;
 use super::rounding::Rounding;
@@ -62,7 +63,7 @@ fn mistakes(kernel: &Kernel, source: Source, packed: &Packed) -> Vec<ShaderError
         Err(error) => errors.push(error),
     }
     if errors.is_empty() {
-        let compiled = checked.exact_spirv(kernel, &packed.specialization, Rounding::Device);
+        let compiled = checked.exact_spirv(kernel, &packed.specialization, Rounding::Device, FloatControls::ALL);
         errors.extend(compiled.err());
     }
     errors
