@@ -5,10 +5,22 @@
 pub mod cpu;
 #[cfg(feature = "dev")]
 pub mod dev;
+pub mod device;
 pub mod error;
 pub mod film;
+#[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod image;
 pub mod job;
 pub mod pack;
+mod picture;
+pub mod render;
 pub mod scene;
+
+pub use device::{Device, DeviceInfo};
+pub use error::Error;
+pub use film::Region;
+pub use image::{Aov, Pixels};
+pub use picture::{Channel, Picture};
+pub use render::{Options, render};
+pub use scene::{Description, Overrides, Scene};

@@ -7,6 +7,7 @@ mod device;
 mod functions;
 mod interface;
 mod pipeline;
+mod place;
 mod prune;
 mod renderer;
 mod rounding;
@@ -14,7 +15,7 @@ mod rounds;
 pub mod spirv;
 mod texels;
 mod validate;
-pub(crate) mod wording;
+mod wording;
 
 pub use bake::bake;
 pub use compile::{Checked, check};

@@ -96,16 +96,16 @@ impl Assets {
         let path = path.map_err(|error| unreadable(file, &error))?;
         let root = self.root.canonicalize().map_err(|error| {
             let root = self.root.display();
-            format!("{file:?} must lie in {root}, the folder of --asset-root, which cannot be found: {error}")
+            format!("{file:?} must lie in {root}, the asset root, which cannot be found: {error}")
         })?;
         if !path.starts_with(&root) {
             let root = self.root.display();
             return Err(match self.root == self.folder {
                 true => format!(
-                    "{file:?} must not leave the scene's folder, {root}, unless --asset-root names a folder that it lies in"
+                    "{file:?} must not leave the scene's folder, {root}, unless another asset root is given that it lies in"
                 ),
                 false => format!(
-                    "{file:?} is {}, which must lie in {root}, the folder of --asset-root",
+                    "{file:?} is {}, which must lie in {root}, the asset root",
                     path.display()
                 ),
             });

@@ -161,8 +161,7 @@ pub(super) fn adaptive(description: &AdaptiveDescription, pixel_samples: &Sample
             .map(Pattern::name)
             .collect();
         format!(
-            "the pattern of pixel_samples is {name:?}, which has no further samples; it must be one of {}, as with \
-             --pixel-pattern sobol",
+            "the pattern of pixel_samples is {name:?}, which has no further samples; it must be one of {}",
             list(others)
         )
     })?;
