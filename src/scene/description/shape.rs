@@ -40,6 +40,25 @@ pub struct RectangleDescription {
     pub tangent: DVec3,
 }
 
+impl RectangleDescription {
+    /// A rectangle of this material, middle, size along tangent and bitangent, normal and tangent.
+    pub fn new(
+        material: impl Into<String>,
+        center: impl Into<DVec3>,
+        size: [f64; 2],
+        normal: impl Into<DVec3>,
+        tangent: impl Into<DVec3>,
+    ) -> Self {
+        Self {
+            material: material.into(),
+            center: center.into(),
+            size,
+            normal: normal.into(),
+            tangent: tangent.into(),
+        }
+    }
+}
+
 /// An ellipsoid: the image of the unit sphere under the linear map with the columns a, b, c.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -56,6 +75,25 @@ pub struct EllipsoidDescription {
     pub c: DVec3,
 }
 
+impl EllipsoidDescription {
+    /// An ellipsoid of this material, middle and half axes.
+    pub fn new(
+        material: impl Into<String>,
+        center: impl Into<DVec3>,
+        a: impl Into<DVec3>,
+        b: impl Into<DVec3>,
+        c: impl Into<DVec3>,
+    ) -> Self {
+        Self {
+            material: material.into(),
+            center: center.into(),
+            a: a.into(),
+            b: b.into(),
+            c: c.into(),
+        }
+    }
+}
+
 /// A sphere.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -68,6 +106,17 @@ pub struct SphereDescription {
     pub radius: f64,
 }
 
+impl SphereDescription {
+    /// A sphere of this material, middle and radius.
+    pub fn new(material: impl Into<String>, center: impl Into<DVec3>, radius: f64) -> Self {
+        Self {
+            material: material.into(),
+            center: center.into(),
+            radius,
+        }
+    }
+}
+
 /// A triangle.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -78,6 +127,16 @@ pub struct TriangleDescription {
     pub vertices: [DVec3; 3],
 }
 
+impl TriangleDescription {
+    /// A triangle of this material and vertices, counter-clockwise as seen from outside.
+    pub fn new(material: impl Into<String>, vertices: [impl Into<DVec3>; 3]) -> Self {
+        Self {
+            material: material.into(),
+            vertices: vertices.map(Into::into),
+        }
+    }
+}
+
 /// A tetrahedron.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -86,6 +145,16 @@ pub struct TetrahedronDescription {
     pub material: String,
     /// Its corners.
     pub vertices: [DVec3; 4],
+}
+
+impl TetrahedronDescription {
+    /// A tetrahedron of this material and corners.
+    pub fn new(material: impl Into<String>, vertices: [impl Into<DVec3>; 4]) -> Self {
+        Self {
+            material: material.into(),
+            vertices: vertices.map(Into::into),
+        }
+    }
 }
 
 /// An infinite plane.
@@ -100,4 +169,21 @@ pub struct PlaneDescription {
     pub normal: DVec3,
     /// Direction of the texture coordinate u; any length.
     pub tangent: DVec3,
+}
+
+impl PlaneDescription {
+    /// A plane of this material, through a point, with this normal and tangent.
+    pub fn new(
+        material: impl Into<String>,
+        point: impl Into<DVec3>,
+        normal: impl Into<DVec3>,
+        tangent: impl Into<DVec3>,
+    ) -> Self {
+        Self {
+            material: material.into(),
+            point: point.into(),
+            normal: normal.into(),
+            tangent: tangent.into(),
+        }
+    }
 }
