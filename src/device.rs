@@ -105,20 +105,20 @@ impl<'a> Renderer<'a> {
         self.backend.largest_film()
     }
 
-    /// Does work on the device. If the driver cuts it short, the CPU does it, and all that follows: it has no such limit.
+    /// Does work on the device, which is told what it is. If the driver cuts it short, the CPU does it, and all that follows: it has no such limit.
     ///
     /// # Errors
     ///
     /// Those of the work.
     pub fn work<T>(
         &mut self,
-        mut work: impl FnMut(&mut dyn Backend) -> Result<T, RenderError>,
+        mut work: impl FnMut(&mut dyn Backend, &DeviceInfo) -> Result<T, RenderError>,
     ) -> Result<T, RenderError> {
-        match work(self.backend.as_mut()) {
+        match work(self.backend.as_mut(), &self.info) {
             Err(why @ RenderError::CutShort { .. }) => {
                 (self.on_cpu)(&why);
                 (self.backend, self.info) = cpu(self.scene);
-                work(self.backend.as_mut())
+                work(self.backend.as_mut(), &self.info)
             }
             other => other,
         }

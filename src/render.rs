@@ -1,13 +1,15 @@
-//! From a scene to a picture in memory, by one call.
+//! From a scene to a picture in memory.
+
+use std::ops::ControlFlow;
 
 use tracing::warn;
 
-use crate::device::{Device, Renderer};
+use crate::device::{Device, DeviceInfo, Renderer};
 use crate::error::{Error, RenderError};
 use crate::film::{Film, Region};
 use crate::image::{Aov, Layout};
-use crate::job::{self, Backend, Cut};
-use crate::pack::{Packed, pack};
+use crate::job::{self, Backend, Cut, Order, Steps};
+use crate::pack::{FirstHit, Packed, pack};
 use crate::picture::Picture;
 use crate::scene::{Problem, Scene};
 
@@ -37,7 +39,7 @@ impl Options {
         let region = self.crop.unwrap_or(whole);
         let Region { x0, y0, x1, y1 } = region;
         let rule = if x0 >= x1 || y0 >= y1 {
-            "x0 must be less than x1, and y0 less than y1".to_string()
+            "must have x0 less than x1, and y0 less than y1".to_string()
         } else if x1 > width || y1 > height {
             format!("must lie in the picture of {width} x {height} pixels")
         } else if let (Some(aov), None) = (self.aovs.iter().find(|aov| aov.is_of_film()), &scene.render.adaptive) {
@@ -50,7 +52,7 @@ impl Options {
     }
 }
 
-/// Renders a scene.
+/// Renders a scene. The picture is kept in memory, in 16 bytes a pixel.
 ///
 /// Where [`Device::Auto`] finds no adapter, or one that cannot do the work, the CPU renders, and a warning by `tracing`
 /// says why; [`Picture::device`] tells what has rendered.
@@ -59,44 +61,175 @@ impl Options {
 ///
 /// Options that do not fit the scene, no such device, and what its driver refuses.
 pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
-    let region = options.region(scene).map_err(Error::Option)?;
     let packed = pack(scene);
-    let on_cpu = |why: &RenderError| warn!("rendering on the CPU: {why}");
-    let mut renderer = Renderer::new(&packed, options, Box::new(on_cpu))?;
-    let film = renderer.work(|backend| film(backend, region, packed.pixel_samples))?;
-    let hits = match options.aovs.iter().any(|aov| !aov.is_of_film()) {
-        true => renderer.work(|backend| job::first_hits(backend, region))?,
-        false => Vec::new(),
-    };
-    Ok(Picture {
-        film,
-        hits,
-        layout: Layout {
+    let mut prepared = Prepared::new(scene, &packed, options)?;
+    let region = prepared.layout.region;
+    let film = prepared.renderer.work(|backend, _| {
+        let mut whole = empty(region, packed.adaptive);
+        let mut take = |band: Film| {
+            put(&mut whole, &band);
+            Ok(())
+        };
+        job::render(
+            backend,
+            region,
+            packed.pixel_samples,
+            &Cut::default(),
+            &mut |_| true,
+            &mut take,
+        )?;
+        Ok(whole)
+    })?;
+    Ok(prepared.picture(film))
+}
+
+/// Renders a scene, and shows the picture as it grows: `watch` is called some ten times a second or more, sees the picture
+/// as it is then, and says whether to go on. All pixels get a few samples before any gets more, but that a picture too
+/// large for one film of the device grows part by part, from the top. The result has the bits of [`render`].
+///
+/// # Errors
+///
+/// Those of [`render`] and of `watch`, and [`RenderError::Cancelled`] if `watch` breaks off.
+pub fn render_growing(
+    scene: &Scene,
+    options: &Options,
+    watch: &mut dyn FnMut(&mut Growing) -> Result<ControlFlow<()>, Error>,
+) -> Result<Picture, Error> {
+    let packed = pack(scene);
+    let mut prepared = Prepared::new(scene, &packed, options)?;
+    let (layout, hits) = (&prepared.layout, &prepared.hits);
+    let total = layout.region.pixels() as f64 * f64::from(packed.pixel_samples);
+    let mut failed = None;
+    let film = prepared.renderer.work(|backend, device| {
+        let cut = Cut::default();
+        let mut steps = Steps::new(&cut, job::CALL, Order::Pixels);
+        let mut whole = empty(layout.region, packed.adaptive);
+        let mut done = 0.0;
+        for band in job::bands(layout.region, &cut, backend.largest_film()) {
+            steps.start(backend, band, packed.pixel_samples);
+            backend.begin(steps.film())?;
+            while let Some(work) = steps.step(backend)? {
+                done += work;
+                let mut growing = Growing {
+                    share: done / total,
+                    backend: &mut *backend,
+                    device,
+                    band,
+                    whole: &mut whole,
+                    hits,
+                    layout,
+                };
+                match watch(&mut growing) {
+                    Ok(ControlFlow::Continue(())) => {}
+                    Ok(ControlFlow::Break(())) => return Err(RenderError::Cancelled),
+                    Err(error) => {
+                        failed = Some(error);
+                        return Err(RenderError::Cancelled);
+                    }
+                }
+            }
+            put(&mut whole, &backend.film()?.part(band));
+        }
+        Ok(whole)
+    });
+    match failed {
+        Some(error) => Err(error),
+        None => {
+            let film = film?;
+            Ok(prepared.picture(film))
+        }
+    }
+}
+
+/// A picture that is being rendered.
+pub struct Growing<'a> {
+    share: f64,
+    backend: &'a mut dyn Backend,
+    device: &'a DeviceInfo,
+    band: Region,
+    whole: &'a mut Film,
+    hits: &'a [FirstHit],
+    layout: &'a Layout,
+}
+
+impl Growing<'_> {
+    /// The share of the work that is done, from 0 to 1.
+    pub fn share(&self) -> f64 {
+        self.share
+    }
+
+    /// The picture as it is now, copied from the device. Pixels without a sample so far are black.
+    ///
+    /// # Errors
+    ///
+    /// Those of the device.
+    pub fn picture(&mut self) -> Result<Picture, Error> {
+        put(self.whole, &self.backend.film()?.part(self.band));
+        Ok(Picture {
+            film: self.whole.clone(),
+            hits: self.hits.to_vec(),
+            layout: self.layout.clone(),
+            device: self.device.clone(),
+        })
+    }
+}
+
+/// What is there before the first sample.
+struct Prepared<'a> {
+    renderer: Renderer<'a>,
+    hits: Vec<FirstHit>,
+    layout: Layout,
+}
+
+impl<'a> Prepared<'a> {
+    fn new(scene: &Scene, packed: &'a Packed, options: &Options) -> Result<Prepared<'a>, Error> {
+        let region = options.region(scene).map_err(Error::Option)?;
+        let on_cpu = |why: &RenderError| warn!("rendering on the CPU: {why}");
+        let mut renderer = Renderer::new(packed, options, Box::new(on_cpu))?;
+        let hits = match options.aovs.iter().any(|aov| !aov.is_of_film()) {
+            true => renderer.work(|backend, _| job::first_hits(backend, region))?,
+            false => Vec::new(),
+        };
+        let layout = Layout {
             picture: (scene.width, scene.height),
             region,
             aovs: options.aovs.clone(),
-            middle_depth: renderer.work(|backend| middle_depth(&packed, &options.aovs, backend))?,
+            middle_depth: renderer.work(|backend, _| middle_depth(packed, &options.aovs, backend))?,
             most_samples: packed.pixel_samples,
-        },
-        device: renderer.info().clone(),
-    })
+        };
+        Ok(Prepared { renderer, hits, layout })
+    }
+
+    fn picture(self, film: Film) -> Picture {
+        Picture {
+            film,
+            hits: self.hits,
+            layout: self.layout,
+            device: self.renderer.info().clone(),
+        }
+    }
 }
 
-/// All bands of a region in one film.
-fn film(backend: &mut dyn Backend, region: Region, samples: u32) -> Result<Film, RenderError> {
-    let mut whole = Film {
-        region,
-        sums: Vec::new(),
-        moments: Vec::new(),
-        looks: Vec::new(),
-    };
-    job::render(backend, region, samples, &Cut::default(), &mut |_| true, &mut |band| {
-        whole.sums.extend(band.sums);
-        whole.moments.extend(band.moments);
-        whole.looks.extend(band.looks);
-        Ok(())
-    })?;
-    Ok(whole)
+fn empty(region: Region, adaptive: bool) -> Film {
+    match adaptive {
+        true => Film::adaptive(region),
+        false => Film::new(region),
+    }
+}
+
+/// Puts whole rows of a film into it.
+fn put(whole: &mut Film, band: &Film) {
+    let start = (band.region.y0 - whole.region.y0) as usize * whole.region.width() as usize;
+    for (to, from) in [
+        (&mut whole.sums, &band.sums),
+        (&mut whole.moments, &band.moments),
+        (&mut whole.looks, &band.looks),
+    ] {
+        // Without adaptive sampling there are no moments and no looks.
+        if let Some(to) = to.get_mut(start..start + from.len()) {
+            to.copy_from_slice(from);
+        }
+    }
 }
 
 /// The depth that looks half bright in a PNG: that in the middle of the whole picture, or 1 where nothing is.

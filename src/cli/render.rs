@@ -280,7 +280,7 @@ fn write_picture(
         region: plan.region,
         aovs: plan.options.aovs.clone(),
         middle_depth: match plan.format {
-            Format::Png => renderer.work(|backend| middle_depth(&plan.scene, &plan.options.aovs, backend))?,
+            Format::Png => renderer.work(|backend, _| middle_depth(&plan.scene, &plan.options.aovs, backend))?,
             Format::Exr => 1.0,
         },
         most_samples: plan.scene.pixel_samples,
@@ -304,15 +304,16 @@ fn write_picture(
                 film = rendered;
                 Ok(())
             };
-            renderer
-                .work(|backend| job::render(backend, band, plan.scene.pixel_samples, &cut, &mut update, &mut take))?;
+            renderer.work(|backend, _| {
+                job::render(backend, band, plan.scene.pixel_samples, &cut, &mut update, &mut take)
+            })?;
             time += start.elapsed();
             camera_rays += match plan.scene.adaptive {
                 true => film.sample_counts().map(u64::from).sum(),
                 false => band.pixels() * u64::from(plan.scene.pixel_samples),
             };
             let hits = match plan.options.aovs.iter().any(|aov| !aov.is_of_film()) {
-                true => renderer.work(|backend| job::first_hits(backend, band))?,
+                true => renderer.work(|backend, _| job::first_hits(backend, band))?,
                 false => Vec::new(),
             };
             strange += film

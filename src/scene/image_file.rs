@@ -37,8 +37,15 @@ pub(super) enum Place {
     Memory(String),
 }
 
+impl Default for Assets {
+    /// Files in the current folder, and no images in memory.
+    fn default() -> Self {
+        Assets::beside(Path::new("."))
+    }
+}
+
 impl Assets {
-    /// Files in a folder.
+    /// Files in a folder, and no images in memory.
     pub fn beside(folder: &Path) -> Assets {
         let folder = match folder.as_os_str().is_empty() {
             true => Path::new("."),
