@@ -56,6 +56,11 @@
 // These end the program where a stream is closed or full.
 #![warn(clippy::print_stderr, clippy::print_stdout)]
 
+// The program in the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 #[doc(hidden)]
 pub mod cpu;
 #[cfg(feature = "dev")]
