@@ -13,14 +13,14 @@ use crate::pack::{FirstHit, Packed, pack};
 use crate::picture::Picture;
 use crate::scene::{Problem, Scene};
 
-/// How a scene is rendered. The scene itself says its size, samples and seed.
+/// How a scene is rendered. Size, samples and seed are the scene's, which [`Overrides`](crate::Overrides) can change.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Options {
     /// What renders.
     pub device: Device,
     /// The pixels that are rendered, the same as in the whole picture; all if absent.
     pub crop: Option<Region>,
-    /// The layers beside the radiance.
+    /// The layers beside the radiance; each is there once, however often it is named.
     pub aovs: Vec<Aov>,
     /// Whether quotients and square roots are rounded correctly in software, for the CPU's bits on GPUs whose own may be off
     /// in the last digit. Vulkan only; without effect on the CPU.
@@ -190,10 +190,16 @@ impl<'a> Prepared<'a> {
             true => renderer.work(|backend, _| job::first_hits(backend, region))?,
             false => Vec::new(),
         };
+        let mut aovs: Vec<Aov> = Vec::new();
+        for aov in &options.aovs {
+            if !aovs.contains(aov) {
+                aovs.push(*aov);
+            }
+        }
         let layout = Layout {
             picture: (scene.width, scene.height),
             region,
-            aovs: options.aovs.clone(),
+            aovs,
             middle_depth: renderer.work(|backend, _| middle_depth(packed, &options.aovs, backend))?,
             most_samples: packed.pixel_samples,
         };
