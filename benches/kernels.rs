@@ -27,7 +27,7 @@ fn scene(path: &str, size: u32) -> Packed {
         ..Overrides::default()
     };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
-    pack(&Scene::load(&path, &overrides).expect("the project's scenes are valid"))
+    pack(&Scene::load_with(&path, &overrides).expect("the project's scenes are valid"))
 }
 
 /// The machine's arithmetic limit: multiplications and additions of eight f32 at a time, without any memory, on one core.

@@ -4,8 +4,25 @@ use std::fmt;
 
 use thiserror::Error;
 
-use crate::gpu::compose::Source;
-use crate::gpu::wording::chain;
+use crate::scene::{Problem, SceneError};
+
+/// What can go wrong between a scene and its picture.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A scene file that is no scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A description, made in code, that is no scene.
+    #[error(transparent)]
+    Description(#[from] Problem),
+    /// An option of a render that does not fit the scene or the device.
+    #[error("{0}")]
+    Option(Problem),
+    /// A picture that could not be rendered or written.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}
 
 /// A shader that naga refuses: where and why.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -17,46 +34,6 @@ pub struct ShaderError {
     pub message: String,
     /// The source around the place, with the place marked, if there is one.
     pub excerpt: Option<String>,
-}
-
-impl ShaderError {
-    pub(crate) fn other(stage: &str, error: &dyn std::error::Error) -> ShaderError {
-        ShaderError {
-            place: stage.to_string(),
-            message: chain(error),
-            excerpt: None,
-        }
-    }
-
-    pub(crate) fn at(source: &Source, span: Option<naga::Span>, message: String) -> ShaderError {
-        let range = span.and_then(|span| span.to_range());
-        let Some((file, text, offset)) = range.clone().and_then(|range| source.locate(range.start)) else {
-            return ShaderError {
-                place: "shader".to_string(),
-                message,
-                excerpt: None,
-            };
-        };
-        let before = &text[..offset];
-        let line = before.matches('\n').count() + 1;
-        let start = before.rfind('\n').map_or(0, |at| at + 1);
-        let column = text[start..offset].chars().count() + 1;
-        let line_text = text[start..].lines().next().unwrap_or("");
-        let length = range
-            .map_or(1, |range| range.len())
-            .min(line_text.len().saturating_sub(offset - start))
-            .max(1);
-        let excerpt = format!(
-            "{line:>5} | {line_text}\n      | {}{}",
-            " ".repeat(column - 1),
-            "^".repeat(length)
-        );
-        ShaderError {
-            place: format!("{file}:{line}:{column}"),
-            message,
-            excerpt: Some(excerpt),
-        }
-    }
 }
 
 /// All that is wrong with shaders: one mistake at least.
@@ -100,7 +77,7 @@ pub enum RenderError {
         device: String,
     },
     /// The device cannot see all of the scene.
-    #[error("{device}: {message}; --device cpu has no such limit")]
+    #[error("{device}: {message}; the CPU has no such limit")]
     TooLarge {
         /// The adapter's name.
         device: String,

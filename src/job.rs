@@ -33,7 +33,7 @@ pub trait Backend {
 
 /// How long one call of [`Backend::render`] aims to take: long enough to hide what a call costs, short enough for
 /// watchdogs, progress and cancelling.
-const CALL: Duration = Duration::from_millis(60);
+pub(crate) const CALL: Duration = Duration::from_millis(60);
 
 /// How work is cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -171,6 +171,11 @@ impl Steps {
         };
         self.pace.start_film();
         self.begin_pass(0);
+    }
+
+    /// The film that the calls are for: the region, and the pixels around it that get the samples of all.
+    pub fn film(&self) -> Region {
+        self.film
     }
 
     /// Forgets the pace: other work comes.

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use wgray::gpu::{Forms, check_kernels};
 use wgray::pack::{Packed, pack};
-use wgray::scene::{Overrides, Scene};
+use wgray::scene::Scene;
 
 use crate::sources;
 
@@ -99,7 +99,7 @@ const KINDS: [(&str, &str); 13] = [
 ];
 
 fn packed(text: &str) -> Option<Packed> {
-    let scene = Scene::parse(text, "s.toml", &Overrides::default());
+    let scene = Scene::parse(text, "s.toml");
     scene.ok().map(|scene| pack(&scene))
 }
 

@@ -5,6 +5,7 @@ mod adapter;
 mod against_oracle;
 mod analytic;
 mod bounds;
+mod choices;
 mod cli;
 mod cost;
 mod culling;

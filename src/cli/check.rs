@@ -1,12 +1,13 @@
-//! `wgray check`: scenes and shaders, without a device.
+//! `wgray check`: scenes and, with the feature `gpu`, shaders; without a device.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+#[cfg(feature = "gpu")]
 use wgray::gpu::{Forms, check_kernels, compose::Shaders};
 use wgray::pack::pack;
-use wgray::scene::{Overrides, Scene};
+use wgray::scene::Overrides;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -15,6 +16,7 @@ pub struct Args {
     scenes: Vec<PathBuf>,
 
     /// Folder of the shaders to check, with the files of the project's own, in place of those in the program
+    #[cfg(feature = "gpu")]
     #[arg(long, value_name = "DIR")]
     shaders: Option<PathBuf>,
 
@@ -25,6 +27,7 @@ pub struct Args {
 
 /// Checks all files, whatever is wrong with some; the exit code is that of the first bad one.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    #[cfg(feature = "gpu")]
     let shaders = match &args.shaders {
         Some(folder) => Shaders::read(folder)?,
         None => Shaders::built_in(),
@@ -36,7 +39,13 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut code = None;
     let mut printed = Ok(());
     for path in &args.scenes {
-        match check(path, &overrides, &shaders) {
+        let checked = check(
+            path,
+            &overrides,
+            #[cfg(feature = "gpu")]
+            &shaders,
+        );
+        match checked {
             Ok(summary) if printed.is_ok() => {
                 printed = writeln!(io::stdout().lock(), "{}: {summary}", path.display());
             }
@@ -53,9 +62,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     })
 }
 
-fn check(path: &Path, overrides: &Overrides, shaders: &Shaders) -> anyhow::Result<String> {
-    let scene = Scene::load(path, overrides)?;
+fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &Shaders) -> anyhow::Result<String> {
+    let scene = super::load(path, overrides)?;
     let packed = pack(&scene);
+    #[cfg(feature = "gpu")]
     check_kernels(&packed, shaders, Forms::All)?;
     Ok(format!(
         "good; {} x {} pixels, {} samples each, {} of light; shapes: {} of {} primitives; lights: {}",

@@ -3,14 +3,38 @@
 use std::io::{self, Write};
 use std::process::ExitCode;
 
+#[cfg(feature = "gpu")]
 use wgray::gpu::{self, FloatControls, Info};
 
 pub fn run() -> ExitCode {
-    super::ended(list(&gpu::adapters()), ExitCode::SUCCESS)
+    super::ended(list(&mut io::stdout().lock()), ExitCode::SUCCESS)
 }
 
-fn list(adapters: &[Info]) -> io::Result<()> {
-    let mut out = io::stdout().lock();
+#[cfg(feature = "gpu")]
+fn list(out: &mut impl Write) -> io::Result<()> {
+    let adapters = gpu::adapters();
+    list_adapters(out, &adapters)?;
+    list_cpu(out)?;
+    let chosen = adapters.first().map_or("cpu", |info| &info.name);
+    writeln!(out, "auto chooses: {chosen}")?;
+    if adapters.is_empty() {
+        writeln!(out, "{}", gpu::HOW_TO_GET_VULKAN)?;
+    }
+    Ok(())
+}
+
+#[cfg(not(feature = "gpu"))]
+fn list(out: &mut impl Write) -> io::Result<()> {
+    list_cpu(out)?;
+    writeln!(out, "auto chooses: cpu")?;
+    writeln!(
+        out,
+        "this program was built without its feature \"gpu\": it looks for no adapter"
+    )
+}
+
+#[cfg(feature = "gpu")]
+fn list_adapters(out: &mut impl Write, adapters: &[Info]) -> io::Result<()> {
     for (number, info) in (1..).zip(adapters) {
         let Info {
             name,
@@ -42,17 +66,10 @@ fn list(adapters: &[Info]) -> io::Result<()> {
         writeln!(out, "    buffers         {storage_buffers} in a shader")?;
         writeln!(out, "    largest buffer  {}", mebibytes(*largest_buffer))?;
     }
-    writeln!(out, "cpu")?;
-    writeln!(out, "    type            this program's own, without a driver")?;
-    writeln!(out, "    threads         {}", rayon::current_num_threads())?;
-    let chosen = adapters.first().map_or("cpu", |info| &info.name);
-    writeln!(out, "auto chooses: {chosen}")?;
-    if adapters.is_empty() {
-        writeln!(out, "{}", gpu::HOW_TO_GET_VULKAN)?;
-    }
     Ok(())
 }
 
+#[cfg(feature = "gpu")]
 /// What a device's arithmetic is asked to keep to, in words.
 fn names(controls: FloatControls) -> String {
     let FloatControls {
@@ -73,6 +90,13 @@ fn names(controls: FloatControls) -> String {
     }
 }
 
+fn list_cpu(out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "cpu")?;
+    writeln!(out, "    type            this program's own, without a driver")?;
+    writeln!(out, "    threads         {}", rayon::current_num_threads())
+}
+
+#[cfg(feature = "gpu")]
 fn mebibytes(bytes: u64) -> String {
     format!("{:.0} MiB", bytes as f64 / f64::from(1 << 20))
 }

@@ -11,12 +11,13 @@ mod signal;
 mod stats;
 
 use std::io::{self, Write};
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::{Parser, Subcommand};
-use wgray::error::{RenderError, ShaderError, ShaderErrors};
-use wgray::scene::SceneError;
+use wgray::error::{Error, RenderError, ShaderError, ShaderErrors};
+use wgray::scene::{Overrides, Problem, Scene, SceneError};
 
 #[derive(Debug, Parser)]
 #[command(name = "wgray", version, about, max_term_width = 100, after_help = EXIT_CODES)]
@@ -35,7 +36,11 @@ const INTERRUPTED: u8 = 130;
 enum Command {
     /// Renders a scene file to a picture
     Render(Box<render::Args>),
-    /// Validates scene files, and the shaders for them, without a device
+    #[cfg_attr(
+        feature = "gpu",
+        doc = "Validates scene files, and the shaders for them, without a device"
+    )]
+    #[cfg_attr(not(feature = "gpu"), doc = "Validates scene files")]
     Check(check::Args),
     /// Lists the adapters that pictures can be rendered on, and which one "auto" chooses
     Devices,
@@ -103,6 +108,42 @@ fn prepare_environment(threads: Option<u16>) {
     }
 }
 
+/// Reads a scene file, with options in place of some of its values.
+fn load(path: &Path, overrides: &Overrides) -> anyhow::Result<Scene> {
+    Scene::load_with(path, overrides).map_err(|error| plain(error.into()))
+}
+
+/// An error of the library in the words of the command line.
+fn plain(error: Error) -> anyhow::Error {
+    match error {
+        Error::Option(problem) | Error::Scene(SceneError::Override(problem)) => option(&problem).into(),
+        Error::Render(error) => error.into(),
+        Error::Scene(error) => error.into(),
+        error => error.into(),
+    }
+}
+
+/// A problem of an option, called as the command line calls it.
+fn option(problem: &Problem) -> Usage {
+    let key = problem.key.to_string();
+    let (name, rest) = key.split_once('.').unwrap_or((&key, ""));
+    let place = if rest.is_empty() {
+        String::new()
+    } else {
+        format!(" {rest}")
+    };
+    let hint = match name {
+        "adaptive" if problem.message.contains("pixel_samples") => ", as with --pixel-pattern sobol",
+        "aov" => "; --adaptive 0 gives all pixels the most samples",
+        _ => "",
+    };
+    Usage(format!(
+        "--{}{place}: {}{hint}",
+        name.replace('_', "-"),
+        problem.message
+    ))
+}
+
 /// Says on standard error what went wrong.
 fn report(error: &anyhow::Error) {
     let shader = shader_errors(error);
@@ -145,11 +186,8 @@ fn shader_errors(error: &anyhow::Error) -> &[ShaderError] {
 fn exit_code(error: &anyhow::Error) -> ExitCode {
     let code = if error.is::<Usage>() {
         2
-    } else if let Some(error) = error.downcast_ref::<SceneError>() {
-        match error {
-            SceneError::Option(_) => 2,
-            _ => 3,
-        }
+    } else if error.is::<SceneError>() {
+        3
     } else {
         match error.downcast_ref::<RenderError>() {
             Some(RenderError::NoDevice(_)) => 4,

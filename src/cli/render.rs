@@ -9,19 +9,19 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser as _};
 use tracing::info;
-use wgray::cpu::Cpu;
+use wgray::device::{Device, Renderer};
 use wgray::error::RenderError;
 use wgray::film::{Film, Region, mean};
-use wgray::gpu::{self, Gpu, compose::Shaders};
 use wgray::image::{self, Aov, Band, Format, Layout, Pending};
-use wgray::job::{self, Backend, Cut};
+use wgray::job::{self, Cut};
 use wgray::pack::{Packed, pack};
-use wgray::scene::{Overrides, Pattern, Scene};
+use wgray::render::{Options, middle_depth};
+use wgray::scene::{Overrides, Pattern};
 
 use super::outputs::Outputs;
 use super::progress::{Mode, Progress};
 use super::stats::Stats;
-use super::{Usage, say, signal};
+use super::{say, signal};
 
 /// The arguments as they are written.
 #[derive(Debug, clap::Args)]
@@ -160,18 +160,10 @@ struct Plan {
     scene: Packed,
     format: Format,
     region: Region,
-    aovs: Vec<Aov>,
-    device: Device,
-    exact_rounding: bool,
+    options: Options,
     threads: Option<u16>,
     progress: Mode,
     quiet: bool,
-}
-
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum Device {
-    Cpu,
-    Gpu(gpu::Choice),
 }
 
 impl Plan {
@@ -196,37 +188,20 @@ impl Plan {
             adaptive: args.adaptive,
             asset_root: args.asset_root,
         };
-        let scene = Scene::load(&args.scene, &overrides)?;
+        let scene = super::load(&args.scene, &overrides)?;
         outputs.check(&[&[args.scene][..], &scene.files].concat())?;
-        let scene = pack(&scene);
-        let (width, height) = (scene.camera.width, scene.camera.height);
-        let region = args.crop.unwrap_or(Region::whole(width, height));
-        if region.x1 > width || region.y1 > height {
-            let Region { x0, y0, x1, y1 } = region;
-            return Err(Usage(format!(
-                "--crop: {x0},{y0},{x1},{y1} must lie in the picture of {width} x {height} pixels"
-            ))
-            .into());
-        }
-        if let Some(aov) = aovs.iter().find(|aov| aov.is_of_film() && !scene.adaptive) {
-            return Err(Usage(format!(
-                "--aov {}: is known under adaptive sampling alone; --adaptive 0 gives all pixels the most samples",
-                aov.name()
-            ))
-            .into());
-        }
+        let options = Options {
+            device: Device::from(args.device.as_str()),
+            crop: args.crop,
+            aovs,
+            exact_rounding: args.exact_rounding,
+        };
+        let region = options.region(&scene).map_err(|problem| super::option(&problem))?;
         let plan = Plan {
-            scene,
+            scene: pack(&scene),
             format: outputs.format,
             region,
-            aovs,
-            device: match args.device.to_lowercase().as_str() {
-                "auto" => Device::Gpu(gpu::Choice::Auto),
-                "gpu" => Device::Gpu(gpu::Choice::Gpu),
-                "cpu" => Device::Cpu,
-                _ => Device::Gpu(gpu::Choice::Named(args.device)),
-            },
-            exact_rounding: args.exact_rounding,
+            options,
             threads: args.threads,
             progress: if args.quiet { Mode::None } else { args.progress },
             quiet: args.quiet,
@@ -234,74 +209,21 @@ impl Plan {
         Ok((plan, outputs))
     }
 
-    /// Makes the device ready for the scene, and says what it is.
-    fn backend(&self) -> anyhow::Result<(Box<dyn Backend + '_>, Described)> {
+    /// Makes the device ready for the scene.
+    fn renderer(&self) -> anyhow::Result<Renderer<'_>> {
         if let Some(threads) = self.threads {
             rayon::ThreadPoolBuilder::new()
                 .num_threads(threads.into())
                 .build_global()
                 .context("threads")?;
         }
-        let Device::Gpu(choice) = &self.device else {
-            return Ok(self.cpu());
-        };
-        let device = match gpu::choose(choice) {
-            Err(why) if *choice == gpu::Choice::Auto => {
-                if !self.quiet {
-                    say(&format!("warning: rendering on the CPU: {why}"));
-                }
-                return Ok(self.cpu());
+        let on_cpu = |why: &RenderError| {
+            if !self.quiet {
+                say(&format!("warning: rendering on the CPU: {why}"));
             }
-            other => other?,
         };
-        let info = &device.info;
-        info!(device = info.name, driver = info.driver, "device open");
-        let described = Described {
-            device: info.name.clone(),
-            driver: info.driver.clone(),
-            backend: info.backend.clone(),
-        };
-        let mut options = gpu::Options::best(&device);
-        if self.exact_rounding {
-            if !info.exact {
-                let message = format!(
-                    "--exact-rounding: needs a Vulkan device, {} is {}",
-                    info.name, info.backend
-                );
-                return Err(Usage(message).into());
-            }
-            options.exact = Some(gpu::Rounding::Software);
-        }
-        match Gpu::new(&device, &self.scene, &Shaders::built_in(), options) {
-            Err(why @ RenderError::TooLarge { .. }) if *choice == gpu::Choice::Auto => {
-                if !self.quiet {
-                    super::say(&format!("warning: rendering on the CPU: {why}"));
-                }
-                Ok(self.cpu())
-            }
-            gpu => Ok((Box::new(gpu?), described)),
-        }
+        Renderer::new(&self.scene, &self.options, Box::new(on_cpu)).map_err(super::plain)
     }
-
-    fn cpu(&self) -> (Box<dyn Backend + '_>, Described) {
-        let described = Described {
-            device: "cpu".to_string(),
-            driver: format!(
-                "wgray {}, {} threads",
-                env!("CARGO_PKG_VERSION"),
-                rayon::current_num_threads()
-            ),
-            backend: "cpu".to_string(),
-        };
-        (Box::new(Cpu::new(&self.scene)), described)
-    }
-}
-
-/// What a render runs on, as `--stats` tells it.
-struct Described {
-    device: String,
-    driver: String,
-    backend: String,
 }
 
 pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
@@ -312,16 +234,10 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
     info!(seconds = start.elapsed().as_secs_f64(), "scene read");
     let outputs = outputs.begin().map_err(RenderError::Output)?;
     let stopped = signal::stop().context("signal handler")?;
-    let (backend, described) = plan.backend()?;
+    let mut renderer = plan.renderer()?;
     let setup = start.elapsed();
     info!(seconds = setup.as_secs_f64(), "ready");
-    let mut renderer = Renderer {
-        plan: &plan,
-        backend,
-        described,
-    };
-    let (render, camera_rays) = write_picture(&mut renderer, outputs.pictures, &stopped)?;
-    let described = renderer.described;
+    let (render, camera_rays) = write_picture(&plan, &mut renderer, outputs.pictures, &stopped)?;
     let total = start.elapsed();
     info!(
         render = render.as_secs_f64(),
@@ -329,12 +245,13 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
         "picture written"
     );
     if let Some(file) = outputs.stats {
+        let device = renderer.info();
         let (width, height) = (plan.region.width(), plan.region.height());
         let (pixel_samples, light_samples) = (plan.scene.pixel_samples, plan.scene.light_samples());
         let stats = Stats {
-            device: described.device,
-            driver: described.driver,
-            backend: described.backend,
+            device: device.name.clone(),
+            driver: device.driver.clone(),
+            backend: device.interface.clone(),
             width,
             height,
             pixel_samples,
@@ -351,41 +268,21 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What renders a plan.
-struct Renderer<'a> {
-    plan: &'a Plan,
-    backend: Box<dyn Backend + 'a>,
-    described: Described,
-}
-
-impl Renderer<'_> {
-    /// Does work on the device. If the driver cuts it short, the CPU does it, and all that follows: it has no such limit.
-    fn work<T>(&mut self, mut work: impl FnMut(&mut dyn Backend) -> Result<T, RenderError>) -> Result<T, RenderError> {
-        match work(self.backend.as_mut()) {
-            Err(why @ RenderError::CutShort { .. }) => {
-                if !self.plan.quiet {
-                    say(&format!("warning: rendering on the CPU: {why}"));
-                }
-                (self.backend, self.described) = self.plan.cpu();
-                work(self.backend.as_mut())
-            }
-            other => other,
-        }
-    }
-}
-
 /// Renders band by band into the picture's files; returns the time it took without writing, and the camera's rays.
 fn write_picture(
+    plan: &Plan,
     renderer: &mut Renderer,
     files: Vec<Pending>,
     stopped: &AtomicBool,
 ) -> anyhow::Result<(Duration, u64)> {
-    let plan = renderer.plan;
     let layout = Layout {
         picture: (plan.scene.camera.width, plan.scene.camera.height),
         region: plan.region,
-        aovs: plan.aovs.clone(),
-        middle_depth: renderer.work(|backend| middle_depth(plan, backend))?,
+        aovs: plan.options.aovs.clone(),
+        middle_depth: match plan.format {
+            Format::Png => renderer.work(|backend, _| middle_depth(&plan.scene, &plan.options.aovs, backend))?,
+            Format::Exr => 1.0,
+        },
         most_samples: plan.scene.pixel_samples,
     };
     let name = files.first().map(|file| file.name().to_owned()).unwrap_or_default();
@@ -396,7 +293,7 @@ fn write_picture(
     image::save(files, plan.format, &layout, &mut |sink| {
         let cut = Cut::default();
         let mut done = 0;
-        for band in job::bands(plan.region, &cut, renderer.backend.largest_film()) {
+        for band in job::bands(plan.region, &cut, renderer.largest_film()) {
             let start = Instant::now();
             let mut update = |share: f64| {
                 progress.update((done as f64 + share * band.pixels() as f64) / plan.region.pixels() as f64);
@@ -407,15 +304,16 @@ fn write_picture(
                 film = rendered;
                 Ok(())
             };
-            renderer
-                .work(|backend| job::render(backend, band, plan.scene.pixel_samples, &cut, &mut update, &mut take))?;
+            renderer.work(|backend, _| {
+                job::render(backend, band, plan.scene.pixel_samples, &cut, &mut update, &mut take)
+            })?;
             time += start.elapsed();
             camera_rays += match plan.scene.adaptive {
                 true => film.sample_counts().map(u64::from).sum(),
                 false => band.pixels() * u64::from(plan.scene.pixel_samples),
             };
-            let hits = match plan.aovs.iter().any(|aov| !aov.is_of_film()) {
-                true => renderer.work(|backend| job::first_hits(backend, band))?,
+            let hits = match plan.options.aovs.iter().any(|aov| !aov.is_of_film()) {
+                true => renderer.work(|backend, _| job::first_hits(backend, band))?,
                 false => Vec::new(),
             };
             strange += film
@@ -436,25 +334,6 @@ fn write_picture(
         say(&format!("warning: {name}: {strange} pixels are not finite numbers"));
     }
     Ok((time, camera_rays))
-}
-
-/// What depth looks half bright: that in the middle of the whole picture, or 1 where nothing is.
-fn middle_depth(plan: &Plan, backend: &mut dyn Backend) -> Result<f32, RenderError> {
-    if plan.format != Format::Png || !plan.aovs.contains(&Aov::Depth) {
-        return Ok(1.0);
-    }
-    let (x0, y0) = (plan.scene.camera.width / 2, plan.scene.camera.height / 2);
-    let hits = backend.first_hits(Region {
-        x0,
-        y0,
-        x1: x0 + 1,
-        y1: y0 + 1,
-    })?;
-    Ok(hits
-        .first()
-        .map(|hit| hit.depth)
-        .filter(|depth| *depth > 0.0)
-        .unwrap_or(1.0))
 }
 
 /// Events of this program on standard error, and warnings of others.

@@ -87,7 +87,7 @@ impl Backend for Cpu<'_> {
     }
 
     fn film(&mut self) -> Result<Film, RenderError> {
-        Ok(std::mem::replace(&mut self.film, Film::new(Region::whole(0, 0))))
+        Ok(self.film.clone())
     }
 
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {

@@ -92,18 +92,18 @@ impl From<&RenderError> for Diagnostic {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Overrides, Scene};
+    use crate::scene::Scene;
 
     #[test]
     fn a_scene_error_is_shown_with_its_line() {
         let text = "[image]\nwidth = 0\nheight = 4\n[camera]\nposition = [0, 1, 0]\nlook_at = [1, 0, 0]\nfov = 40\n";
-        let error = Scene::parse(text, "s.toml", &Overrides::default()).unwrap_err();
+        let error = Scene::parse(text, "s.toml").unwrap_err();
         let shown = Diagnostic::scene(&error, text);
         assert_eq!(shown.place.as_deref(), Some("s.toml:2"));
         assert_eq!(shown.message, "image.width: 0 must be from 1 to 65536");
         assert_eq!(shown.excerpt.as_deref(), Some("    2 | width = 0\n      | ^^^^^^^^^"));
         let text = "[image]\nwidth = = 2";
-        let error = Scene::parse(text, "s.toml", &Overrides::default()).unwrap_err();
+        let error = Scene::parse(text, "s.toml").unwrap_err();
         let shown = Diagnostic::scene(&error, text);
         assert_eq!(shown.place.as_deref(), Some("s.toml:2:9"));
         assert_eq!(shown.excerpt.as_deref(), Some("    2 | width = = 2\n      |         ^"));

@@ -120,7 +120,7 @@ impl Sources {
         if let Ok(described) = &described {
             files.extend(self.assets(described).map(|path| (path.clone(), self.stamp(&path))));
         }
-        let scene = Scene::load(&self.scene, &self.overrides).and_then(|scene| Ok((scene, described?)));
+        let scene = Scene::load_with(&self.scene, &self.overrides).and_then(|scene| Ok((scene, described?)));
         let scene = scene
             .map_err(|error| Diagnostic::scene(&error, &text))
             .map(|(scene, described)| {

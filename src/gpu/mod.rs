@@ -8,6 +8,7 @@ mod device;
 mod functions;
 mod interface;
 mod pipeline;
+mod place;
 mod prune;
 mod renderer;
 mod rounding;
@@ -16,7 +17,7 @@ mod scene;
 pub mod spirv;
 mod texels;
 mod validate;
-pub(crate) mod wording;
+mod wording;
 
 pub use bake::bake;
 pub use compile::{Checked, check};

@@ -90,7 +90,7 @@ fn mebibytes(bytes: u64) -> String {
 mod tests {
     use super::*;
     use crate::pack::pack;
-    use crate::scene::{Overrides, Scene};
+    use crate::scene::Scene;
 
     fn info(largest_binding: u64, storage_buffers: u32) -> Info {
         Info {
@@ -111,7 +111,7 @@ mod tests {
                      materials.m = { type = 'mirror' }\n";
         let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
         let text = format!("{start}{}", sphere.repeat(shapes));
-        let mut packed = pack(&Scene::parse(&text, "s", &Overrides::default()).unwrap());
+        let mut packed = pack(&Scene::parse(&text, "s").unwrap());
         packed.texels = (0..texels as u32).collect();
         packed
     }
@@ -137,11 +137,11 @@ mod tests {
         let told = |info: Info, packed: &Packed| TexelParts::of(&info, packed).unwrap_err().to_string();
         assert_eq!(
             told(info(1 << 20, storage), &packed(1, (1 << 18) + 1)),
-            "small: the scene's images take 1.0 MiB, a shader sees 1 x 1.0 MiB of them at most; --device cpu has no such limit"
+            "small: the scene's images take 1.0 MiB, a shader sees 1 x 1.0 MiB of them at most; the CPU has no such limit"
         );
         assert_eq!(
             told(info(1 << 18, storage), &packed(5000, 0)),
-            "small: the scene's shapes take 0.4 MiB, a shader sees 0.2 MiB of a buffer at most; --device cpu has no such limit"
+            "small: the scene's shapes take 0.4 MiB, a shader sees 0.2 MiB of a buffer at most; the CPU has no such limit"
         );
         TexelParts::of(&info(1 << 18, storage), &packed(3000, 0)).unwrap();
     }

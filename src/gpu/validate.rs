@@ -115,7 +115,7 @@ fn mistakes_of_functions(mut source: Source) -> (Vec<ShaderError>, Option<(Sourc
 mod tests {
     use super::*;
     use crate::pack::pack;
-    use crate::scene::{Overrides, Scene};
+    use crate::scene::Scene;
 
     const SCENE: &str = "
         image = { width = 8, height = 8 }
@@ -136,7 +136,7 @@ mod tests {
             };
             shaders = shaders.with(name, text);
         }
-        let packed = pack(&Scene::parse(SCENE, "s.toml", &Overrides::default()).unwrap());
+        let packed = pack(&Scene::parse(SCENE, "s.toml").unwrap());
         let errors = check_kernels(&packed, &shaders, Forms::Buffers).err();
         errors.map_or(Vec::new(), |errors| errors.0.iter().map(ToString::to_string).collect())
     }

@@ -89,7 +89,7 @@ impl Aov {
     }
 
     /// The channels of an EXR layer.
-    pub(super) fn channels(self) -> Vec<Channel> {
+    pub(crate) fn channels(self) -> Vec<Channel> {
         match self {
             Aov::Normal => vec![
                 Channel::Float("normal.X", |hit| hit.normal.x),

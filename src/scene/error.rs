@@ -40,9 +40,9 @@ pub enum SceneError {
         /// What is wrong.
         problem: Problem,
     },
-    /// An option that stands in for a value of the file has a bad value ([`Overrides`](super::Overrides)).
+    /// A value that stands in for one of the file is bad; the key is the field of [`Overrides`](super::Overrides).
     #[error("{0}")]
-    Option(Problem),
+    Override(Problem),
 }
 
 /// A value that breaks a rule: `shapes[2].size: -1 must be finite and greater than 0`.
@@ -56,6 +56,16 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// A problem of one key.
+    pub(crate) fn of(key: &str, message: impl Into<String>) -> Self {
+        Self::new(message).at(key)
+    }
+
+    /// The problem of a key inside of another one.
+    pub(crate) fn inside(self, key: &str) -> Self {
+        self.at(key)
+    }
+
     pub(super) fn new(message: impl Into<String>) -> Self {
         Self {
             key: KeyPath::default(),

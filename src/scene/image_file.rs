@@ -1,5 +1,6 @@
-//! Image files that textures name: found, decoded within limits, and checked.
+//! Images that textures name: files, found, decoded within limits, and checked; and images in memory.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
@@ -16,17 +17,35 @@ const LARGEST_FILE: u64 = 256 << 20;
 /// The largest texel, as of any colour.
 const BRIGHTEST: f32 = 1e6;
 
-/// Where the files that a scene names are.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Where the images that a scene names are.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Assets {
     /// Their names are relative to this folder, the scene file's.
     pub folder: PathBuf,
     /// They must lie in this one.
     pub root: PathBuf,
+    /// Images in memory by their names: a texture that names one of them as its file has it, and no file is read.
+    pub images: BTreeMap<String, Arc<Image>>,
+}
+
+/// A place that an image comes from.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Place {
+    /// A file, without links.
+    File(PathBuf),
+    /// An image of [`Assets::images`].
+    Memory(String),
+}
+
+impl Default for Assets {
+    /// Files in the current folder, and no images in memory.
+    fn default() -> Self {
+        Assets::beside(Path::new("."))
+    }
 }
 
 impl Assets {
-    /// Files in a folder.
+    /// Files in a folder, and no images in memory.
     pub fn beside(folder: &Path) -> Assets {
         let folder = match folder.as_os_str().is_empty() {
             true => Path::new("."),
@@ -35,7 +54,47 @@ impl Assets {
         Assets {
             folder: folder.to_owned(),
             root: folder.to_owned(),
+            images: BTreeMap::new(),
         }
+    }
+
+    /// Takes an image from memory. `encoding` is what its values should mean, if that is said; `fits` is asked before it is
+    /// looked at. The error is the value with the rule.
+    fn image_in_memory(
+        &self,
+        name: &str,
+        encoding: Option<Encoding>,
+        fits: impl Fn(Header) -> Result<(), String>,
+    ) -> Result<File, String> {
+        let image = self
+            .images
+            .get(name)
+            .ok_or_else(|| format!("{name:?} is no image in memory"))?;
+        let Image { width, height, texels } = &**image;
+        let (count, default) = match texels {
+            Texels::Bytes(encoding, texels) => (texels.len(), *encoding),
+            Texels::Floats(texels) => (texels.len(), Encoding::Linear),
+        };
+        if *width.max(height) > LONGEST_SIDE {
+            return Err(format!("{name:?} must have at most {LONGEST_SIDE} texels along a side"));
+        }
+        has_texels(name, *width, *height)?;
+        if count as u64 != u64::from(*width) * u64::from(*height) {
+            return Err(format!(
+                "{name:?} has {count} texels; its size, {width} x {height}, must be their number"
+            ));
+        }
+        if encoding.is_some_and(|encoding| encoding != default) {
+            return Err(format!("{name:?} must have the encoding of the image in memory"));
+        }
+        fits(Header::of(image))?;
+        in_range(name, image)?;
+        Ok(File {
+            image: Arc::clone(image),
+            format: None,
+            default,
+            encoding: default,
+        })
     }
 
     /// Reads an image. `encoding` is what its values mean, if that is said; `fits` is asked before anything is decoded. The
@@ -43,10 +102,13 @@ impl Assets {
     pub(super) fn image(
         &self,
         file: &str,
-        path: &Path,
+        place: &Place,
         encoding: Option<Encoding>,
         fits: impl Fn(Header) -> Result<(), String>,
     ) -> Result<File, String> {
+        let Place::File(path) = place else {
+            return self.image_in_memory(file, encoding, fits);
+        };
         let bytes = read(file, path)?;
         let format = image::guess_format(&bytes)
             .ok()
@@ -66,46 +128,38 @@ impl Assets {
         })?;
         drop(bytes);
         let (width, height) = (decoded.width(), decoded.height());
-        if width == 0 || height == 0 {
-            return Err(format!(
-                "{file:?} must have a texel at least; its size is {width} x {height}"
-            ));
-        }
+        has_texels(file, width, height)?;
         let default = if is_float { Encoding::Linear } else { Encoding::Srgb };
         let texels = texels(decoded, is_float, encoding.unwrap_or(default));
-        if let Texels::Floats(values) = &texels {
-            let bad = |value: &f32| !(0.0..=BRIGHTEST).contains(value);
-            if let Some(i) = values.iter().position(|texel| texel.iter().any(bad)) {
-                let (x, y) = (i as u32 % width, i as u32 / width);
-                let [r, g, b] = values[i];
-                let rule = "the values of each must be finite, from 0 to 1e6";
-                return Err(format!("{file:?} has the texel [{r}, {g}, {b}] at ({x}, {y}); {rule}"));
-            }
-        }
+        let image = Image { width, height, texels };
+        in_range(file, &image)?;
         Ok(File {
-            image: Arc::new(Image { width, height, texels }),
-            format,
+            image: Arc::new(image),
+            format: Some(format),
             default,
             encoding: encoding.unwrap_or(default),
         })
     }
 
-    /// Where a file is.
-    pub(super) fn find(&self, file: &str) -> Result<PathBuf, String> {
+    /// Where an image is.
+    pub(super) fn find(&self, file: &str) -> Result<Place, String> {
+        if self.images.contains_key(file) {
+            return Ok(Place::Memory(file.to_owned()));
+        }
         let path = self.folder.join(file).canonicalize();
         let path = path.map_err(|error| unreadable(file, &error))?;
         let root = self.root.canonicalize().map_err(|error| {
             let root = self.root.display();
-            format!("{file:?} must lie in {root}, the folder of --asset-root, which cannot be found: {error}")
+            format!("{file:?} must lie in {root}, the asset root, which cannot be found: {error}")
         })?;
         if !path.starts_with(&root) {
             let root = self.root.display();
             return Err(match self.root == self.folder {
                 true => format!(
-                    "{file:?} must not leave the scene's folder, {root}, unless --asset-root names a folder that it lies in"
+                    "{file:?} must not leave the scene's folder, {root}, unless another asset root is given that it lies in"
                 ),
                 false => format!(
-                    "{file:?} is {}, which must lie in {root}, the folder of --asset-root",
+                    "{file:?} is {}, which must lie in {root}, the asset root",
                     path.display()
                 ),
             });
@@ -113,15 +167,38 @@ impl Assets {
         if !path.is_file() {
             return Err(format!("{file:?} must be a file"));
         }
-        Ok(path)
+        Ok(Place::File(path))
     }
 }
 
-/// A file that was read.
+fn has_texels(name: &str, width: u32, height: u32) -> Result<(), String> {
+    if width == 0 || height == 0 {
+        return Err(format!(
+            "{name:?} must have a texel at least; its size is {width} x {height}"
+        ));
+    }
+    Ok(())
+}
+
+fn in_range(name: &str, image: &Image) -> Result<(), String> {
+    if let Texels::Floats(values) = &image.texels {
+        let bad = |value: &f32| !(0.0..=BRIGHTEST).contains(value);
+        if let Some(i) = values.iter().position(|texel| texel.iter().any(bad)) {
+            let (x, y) = (i as u32 % image.width, i as u32 / image.width);
+            let [r, g, b] = values[i];
+            let rule = "the values of each must be finite, from 0 to 1e6";
+            return Err(format!("{name:?} has the texel [{r}, {g}, {b}] at ({x}, {y}); {rule}"));
+        }
+    }
+    Ok(())
+}
+
+/// A file that was read, or an image that was in memory.
 #[derive(Clone)]
 pub(super) struct File {
     pub image: Arc<Image>,
-    format: ImageFormat,
+    /// None in memory.
+    format: Option<ImageFormat>,
     default: Encoding,
     encoding: Encoding,
 }
@@ -134,7 +211,7 @@ impl File {
 
     /// Refuses a name that says another format.
     pub fn check_name(&self, file: &str) -> Result<(), String> {
-        check_name(file, self.format)
+        self.format.map_or(Ok(()), |format| check_name(file, format))
     }
 }
 

@@ -1,4 +1,4 @@
-//! From a scene file to a checked [`Scene`], with the options of a command line in place of its values.
+//! From a scene file to a checked [`Scene`], with other values in place of some of the file's.
 
 use std::fs::File;
 use std::io::{self, Read as _};
@@ -12,44 +12,44 @@ use super::{AdaptiveDescription, Assets, Description, Pattern, SamplesDescriptio
 /// The largest scene file in bytes: far above what anyone writes, far below what fills the memory.
 const LARGEST_FILE: u64 = 64 << 20;
 
-/// Values that stand in for those of a file. Where one is bad the error is [`SceneError::Option`], which names
-/// the option of the command line.
+/// Values that stand in for those of a file. Where one is bad the error is [`SceneError::Override`], which names the
+/// field.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overrides {
-    /// `--size`: width and height.
+    /// Width and height of the picture, in pixels, 1 to 65,536.
     pub size: Option<(u32, u32)>,
-    /// `--pixel-samples`: the count; the pattern stays.
+    /// The count of every pixel's samples; their pattern stays.
     pub pixel_samples: Option<u32>,
-    /// `--light-samples`: the count; the pattern stays.
+    /// The count of samples of every area light at every hit; their pattern stays.
     pub light_samples: Option<u32>,
-    /// `--seed`
+    /// The seed of all random patterns.
     pub seed: Option<u32>,
-    /// `--pixel-pattern`
+    /// The layout of a pixel's samples; their count stays.
     pub pixel_pattern: Option<Pattern>,
-    /// `--adaptive`: the error; the most samples stay.
+    /// The error that adaptive sampling aims at, 0 to 1; the most samples stay.
     pub adaptive: Option<f64>,
-    /// `--asset-root`: the folder that files named by the scene must lie in, instead of the scene's own.
+    /// The folder that files named by the scene must lie in, instead of the scene's own.
     pub asset_root: Option<PathBuf>,
 }
 
 impl Overrides {
     fn apply(&self, description: &mut Description) -> Result<(), Problem> {
         if let Some((width, height)) = self.size {
-            description.image.width = side(width).at("--size")?;
-            description.image.height = side(height).at("--size")?;
+            description.image.width = side(width).at("size")?;
+            description.image.height = side(height).at("size")?;
         }
         let render = &mut description.render;
         if let Some(pattern) = self.pixel_pattern {
             render.pixel_samples.pattern = pattern;
         }
-        set_count(&mut render.pixel_samples, self.pixel_samples).at("--pixel-samples")?;
-        set_count(&mut render.light_samples, self.light_samples).at("--light-samples")?;
+        set_count(&mut render.pixel_samples, self.pixel_samples).at("pixel_samples")?;
+        set_count(&mut render.light_samples, self.light_samples).at("light_samples")?;
         render.seed = self.seed.unwrap_or(render.seed);
         if let Some(error) = self.adaptive {
-            adaptive_error(error).at("--adaptive")?;
+            adaptive_error(error).at("adaptive")?;
             let max_samples = (render.adaptive.as_ref()).and_then(|adaptive| adaptive.max_samples);
             let description = AdaptiveDescription { error, max_samples };
-            adaptive(&description, &render.pixel_samples).at("--adaptive")?;
+            adaptive(&description, &render.pixel_samples).at("adaptive")?;
             render.adaptive = Some(description);
         }
         Ok(())
@@ -69,7 +69,17 @@ impl Scene {
     /// # Errors
     ///
     /// Files that cannot be read, hold more than 64 MiB or are not UTF-8, and the errors of [`Scene::parse`].
-    pub fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
+    pub fn load(path: impl AsRef<Path>) -> Result<Scene, SceneError> {
+        Scene::load_with(path, &Overrides::default())
+    }
+
+    /// Reads and checks a scene file, with other values in place of some of the file's.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Scene::load`], and bad overrides.
+    pub fn load_with(path: impl AsRef<Path>, overrides: &Overrides) -> Result<Scene, SceneError> {
+        let path = path.as_ref();
         let bytes = read(path).map_err(|error| SceneError::Read {
             path: path.to_owned(),
             error,
@@ -90,8 +100,17 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// The errors of [`Description::parse`] and of [`Description::validate`], and bad overrides.
-    pub fn parse(text: &str, origin: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
+    /// The errors of [`Description::parse`] and of [`Description::validate`].
+    pub fn parse(text: &str, origin: &str) -> Result<Scene, SceneError> {
+        Scene::parse_with(text, origin, &Overrides::default())
+    }
+
+    /// Reads and checks the text of a scene file, with other values in place of some of its own.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Scene::parse`], and bad overrides.
+    pub fn parse_with(text: &str, origin: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
         parse_beside(text, origin, folder_of(Path::new(origin)), overrides)
     }
 }
@@ -102,7 +121,7 @@ fn folder_of(path: &Path) -> &Path {
 
 fn parse_beside(text: &str, origin: &str, folder: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
     let mut description = Description::parse(text, origin)?;
-    overrides.apply(&mut description).map_err(SceneError::Option)?;
+    overrides.apply(&mut description).map_err(SceneError::Override)?;
     let mut assets = Assets::beside(folder);
     if let Some(root) = &overrides.asset_root {
         assets.root.clone_from(root);
@@ -148,18 +167,18 @@ light_samples = { pattern = 'random', count = 5 }
             adaptive: None,
             asset_root: None,
         };
-        let scene = Scene::parse(SCENE, "s.toml", &overrides).unwrap();
+        let scene = Scene::parse_with(SCENE, "s.toml", &overrides).unwrap();
         let render = scene.render;
         assert_eq!((scene.width, scene.height, render.seed), (50, 40, 3));
         assert_eq!((render.pixel_samples.count, render.light_samples.count), (9, 8));
-        let scene = Scene::parse(SCENE, "s.toml", &Overrides::default()).unwrap();
+        let scene = Scene::parse(SCENE, "s.toml").unwrap();
         let render = scene.render;
         assert_eq!((scene.width, scene.height, render.seed), (4, 3, 0));
         assert_eq!((render.pixel_samples.count, render.light_samples.count), (16, 5));
     }
 
     #[test]
-    fn bad_overrides_are_told_by_the_options_name() {
+    fn bad_overrides_are_told_by_their_names() {
         let none = Overrides::default;
         for (overrides, told) in [
             (
@@ -167,32 +186,32 @@ light_samples = { pattern = 'random', count = 5 }
                     size: Some((0, 1)),
                     ..none()
                 },
-                "--size: 0 must be from 1 to 65536",
+                "size: 0 must be from 1 to 65536",
             ),
             (
                 Overrides {
                     size: Some((1, 65_537)),
                     ..none()
                 },
-                "--size: 65537 must be from 1 to 65536",
+                "size: 65537 must be from 1 to 65536",
             ),
             (
                 Overrides {
                     pixel_samples: Some(8),
                     ..none()
                 },
-                "--pixel-samples: 8 must be a square number, as its pattern is n x n cells",
+                "pixel_samples: 8 must be a square number, as its pattern is n x n cells",
             ),
             (
                 Overrides {
                     light_samples: Some(0),
                     ..none()
                 },
-                "--light-samples: 0 must be from 1 to 65536",
+                "light_samples: 0 must be from 1 to 65536",
             ),
         ] {
-            let error = Scene::parse(SCENE, "s.toml", &overrides).unwrap_err();
-            assert!(matches!(error, SceneError::Option(_)), "{error}");
+            let error = Scene::parse_with(SCENE, "s.toml", &overrides).unwrap_err();
+            assert!(matches!(error, SceneError::Override(_)), "{error}");
             assert_eq!(error.to_string(), told);
         }
     }
@@ -200,7 +219,7 @@ light_samples = { pattern = 'random', count = 5 }
     #[test]
     fn files_are_read_or_the_message_says_why_not() {
         let folder = tempfile::tempdir().unwrap();
-        let load = |name: &str| Scene::load(&folder.path().join(name), &Overrides::default());
+        let load = |name: &str| Scene::load(folder.path().join(name));
         let told = |name: &str| load(name).unwrap_err().to_string();
         let path = |name: &str| folder.path().join(name).display().to_string();
         let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();

@@ -138,7 +138,7 @@ impl Files {
     }
 
     pub fn packed(&self) -> Packed {
-        pack(&Scene::load(&self.path("scene.toml"), &Overrides::default()).unwrap())
+        pack(&Scene::load(self.path("scene.toml")).unwrap())
     }
 
     /// What `render` makes of the files.

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
 use proptest::test_runner::{Config, RngAlgorithm, TestError, TestRng, TestRunner};
 use wgray::gpu::compose::Shaders;
-use wgray::scene::{Description, Overrides, Scene};
+use wgray::scene::{Description, Scene};
 
 use crate::adapter::{self, bit_exact};
 use crate::nearly::Nearly;
@@ -157,7 +157,7 @@ fn shaders_that_differ_by_one_ulp_are_found_by_random_scenes() {
     let (d, reason) = failing(40, 10, true, &shaders).expect("a scene that differs");
     assert!(reason.contains("pixels differ"), "{reason}");
     let path = save(&d, "scene-of-a-negative-control.toml");
-    let scene = Scene::load(&path, &Overrides::default()).unwrap_or_else(|error| panic!("{error}"));
+    let scene = Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(wgray::pack::pack(&scene), scenes::packed(&d));
 }
 

@@ -322,7 +322,7 @@ fn what_cannot_be_is_told() {
              [render]\n{render}\n"
         )
     };
-    let told = |render: &str, overrides: &Overrides| match Scene::parse(&text(render), "s.toml", overrides) {
+    let told = |render: &str, overrides: &Overrides| match Scene::parse_with(&text(render), "s.toml", overrides) {
         Ok(_) => "sound".to_string(),
         Err(error) => error.to_string(),
     };
@@ -386,7 +386,7 @@ fn what_cannot_be_is_told() {
     let grid = "--adaptive: the pattern of pixel_samples is \"grid\", which has no further samples";
     assert!(told("", &option(0.1, None)).starts_with(grid));
     assert!(told("", &option(-0.1, Some(Pattern::Sobol))).starts_with("--adaptive: -0.1 must be from 0 to 1"));
-    let scene = Scene::parse(&text(""), "s.toml", &option(0.1, Some(Pattern::Sobol))).expect("a sound scene");
+    let scene = Scene::parse_with(&text(""), "s.toml", &option(0.1, Some(Pattern::Sobol))).expect("a sound scene");
     let adaptive = scene.render.adaptive.expect("adaptive sampling");
     assert_eq!((adaptive.error, adaptive.max_samples), (0.1, 256));
 }

@@ -15,7 +15,7 @@ camera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }
 fn load(folder: &Path, text: &str) -> Result<Scene, String> {
     let path = folder.join("s.toml");
     std::fs::write(&path, format!("{START}{text}")).unwrap();
-    Scene::load(&path, &Overrides::default()).map_err(|error| {
+    Scene::load(&path).map_err(|error| {
         let message = error.to_string();
         let start = format!("{}:", path.display());
         message
@@ -129,7 +129,7 @@ fn links_that_leave_the_folder_are_refused() {
         asset_root: Some("/".into()),
         ..Overrides::default()
     };
-    Scene::load(&folder.path().join("s.toml"), &overrides).unwrap();
+    Scene::load_with(folder.path().join("s.toml"), &overrides).unwrap();
 }
 
 /// A copy of a PNG whose header claims another size, with its checksum: what the header rules out is not decoded.

@@ -1,7 +1,7 @@
 //! EXR files of one channel are gray images.
 
 use exr::prelude::*;
-use wgray::scene::{Overrides, Scene, Texels, TexturePattern};
+use wgray::scene::{Scene, Texels, TexturePattern};
 
 const SIZE: (usize, usize) = (3, 2);
 
@@ -21,7 +21,7 @@ fn load(folder: &std::path::Path) -> std::result::Result<Texels, String> {
         camera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }\n\
         [textures.t]\ntype = 'image'\nfile = 't.exr'\n";
     std::fs::write(folder.join("s.toml"), text).unwrap();
-    let scene = Scene::load(&folder.join("s.toml"), &Overrides::default()).map_err(|error| error.to_string())?;
+    let scene = Scene::load(folder.join("s.toml")).map_err(|error| error.to_string())?;
     let TexturePattern::Image { image, .. } = &scene.textures[0].pattern else {
         panic!("an image");
     };

@@ -34,6 +34,25 @@ pub struct RectangleLightDescription {
     pub color: DVec3,
 }
 
+impl RectangleLightDescription {
+    /// A light of this middle, size along tangent and bitangent, normal, tangent and linear RGB.
+    pub fn new(
+        center: impl Into<DVec3>,
+        size: [f64; 2],
+        normal: impl Into<DVec3>,
+        tangent: impl Into<DVec3>,
+        color: impl Into<DVec3>,
+    ) -> Self {
+        Self {
+            center: center.into(),
+            size,
+            normal: normal.into(),
+            tangent: tangent.into(),
+            color: color.into(),
+        }
+    }
+}
+
 /// Light from one point, without falloff.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -44,6 +63,16 @@ pub struct PointLightDescription {
     pub color: DVec3,
 }
 
+impl PointLightDescription {
+    /// A light at this position, of linear RGB.
+    pub fn new(position: impl Into<DVec3>, color: impl Into<DVec3>) -> Self {
+        Self {
+            position: position.into(),
+            color: color.into(),
+        }
+    }
+}
+
 /// Light from infinitely far away.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -52,4 +81,14 @@ pub struct DirectionalLightDescription {
     pub direction: DVec3,
     /// Linear RGB.
     pub color: DVec3,
+}
+
+impl DirectionalLightDescription {
+    /// Light that travels in this direction, of linear RGB.
+    pub fn new(direction: impl Into<DVec3>, color: impl Into<DVec3>) -> Self {
+        Self {
+            direction: direction.into(),
+            color: color.into(),
+        }
+    }
 }

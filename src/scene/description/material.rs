@@ -37,8 +37,22 @@ pub struct PhongDescription {
     pub normal_map: Option<NormalMapDescription>,
 }
 
+impl PhongDescription {
+    /// A material with one colour for all three factors, and the exponent 16.
+    pub fn new(color: impl Into<ColorDescription>) -> Self {
+        Self {
+            color: Some(color.into()),
+            ambient: None,
+            diffuse: None,
+            specular: None,
+            shininess: sixteen(),
+            normal_map: None,
+        }
+    }
+}
+
 /// A mirror.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct MirrorDescription {
     /// Factor of the reflected light.
@@ -59,6 +73,17 @@ pub struct GlassDescription {
     pub tint: ColorDescription,
     /// What bends its normals.
     pub normal_map: Option<NormalMapDescription>,
+}
+
+impl GlassDescription {
+    /// Glass that colours no light.
+    pub fn new(ior: f64) -> Self {
+        Self {
+            ior,
+            tint: ColorDescription::default(),
+            normal_map: None,
+        }
+    }
 }
 
 fn sixteen() -> f64 {

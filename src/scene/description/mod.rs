@@ -1,6 +1,7 @@
 //! What a scene file says, field for field; `docs/scene-format.md` describes every key.
 //!
 //! Nothing here is checked but the types: [`Description::validate`] makes a [`Scene`](super::Scene) of it.
+//! It is read from a file, or made in code by [`Description::new`] and the constructors of its parts.
 //! Serializing a `Description` with the `toml` crate gives a file that reads back as the same `Description`.
 
 mod light;
@@ -18,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use self::tagged::{ReadError, Tagged, tagged};
+use super::Assets;
 
 pub use self::light::*;
 pub use self::material::*;
@@ -45,6 +47,58 @@ pub struct Description {
 }
 
 impl Description {
+    /// An empty scene for a picture of this size, in pixels, rendered by the settings' defaults.
+    pub fn new(width: u32, height: u32, camera: impl Into<CameraDescription>) -> Self {
+        Self {
+            image: ImageDescription { width, height },
+            camera: camera.into(),
+            render: RenderDescription::default(),
+            textures: BTreeMap::new(),
+            materials: BTreeMap::new(),
+            lights: Vec::new(),
+            shapes: Vec::new(),
+        }
+    }
+
+    /// The scene with other settings.
+    pub fn with_render(mut self, render: RenderDescription) -> Self {
+        self.render = render;
+        self
+    }
+
+    /// The scene with a further texture, in place of any that has its name.
+    pub fn with_texture(mut self, name: impl Into<String>, texture: impl Into<TextureDescription>) -> Self {
+        self.textures.insert(name.into(), texture.into());
+        self
+    }
+
+    /// The scene with a further material, in place of any that has its name.
+    pub fn with_material(mut self, name: impl Into<String>, material: impl Into<MaterialDescription>) -> Self {
+        self.materials.insert(name.into(), material.into());
+        self
+    }
+
+    /// The scene with a further light.
+    pub fn with_light(mut self, light: impl Into<LightDescription>) -> Self {
+        self.lights.push(light.into());
+        self
+    }
+
+    /// The scene with a further shape.
+    pub fn with_shape(mut self, shape: impl Into<ShapeDescription>) -> Self {
+        self.shapes.push(shape.into());
+        self
+    }
+
+    /// The files that it names, without the images in memory.
+    pub(super) fn files_beside(&self, assets: &Assets) -> impl Iterator<Item = PathBuf> {
+        let in_memory = |path: &PathBuf| {
+            let mut names = assets.images.keys();
+            names.any(|name| assets.folder.join(name) == *path)
+        };
+        self.files(&assets.folder).filter(move |path| !in_memory(path))
+    }
+
     /// The files that it names, which are relative to the scene file's folder.
     pub fn files(&self, folder: &Path) -> impl Iterator<Item = PathBuf> {
         self.textures.values().filter_map(move |texture| match texture {
@@ -92,6 +146,19 @@ pub struct PerspectiveDescription {
     pub focal_length: f64,
 }
 
+impl PerspectiveDescription {
+    /// A camera with z upwards. `fov` is vertical, in degrees.
+    pub fn new(position: impl Into<DVec3>, look_at: impl Into<DVec3>, fov: f64) -> Self {
+        Self {
+            position: position.into(),
+            look_at: look_at.into(),
+            up: z_up(),
+            fov,
+            focal_length: one(),
+        }
+    }
+}
+
 /// A camera of parallel rays.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -105,6 +172,18 @@ pub struct OrthographicDescription {
     pub up: DVec3,
     /// Height of the seen rectangle in scene units.
     pub height: f64,
+}
+
+impl OrthographicDescription {
+    /// A camera with z upwards. `height` is that of the seen rectangle, in scene units.
+    pub fn new(position: impl Into<DVec3>, look_at: impl Into<DVec3>, height: f64) -> Self {
+        Self {
+            position: position.into(),
+            look_at: look_at.into(),
+            up: z_up(),
+            height,
+        }
+    }
 }
 
 fn z_up() -> DVec3 {

@@ -42,6 +42,25 @@ pub struct RectangleDescription {
     pub tangent: DVec3,
 }
 
+impl RectangleDescription {
+    /// A rectangle of this material, middle, size along tangent and bitangent, normal and tangent.
+    pub fn new(
+        material: impl Into<String>,
+        center: impl Into<DVec3>,
+        size: [f64; 2],
+        normal: impl Into<DVec3>,
+        tangent: impl Into<DVec3>,
+    ) -> Self {
+        Self {
+            material: material.into(),
+            center: center.into(),
+            size,
+            normal: normal.into(),
+            tangent: tangent.into(),
+        }
+    }
+}
+
 /// A disk.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -57,6 +76,19 @@ pub struct DiskDescription {
     /// Direction of the texture coordinate u; any length. If absent, x, or y where the normal is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tangent: Option<DVec3>,
+}
+
+impl DiskDescription {
+    /// A disk of this material, middle, radius and normal.
+    pub fn new(material: impl Into<String>, center: impl Into<DVec3>, radius: f64, normal: impl Into<DVec3>) -> Self {
+        Self {
+            material: material.into(),
+            center: center.into(),
+            radius,
+            normal: normal.into(),
+            tangent: None,
+        }
+    }
 }
 
 /// An ellipsoid: the image of the unit sphere under the linear map with the columns a, b, c.
@@ -75,6 +107,25 @@ pub struct EllipsoidDescription {
     pub c: DVec3,
 }
 
+impl EllipsoidDescription {
+    /// An ellipsoid of this material, middle and half axes.
+    pub fn new(
+        material: impl Into<String>,
+        center: impl Into<DVec3>,
+        a: impl Into<DVec3>,
+        b: impl Into<DVec3>,
+        c: impl Into<DVec3>,
+    ) -> Self {
+        Self {
+            material: material.into(),
+            center: center.into(),
+            a: a.into(),
+            b: b.into(),
+            c: c.into(),
+        }
+    }
+}
+
 /// A sphere.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -87,6 +138,17 @@ pub struct SphereDescription {
     pub radius: f64,
 }
 
+impl SphereDescription {
+    /// A sphere of this material, middle and radius.
+    pub fn new(material: impl Into<String>, center: impl Into<DVec3>, radius: f64) -> Self {
+        Self {
+            material: material.into(),
+            center: center.into(),
+            radius,
+        }
+    }
+}
+
 /// A triangle.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -97,6 +159,16 @@ pub struct TriangleDescription {
     pub vertices: [DVec3; 3],
 }
 
+impl TriangleDescription {
+    /// A triangle of this material and vertices, counter-clockwise as seen from outside.
+    pub fn new(material: impl Into<String>, vertices: [impl Into<DVec3>; 3]) -> Self {
+        Self {
+            material: material.into(),
+            vertices: vertices.map(Into::into),
+        }
+    }
+}
+
 /// A tetrahedron.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -105,6 +177,16 @@ pub struct TetrahedronDescription {
     pub material: String,
     /// Its corners.
     pub vertices: [DVec3; 4],
+}
+
+impl TetrahedronDescription {
+    /// A tetrahedron of this material and corners.
+    pub fn new(material: impl Into<String>, vertices: [impl Into<DVec3>; 4]) -> Self {
+        Self {
+            material: material.into(),
+            vertices: vertices.map(Into::into),
+        }
+    }
 }
 
 /// An infinite plane.
@@ -119,4 +201,21 @@ pub struct PlaneDescription {
     pub normal: DVec3,
     /// Direction of the texture coordinate u; any length.
     pub tangent: DVec3,
+}
+
+impl PlaneDescription {
+    /// A plane of this material, through a point, with this normal and tangent.
+    pub fn new(
+        material: impl Into<String>,
+        point: impl Into<DVec3>,
+        normal: impl Into<DVec3>,
+        tangent: impl Into<DVec3>,
+    ) -> Self {
+        Self {
+            material: material.into(),
+            point: point.into(),
+            normal: normal.into(),
+            tangent: tangent.into(),
+        }
+    }
 }

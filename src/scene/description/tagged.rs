@@ -28,6 +28,14 @@ macro_rules! tagged {
             $($(#[$variant_doc])* #[serde(rename = $tag)] $variant($body),)+
         }
 
+        $(
+            impl From<$body> for $name {
+                fn from(body: $body) -> Self {
+                    Self::$variant(body)
+                }
+            }
+        )+
+
         impl Tagged for $name {
             const TYPES: &'static [&'static str] = &[$($tag),+];
 

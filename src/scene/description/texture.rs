@@ -27,6 +27,20 @@ impl Default for ColorDescription {
     }
 }
 
+impl From<[f64; 3]> for ColorDescription {
+    /// Linear RGB.
+    fn from(color: [f64; 3]) -> Self {
+        Self::Plain(color.into())
+    }
+}
+
+impl ColorDescription {
+    /// The colours of a texture, by its name.
+    pub fn texture(name: impl Into<String>) -> Self {
+        Self::Texture(TextureReference { texture: name.into() })
+    }
+}
+
 // By hand: serde's untagged enums lose the place and the reason of an error.
 impl<'de> Deserialize<'de> for ColorDescription {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -93,6 +107,13 @@ pub struct ConstantDescription {
     pub color: DVec3,
 }
 
+impl ConstantDescription {
+    /// This colour, in linear RGB.
+    pub fn new(color: impl Into<DVec3>) -> Self {
+        Self { color: color.into() }
+    }
+}
+
 /// Squares of two colours, of side 1.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -110,6 +131,19 @@ pub struct CheckerDescription {
     /// Added to u and v.
     #[serde(default)]
     pub offset: [f64; 2],
+}
+
+impl CheckerDescription {
+    /// Squares of side 1 in these colours, in linear RGB.
+    pub fn new(even: impl Into<DVec3>, odd: impl Into<DVec3>) -> Self {
+        Self {
+            even: even.into(),
+            odd: odd.into(),
+            scale: ones(),
+            rotate: 0.0,
+            offset: [0.0; 2],
+        }
+    }
 }
 
 /// Lines around whole numbers.
@@ -133,7 +167,21 @@ pub struct GridDescription {
     pub offset: [f64; 2],
 }
 
-/// An image file.
+impl GridDescription {
+    /// Lines of this width around cells, in these colours, in linear RGB.
+    pub fn new(cell: impl Into<DVec3>, line: impl Into<DVec3>, line_width: f64) -> Self {
+        Self {
+            cell: cell.into(),
+            line: line.into(),
+            line_width,
+            scale: ones(),
+            rotate: 0.0,
+            offset: [0.0; 2],
+        }
+    }
+}
+
+/// An image file, or an image of [`Assets::images`](crate::scene::Assets::images).
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImageTextureDescription {
@@ -159,6 +207,22 @@ pub struct ImageTextureDescription {
     /// Added to u and v.
     #[serde(default)]
     pub offset: [f64; 2],
+}
+
+impl ImageTextureDescription {
+    /// The image of this name, repeated, and filtered by the elliptical weighted average.
+    pub fn new(file: impl Into<String>) -> Self {
+        Self {
+            file: file.into(),
+            encoding: None,
+            wrap: Wrap::default(),
+            filter: Filter::default(),
+            max_anisotropy: sixteen(),
+            scale: ones(),
+            rotate: 0.0,
+            offset: [0.0; 2],
+        }
+    }
 }
 
 fn one() -> f64 {

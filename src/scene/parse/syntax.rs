@@ -238,7 +238,7 @@ fn twice(text: &str, place: &Place, name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use crate::scene::{Overrides, Scene};
+    use crate::scene::Scene;
 
     const START: &str = "\
 [image]
@@ -345,7 +345,7 @@ fov = 45
             ),
             ("é = 3", "8:1: "),
         ] {
-            let error = Scene::parse(&format!("{START}{added}"), "s.toml", &Overrides::default()).unwrap_err();
+            let error = Scene::parse(&format!("{START}{added}"), "s.toml").unwrap_err();
             let message = error.to_string();
             assert!(message.starts_with(&format!("s.toml:{told}")), "{message}\n{told}");
             assert_eq!(message.lines().count(), 1, "{message}");
@@ -360,8 +360,8 @@ fov = 45
         for a in texts {
             for b in texts {
                 for c in texts {
-                    let _ = Scene::parse(&format!("a{a}{b}{c}"), "s.toml", &Overrides::default());
-                    let _ = Scene::parse(&format!("x = {a}{b}{c}"), "s.toml", &Overrides::default());
+                    let _ = Scene::parse(&format!("a{a}{b}{c}"), "s.toml");
+                    let _ = Scene::parse(&format!("x = {a}{b}{c}"), "s.toml");
                 }
             }
         }

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::super::{
-    Assets, CameraDescription, LightDescription, MaterialDescription, Overrides, RenderDescription, Scene,
-    ShapeDescription, TextureDescription,
+    Assets, CameraDescription, LightDescription, MaterialDescription, RenderDescription, Scene, ShapeDescription,
+    TextureDescription,
 };
 use super::*;
 
@@ -22,14 +22,12 @@ fov = 45
 ";
 
 fn message(text: &str) -> String {
-    Scene::parse(text, "s.toml", &Overrides::default())
-        .unwrap_err()
-        .to_string()
+    Scene::parse(text, "s.toml").unwrap_err().to_string()
 }
 
 #[test]
 fn bad_text_is_told_with_its_line() {
-    Scene::parse(START, "s.toml", &Overrides::default()).unwrap();
+    Scene::parse(START, "s.toml").unwrap();
     // What is added, the line in it, and what is told.
     for (added, line, told) in [
         (
@@ -168,7 +166,7 @@ fn text_that_is_no_toml_is_told_with_line_and_column() {
 #[test]
 fn every_prefix_of_a_scene_is_read_or_refused_without_panic() {
     let text = include_str!("../../../scenes/cornell.toml");
-    let good = |end: usize| Scene::parse(&text[..end], "s.toml", &Overrides::default()).is_ok();
+    let good = |end: usize| Scene::parse(&text[..end], "s.toml").is_ok();
     let count = (0..text.len())
         .filter(|&end| text.is_char_boundary(end) && good(end))
         .count();
@@ -203,7 +201,7 @@ fn a_scene_written_and_read_back_is_the_same() {
 #[test]
 fn the_example_of_the_page_is_a_scene() {
     let example = PAGE.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
-    let scene = Scene::parse(example, "scene-format.md", &Overrides::default()).unwrap();
+    let scene = Scene::parse(example, "scene-format.md").unwrap();
     assert_eq!(scene.shapes.len(), 1);
 }
 

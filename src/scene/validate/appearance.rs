@@ -1,12 +1,11 @@
 //! The rules of materials and textures.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::super::decode::Header;
-use super::super::image_file::File;
+use super::super::image_file::{File, Place};
 use super::super::texture::{levels, words};
 use super::super::{
     Assets, ColorDescription, Encoding, Image, ImageTextureDescription, Material, MaterialDescription, NormalMap,
@@ -39,7 +38,7 @@ pub(super) fn textures(descriptions: &BTreeMap<String, TextureDescription>, asse
 struct Images<'a> {
     assets: &'a Assets,
     /// By their place, with the words that each takes.
-    files: BTreeMap<PathBuf, Vec<(File, u64)>>,
+    files: BTreeMap<Place, Vec<(File, u64)>>,
     /// The memory of all of them, in bytes.
     taken: u64,
 }
@@ -47,8 +46,8 @@ struct Images<'a> {
 impl Images<'_> {
     fn image(&mut self, texture: &ImageTextureDescription) -> Result<Arc<Image>, String> {
         let file = &texture.file;
-        let path = self.assets.find(file)?;
-        let known = self.files.entry(path.clone()).or_default();
+        let place = self.assets.find(file)?;
+        let known = self.files.entry(place.clone()).or_default();
         let taken = self.taken;
         // With what it takes already.
         let fits = |header: Header, before: u64| {
@@ -81,7 +80,7 @@ impl Images<'_> {
         }
         let read = self
             .assets
-            .image(file, &path, texture.encoding, |header| fits(header, 0).map(|_| ()))?;
+            .image(file, &place, texture.encoding, |header| fits(header, 0).map(|_| ()))?;
         let words = fits(Header::of(&read.image), 0)?;
         self.taken += 4 * words;
         let image = Arc::clone(&read.image);

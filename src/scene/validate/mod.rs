@@ -35,7 +35,7 @@ const FLATTEST: f64 = 1e-6;
 type Checked<T> = Result<T, Problem>;
 
 impl Description {
-    /// Checks every value and makes a scene of them; files that they name are in the current folder.
+    /// Checks every value and makes a scene of them. Image files that they name are in the current folder.
     ///
     /// # Errors
     ///
@@ -72,7 +72,7 @@ impl Description {
             textures,
             materials,
             shapes,
-            files: self.files(&assets.folder).collect(),
+            files: self.files_beside(assets).collect(),
         })
     }
 }
@@ -161,8 +161,7 @@ pub(super) fn adaptive(description: &AdaptiveDescription, pixel_samples: &Sample
             .map(Pattern::name)
             .collect();
         format!(
-            "the pattern of pixel_samples is {name:?}, which has no further samples; it must be one of {}, as with \
-             --pixel-pattern sobol",
+            "the pattern of pixel_samples is {name:?}, which has no further samples; it must be one of {}",
             list(others)
         )
     })?;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::super::{Overrides, SceneError};
+use super::super::SceneError;
 use super::*;
 
 /// One of everything; every line is there once, so that a test can put another in its place.
@@ -83,7 +83,7 @@ tangent = [1, 1, 0]
 "#;
 
 fn parse(text: &str) -> Result<Scene, SceneError> {
-    Scene::parse(text, "s.toml", &Overrides::default())
+    Scene::parse(text, "s.toml")
 }
 
 /// The good scene with a line changed.

@@ -1,0 +1,42 @@
+//! Renders a scene on an adapter and on the CPU, and compares the two pictures bit by bit.
+//!
+//! ```sh
+//! cargo run --release --example gpu_against_cpu -- scenes/textures.toml
+//! ```
+
+use std::process::ExitCode;
+
+use wgray::image::difference;
+use wgray::{Device, Error, Options, Overrides, Scene};
+
+fn main() -> Result<ExitCode, Error> {
+    let file = std::env::args()
+        .nth(1)
+        .unwrap_or("scenes/mirror-glass.toml".to_string());
+    let overrides = Overrides {
+        size: Some((96, 64)),
+        pixel_samples: Some(4),
+        ..Overrides::default()
+    };
+    let scene = Scene::load_with(file, &overrides)?;
+    let render = |device| {
+        let options = Options {
+            device,
+            ..Options::default()
+        };
+        wgray::render(&scene, &options)
+    };
+    let (gpu, cpu) = (render(Device::Gpu)?, render(Device::Cpu)?);
+    let Some(apart) = difference(&gpu.pixels(), &cpu.pixels(), 0.0) else {
+        return Ok(ExitCode::FAILURE); // of two sizes: never so
+    };
+    let name = &gpu.device().name;
+    println!(
+        "{name}: {} pixels differ from the CPU's, by {} at most",
+        apart.unequal, apart.largest
+    );
+    Ok(match apart.unequal {
+        0 => ExitCode::SUCCESS,
+        _ => ExitCode::FAILURE,
+    })
+}

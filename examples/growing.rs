@@ -1,0 +1,58 @@
+//! Shows a picture in the terminal as it grows: all pixels have their first samples at once, and get better. It needs a
+//! terminal with 24-bit colours.
+//!
+//! ```sh
+//! cargo run --release --example growing -- scenes/cornell.toml
+//! ```
+
+use std::io::{self, Write as _};
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use wgray::{Error, Options, Overrides, Picture, Scene};
+
+/// Width and height of the picture: two pixels, one above the other, are a character.
+const SIZE: (u32, u32) = (64, 48);
+
+fn main() -> Result<(), Error> {
+    let file = std::env::args()
+        .nth(1)
+        .unwrap_or("scenes/mirror-glass.toml".to_string());
+    let overrides = Overrides {
+        size: Some(SIZE),
+        ..Overrides::default()
+    };
+    let scene = Scene::load_with(file, &overrides)?;
+
+    let mut shown = Instant::now();
+    let picture = wgray::render_growing(&scene, &Options::default(), &mut |growing| {
+        if shown.elapsed() > Duration::from_millis(100) {
+            // Moves the cursor back up, so that the next picture stands in the place of this one.
+            let lines = draw(&growing.picture()?);
+            print!("{:3.0} %\x1b[{lines}A\r", growing.share() * 100.0);
+            shown = Instant::now();
+        }
+        // A stream that takes nothing any more: nobody looks, so that the work can end.
+        Ok(match io::stdout().flush() {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(_) => ControlFlow::Break(()),
+        })
+    })?;
+    draw(&picture);
+    println!("100 %, rendered on {}", picture.device().name);
+    Ok(())
+}
+
+/// Prints a picture, and returns how many lines it takes.
+fn draw(picture: &Picture) -> usize {
+    let (width, bytes) = (picture.width() as usize, picture.rgb8());
+    let rows: Vec<&[u8]> = bytes.chunks(3 * width).collect();
+    for pair in rows.chunks_exact(2) {
+        for (upper, lower) in pair[0].chunks(3).zip(pair[1].chunks(3)) {
+            let (u, l) = (upper, lower);
+            print!("\x1b[38;2;{};{};{};48;2;{};{};{}m▀", u[0], u[1], u[2], l[0], l[1], l[2]);
+        }
+        println!("\x1b[0m");
+    }
+    rows.len() / 2
+}

@@ -1,0 +1,24 @@
+//! Renders a scene file to a picture file.
+//!
+//! ```sh
+//! cargo run --release --example render_file -- scenes/cornell.toml cornell.png
+//! ```
+
+use wgray::{Error, Options, Scene};
+
+fn main() -> Result<(), Error> {
+    let mut arguments = std::env::args().skip(1);
+    let scene = arguments.next().unwrap_or("scenes/mirror-glass.toml".to_string());
+    let file = arguments.next().unwrap_or("target/render_file.png".to_string());
+
+    let scene = Scene::load(scene)?;
+    let picture = wgray::render(&scene, &Options::default())?;
+    picture.save(&file)?;
+
+    let (width, height) = (picture.width(), picture.height());
+    println!(
+        "{file}: {width} x {height} pixels, rendered on {}",
+        picture.device().name
+    );
+    Ok(())
+}

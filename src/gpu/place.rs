@@ -1,0 +1,45 @@
+//! Errors of shaders, with the place that the author wrote.
+
+use super::compose::Source;
+use super::wording::chain;
+use crate::error::ShaderError;
+
+impl ShaderError {
+    pub(crate) fn other(stage: &str, error: &dyn std::error::Error) -> ShaderError {
+        ShaderError {
+            place: stage.to_string(),
+            message: chain(error),
+            excerpt: None,
+        }
+    }
+
+    pub(crate) fn at(source: &Source, span: Option<naga::Span>, message: String) -> ShaderError {
+        let range = span.and_then(|span| span.to_range());
+        let Some((file, text, offset)) = range.clone().and_then(|range| source.locate(range.start)) else {
+            return ShaderError {
+                place: "shader".to_string(),
+                message,
+                excerpt: None,
+            };
+        };
+        let before = &text[..offset];
+        let line = before.matches('\n').count() + 1;
+        let start = before.rfind('\n').map_or(0, |at| at + 1);
+        let column = text[start..offset].chars().count() + 1;
+        let line_text = text[start..].lines().next().unwrap_or("");
+        let length = range
+            .map_or(1, |range| range.len())
+            .min(line_text.len().saturating_sub(offset - start))
+            .max(1);
+        let excerpt = format!(
+            "{line:>5} | {line_text}\n      | {}{}",
+            " ".repeat(column - 1),
+            "^".repeat(length)
+        );
+        ShaderError {
+            place: format!("{file}:{line}:{column}"),
+            message,
+            excerpt: Some(excerpt),
+        }
+    }
+}

@@ -1,0 +1,263 @@
+//! From a scene to a picture in memory.
+
+use std::ops::ControlFlow;
+
+use tracing::warn;
+
+use crate::device::{Device, DeviceInfo, Renderer};
+use crate::error::{Error, RenderError};
+use crate::film::{Film, Region};
+use crate::image::{Aov, Layout};
+use crate::job::{self, Backend, Cut, Order, Steps};
+use crate::pack::{FirstHit, Packed, pack};
+use crate::picture::Picture;
+use crate::scene::{Problem, Scene};
+
+/// How a scene is rendered. Size, samples and seed are the scene's, which [`Overrides`](crate::Overrides) can change.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// What renders.
+    pub device: Device,
+    /// The pixels that are rendered, the same as in the whole picture; all if absent.
+    pub crop: Option<Region>,
+    /// The layers beside the radiance; each is there once, however often it is named.
+    pub aovs: Vec<Aov>,
+    /// Whether quotients and square roots are rounded correctly in software, for the CPU's bits on GPUs whose own may be off
+    /// in the last digit. Vulkan only; without effect on the CPU.
+    pub exact_rounding: bool,
+}
+
+impl Options {
+    /// The pixels that these options ask for.
+    ///
+    /// # Errors
+    ///
+    /// The first option that does not fit the scene.
+    pub fn region(&self, scene: &Scene) -> Result<Region, Problem> {
+        let (width, height) = (scene.width, scene.height);
+        let whole = Region::whole(width, height);
+        let region = self.crop.unwrap_or(whole);
+        let Region { x0, y0, x1, y1 } = region;
+        let rule = if x0 >= x1 || y0 >= y1 {
+            "must have x0 less than x1, and y0 less than y1".to_string()
+        } else if x1 > width || y1 > height {
+            format!("must lie in the picture of {width} x {height} pixels")
+        } else if let (Some(aov), None) = (self.aovs.iter().find(|aov| aov.is_of_film()), &scene.render.adaptive) {
+            let rule = "is known under adaptive sampling alone";
+            return Err(Problem::of(aov.name(), rule).inside("aov"));
+        } else {
+            return Ok(region);
+        };
+        Err(Problem::of("crop", format!("{x0},{y0},{x1},{y1} {rule}")))
+    }
+}
+
+/// Renders a scene. The picture is kept in memory, in 16 bytes a pixel.
+///
+/// Where [`Device::Auto`] finds no adapter, or one that cannot do the work, the CPU renders, and a warning by `tracing`
+/// says why; [`Picture::device`] tells what has rendered.
+///
+/// # Errors
+///
+/// Options that do not fit the scene, no such device, and what its driver refuses.
+pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
+    let packed = pack(scene);
+    let mut prepared = Prepared::new(scene, &packed, options)?;
+    let region = prepared.layout.region;
+    let film = prepared.renderer.work(|backend, _| {
+        let mut whole = empty(region, packed.adaptive);
+        let mut take = |band: Film| {
+            put(&mut whole, &band);
+            Ok(())
+        };
+        job::render(
+            backend,
+            region,
+            packed.pixel_samples,
+            &Cut::default(),
+            &mut |_| true,
+            &mut take,
+        )?;
+        Ok(whole)
+    })?;
+    Ok(prepared.picture(film))
+}
+
+/// Renders a scene, and shows the picture as it grows: `watch` is called some ten times a second or more, sees the picture
+/// as it is then, and says whether to go on. All pixels get a few samples before any gets more, but that a picture too
+/// large for one film of the device grows part by part, from the top. The result has the bits of [`render`].
+///
+/// # Errors
+///
+/// Those of [`render`] and of `watch`, and [`RenderError::Cancelled`] if `watch` breaks off.
+pub fn render_growing(
+    scene: &Scene,
+    options: &Options,
+    watch: &mut dyn FnMut(&mut Growing) -> Result<ControlFlow<()>, Error>,
+) -> Result<Picture, Error> {
+    let packed = pack(scene);
+    let mut prepared = Prepared::new(scene, &packed, options)?;
+    let (layout, hits) = (&prepared.layout, &prepared.hits);
+    let total = layout.region.pixels() as f64 * f64::from(packed.pixel_samples);
+    let mut failed = None;
+    let film = prepared.renderer.work(|backend, device| {
+        let cut = Cut::default();
+        let mut steps = Steps::new(&cut, job::CALL, Order::Pixels);
+        let mut whole = empty(layout.region, packed.adaptive);
+        let mut done = 0.0;
+        for band in job::bands(layout.region, &cut, backend.largest_film()) {
+            steps.start(backend, band, packed.pixel_samples);
+            backend.begin(steps.film())?;
+            while let Some(work) = steps.step(backend)? {
+                done += work;
+                let mut growing = Growing {
+                    share: done / total,
+                    backend: &mut *backend,
+                    device,
+                    band,
+                    whole: &mut whole,
+                    hits,
+                    layout,
+                };
+                match watch(&mut growing) {
+                    Ok(ControlFlow::Continue(())) => {}
+                    Ok(ControlFlow::Break(())) => return Err(RenderError::Cancelled),
+                    Err(error) => {
+                        failed = Some(error);
+                        return Err(RenderError::Cancelled);
+                    }
+                }
+            }
+            put(&mut whole, &backend.film()?.part(band));
+        }
+        Ok(whole)
+    });
+    match failed {
+        Some(error) => Err(error),
+        None => {
+            let film = film?;
+            Ok(prepared.picture(film))
+        }
+    }
+}
+
+/// A picture that is being rendered.
+pub struct Growing<'a> {
+    share: f64,
+    backend: &'a mut dyn Backend,
+    device: &'a DeviceInfo,
+    band: Region,
+    whole: &'a mut Film,
+    hits: &'a [FirstHit],
+    layout: &'a Layout,
+}
+
+impl Growing<'_> {
+    /// The share of the work that is done, from 0 to 1.
+    pub fn share(&self) -> f64 {
+        self.share
+    }
+
+    /// The picture as it is now, copied from the device. Pixels without a sample so far are black.
+    ///
+    /// # Errors
+    ///
+    /// Those of the device.
+    pub fn picture(&mut self) -> Result<Picture, Error> {
+        put(self.whole, &self.backend.film()?.part(self.band));
+        Ok(Picture {
+            film: self.whole.clone(),
+            hits: self.hits.to_vec(),
+            layout: self.layout.clone(),
+            device: self.device.clone(),
+        })
+    }
+}
+
+/// What is there before the first sample.
+struct Prepared<'a> {
+    renderer: Renderer<'a>,
+    hits: Vec<FirstHit>,
+    layout: Layout,
+}
+
+impl<'a> Prepared<'a> {
+    fn new(scene: &Scene, packed: &'a Packed, options: &Options) -> Result<Prepared<'a>, Error> {
+        let region = options.region(scene).map_err(Error::Option)?;
+        let on_cpu = |why: &RenderError| warn!("rendering on the CPU: {why}");
+        let mut renderer = Renderer::new(packed, options, Box::new(on_cpu))?;
+        let hits = match options.aovs.iter().any(|aov| !aov.is_of_film()) {
+            true => renderer.work(|backend, _| job::first_hits(backend, region))?,
+            false => Vec::new(),
+        };
+        let mut aovs: Vec<Aov> = Vec::new();
+        for aov in &options.aovs {
+            if !aovs.contains(aov) {
+                aovs.push(*aov);
+            }
+        }
+        let layout = Layout {
+            picture: (scene.width, scene.height),
+            region,
+            aovs,
+            middle_depth: renderer.work(|backend, _| middle_depth(packed, &options.aovs, backend))?,
+            most_samples: packed.pixel_samples,
+        };
+        Ok(Prepared { renderer, hits, layout })
+    }
+
+    fn picture(self, film: Film) -> Picture {
+        Picture {
+            film,
+            hits: self.hits,
+            layout: self.layout,
+            device: self.renderer.info().clone(),
+        }
+    }
+}
+
+fn empty(region: Region, adaptive: bool) -> Film {
+    match adaptive {
+        true => Film::adaptive(region),
+        false => Film::new(region),
+    }
+}
+
+/// Puts whole rows of a film into it.
+fn put(whole: &mut Film, band: &Film) {
+    let start = (band.region.y0 - whole.region.y0) as usize * whole.region.width() as usize;
+    for (to, from) in [
+        (&mut whole.sums, &band.sums),
+        (&mut whole.moments, &band.moments),
+        (&mut whole.looks, &band.looks),
+    ] {
+        // Without adaptive sampling there are no moments and no looks.
+        if let Some(to) = to.get_mut(start..start + from.len()) {
+            to.copy_from_slice(from);
+        }
+    }
+}
+
+/// The depth that looks half bright in a PNG: that in the middle of the whole picture, or 1 where nothing is.
+///
+/// # Errors
+///
+/// Those of the device.
+pub fn middle_depth(scene: &Packed, aovs: &[Aov], backend: &mut dyn Backend) -> Result<f32, RenderError> {
+    if !aovs.contains(&Aov::Depth) {
+        return Ok(1.0);
+    }
+    let (x0, y0) = (scene.camera.width / 2, scene.camera.height / 2);
+    let middle = Region {
+        x0,
+        y0,
+        x1: x0 + 1,
+        y1: y0 + 1,
+    };
+    let hits = backend.first_hits(middle)?;
+    Ok(hits
+        .first()
+        .map(|hit| hit.depth)
+        .filter(|depth| *depth > 0.0)
+        .unwrap_or(1.0))
+}

@@ -1,0 +1,94 @@
+//! The library on the adapter under test: the choice of a device, and the CPU that takes over.
+
+use std::ops::ControlFlow;
+
+use wgray::error::RenderError;
+use wgray::{Aov, Device, Error, Options, Overrides, Scene};
+
+use crate::{adapter, sources};
+
+fn scene(overrides: Overrides) -> Scene {
+    let size = overrides.size.or(Some((40, 30)));
+    let overrides = Overrides { size, ..overrides };
+    Scene::load_with(sources::path("scenes/mirror-glass.toml"), &overrides).expect("a sound scene")
+}
+
+fn on(device: Device) -> Options {
+    Options {
+        device,
+        aovs: vec![Aov::Depth, Aov::Normal],
+        ..Options::default()
+    }
+}
+
+#[test]
+fn every_choice_gives_the_same_picture_and_tells_what_has_rendered() {
+    let Some(device) = adapter::device() else { return };
+    let name = device.info.name.clone();
+    let scene = scene(Overrides::default());
+    let cpu = wgray::render(&scene, &on(Device::Cpu)).unwrap();
+    assert_eq!(cpu.device().name, "cpu");
+    let exact = Options {
+        exact_rounding: device.info.exact,
+        ..on(Device::Named(name.clone()))
+    };
+    for options in [on(Device::Named(name.clone())), exact] {
+        let picture = wgray::render(&scene, &options).unwrap();
+        assert_eq!(picture.device().name, name);
+        if adapter::bit_exact(device) {
+            assert!(picture.pixels() == cpu.pixels(), "{options:?}");
+            assert!(picture.channel("depth.Z") == cpu.channel("depth.Z"), "{options:?}");
+        }
+    }
+    let first = wgray::adapters()[0].name.clone();
+    for choice in [Device::Auto, Device::Gpu, Device::Named("1".to_string())] {
+        let picture = wgray::render(&scene, &on(choice)).unwrap();
+        assert_eq!(picture.device().name, first);
+    }
+    let error = wgray::render(&scene, &on(Device::from("abacus"))).unwrap_err();
+    assert!(matches!(error, Error::Render(RenderError::NoDevice(_))), "{error:?}");
+}
+
+#[test]
+fn a_picture_grows_on_the_device_to_the_rendered_one() {
+    let Some(device) = adapter::device() else { return };
+    let scene = scene(Overrides {
+        size: Some((130, 131)),
+        ..Overrides::default()
+    });
+    let options = on(Device::Named(device.info.name.clone()));
+    let rendered = wgray::render(&scene, &options).unwrap();
+    let mut seen = Vec::new();
+    let grown = wgray::render_growing(&scene, &options, &mut |growing| {
+        seen.push(growing.picture()?);
+        Ok(ControlFlow::Continue(()))
+    });
+    assert!(grown.unwrap() == rendered);
+    assert!(seen.len() > 1 && seen[0] != rendered && seen.last() == Some(&rendered));
+    let cancelled = wgray::render_growing(&scene, &options, &mut |_| Ok(ControlFlow::Break(())));
+    assert!(matches!(cancelled, Err(Error::Render(RenderError::Cancelled))));
+}
+
+/// Whatever the driver: where it ends loops early and a sample is too long for it, the CPU takes over and the picture says so.
+#[test]
+fn a_sample_too_long_for_the_driver_is_rendered_by_the_cpu() {
+    let Some(device) = adapter::device() else { return };
+    let scene = scene(Overrides {
+        size: Some((2, 1)),
+        pixel_samples: Some(1),
+        light_samples: Some(65_536),
+        ..Overrides::default()
+    });
+    let options = on(Device::Named(device.info.name.clone()));
+    let cpu = wgray::render(&scene, &on(Device::Cpu)).unwrap();
+    let watched = wgray::render_growing(&scene, &options, &mut |growing| {
+        growing.picture().map(|_| ControlFlow::Continue(()))
+    });
+    for picture in [wgray::render(&scene, &options).unwrap(), watched.unwrap()] {
+        let name = &picture.device().name;
+        assert!(name == "cpu" || *name == device.info.name, "{name}");
+        if adapter::bit_exact(device) {
+            assert!(picture.pixels() == cpu.pixels());
+        }
+    }
+}

@@ -1,0 +1,369 @@
+//! The library as a program uses it that renders on the CPU, with whichever features it was built; and the program `wgray`
+//! without the feature `gpu`.
+
+use std::ops::ControlFlow;
+#[cfg(all(feature = "cli", not(feature = "gpu")))]
+use std::path::Path;
+use std::sync::Arc;
+
+use wgray::error::RenderError;
+use wgray::image::read_exr;
+use wgray::scene::{
+    AdaptiveDescription, Assets, ColorDescription, Encoding, Image, ImageTextureDescription, Pattern,
+    PerspectiveDescription, PhongDescription, PlaneDescription, RectangleLightDescription, RenderDescription,
+    SamplesDescription, SphereDescription, Texels,
+};
+use wgray::{Aov, Channel, DVec3, Description, Device, Error, Options, Overrides, Picture, Region, Scene};
+
+const FILE: &str = r#"
+image = { width = 24, height = 16 }
+camera = { position = [0, -5, 2], look_at = [0, 0, 0.5], fov = 40 }
+[render]
+ambient = [0.1, 0.1, 0.1]
+pixel_samples = { pattern = "random", count = 4 }
+light_samples = { pattern = "grid", count = 4 }
+[materials.red]
+type = "phong"
+color = [0.8, 0.1, 0.1]
+[[lights]]
+type = "rectangle"
+center = [0, -1, 4]
+size = [1, 1]
+normal = [0, 0, -1]
+tangent = [1, 0, 0]
+color = [0.8, 0.8, 0.8]
+[[shapes]]
+type = "sphere"
+material = "red"
+center = [0, 0, 0.5]
+radius = 0.5
+[[shapes]]
+type = "plane"
+material = "red"
+point = [0, 0, 0]
+normal = [0, 0, 1]
+tangent = [1, 0, 0]
+"#;
+
+/// What [`FILE`] says.
+fn described() -> Description {
+    let samples = |pattern, count| SamplesDescription { pattern, count };
+    Description::new(
+        24,
+        16,
+        PerspectiveDescription::new([0.0, -5.0, 2.0], [0.0, 0.0, 0.5], 40.0),
+    )
+    .with_render(RenderDescription {
+        ambient: DVec3::splat(0.1),
+        pixel_samples: samples(Pattern::Random, 4),
+        light_samples: samples(Pattern::Grid, 4),
+        ..RenderDescription::default()
+    })
+    .with_material("red", PhongDescription::new([0.8, 0.1, 0.1]))
+    .with_light(RectangleLightDescription::new(
+        [0.0, -1.0, 4.0],
+        [1.0, 1.0],
+        [0.0, 0.0, -1.0],
+        [1.0, 0.0, 0.0],
+        [0.8, 0.8, 0.8],
+    ))
+    .with_shape(SphereDescription::new("red", [0.0, 0.0, 0.5], 0.5))
+    .with_shape(PlaneDescription::new("red", [0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]))
+}
+
+fn on_cpu() -> Options {
+    Options {
+        device: Device::Cpu,
+        ..Options::default()
+    }
+}
+
+fn scene() -> Scene {
+    described().validate().expect("a sound scene")
+}
+
+fn floats(picture: &Picture, name: &str) -> Vec<f32> {
+    match picture.channel(name) {
+        Some(Channel::Floats(values)) => values,
+        other => panic!("{name}: {other:?}"),
+    }
+}
+
+#[test]
+fn a_scene_made_in_code_is_that_of_the_file_that_says_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, FILE).unwrap();
+    let loaded = Scene::load(&path).unwrap();
+    assert_eq!(scene(), loaded);
+    let other = described().with_shape(SphereDescription::new("red", [1.0, 0.0, 0.5], 0.5));
+    assert_ne!(other.validate().unwrap(), loaded);
+    let picture = wgray::render(&loaded, &on_cpu()).unwrap();
+    assert_eq!((picture.width(), picture.height()), (24, 16));
+    assert_eq!(picture.device().name, "cpu");
+    let different = picture
+        .pixels()
+        .colors
+        .windows(2)
+        .filter(|pair| pair[0] != pair[1])
+        .count();
+    assert!(different > 100, "{different}: there is something to see");
+}
+
+#[test]
+fn a_bad_scene_is_told_with_place_value_and_rule() {
+    let ball = SphereDescription::new("red", [0.0, 0.0, 0.5], -1.0);
+    let told = |description: Description| Error::from(description.validate().unwrap_err()).to_string();
+    let message = told(described().with_shape(ball));
+    assert!(message.starts_with("shapes[2].radius: -1 must be finite"), "{message}");
+    let message = told(described().with_shape(SphereDescription::new("blue", [0.0; 3], 1.0)));
+    assert!(
+        message.starts_with("shapes[2].material: \"blue\" is no material"),
+        "{message}"
+    );
+    let missing = Scene::load("no such file.toml").unwrap_err().to_string();
+    assert!(missing.starts_with("no such file.toml: cannot be read: "), "{missing}");
+    let overrides = Overrides {
+        pixel_samples: Some(0),
+        ..Overrides::default()
+    };
+    let message = Scene::parse_with(FILE, "s.toml", &overrides).unwrap_err().to_string();
+    assert_eq!(message, "pixel_samples: 0 must be from 1 to 65536");
+}
+
+#[test]
+fn options_that_do_not_fit_are_told() {
+    let crop = |x0, y0, x1, y1| Options {
+        crop: Some(Region { x0, y0, x1, y1 }),
+        ..on_cpu()
+    };
+    let aov = Options {
+        aovs: vec![Aov::Depth, Aov::SampleCount],
+        ..on_cpu()
+    };
+    for (options, told) in [
+        (
+            crop(0, 0, 25, 16),
+            "crop: 0,0,25,16 must lie in the picture of 24 x 16 pixels",
+        ),
+        (
+            crop(3, 0, 3, 16),
+            "crop: 3,0,3,16 must have x0 less than x1, and y0 less than y1",
+        ),
+        (
+            crop(5, 9, 7, 2),
+            "crop: 5,9,7,2 must have x0 less than x1, and y0 less than y1",
+        ),
+        (aov, "aov.sample_count: is known under adaptive sampling alone"),
+    ] {
+        let error = wgray::render(&scene(), &options).unwrap_err();
+        assert_eq!(error.to_string(), told);
+        assert!(matches!(error, Error::Option(_)), "{error:?}");
+    }
+}
+
+#[test]
+fn a_crop_has_the_pixels_and_layers_of_the_whole() {
+    let region = Region {
+        x0: 5,
+        y0: 3,
+        x1: 20,
+        y1: 11,
+    };
+    let aovs = vec![Aov::Depth, Aov::Normal, Aov::Primitive];
+    let whole = Options { aovs, ..on_cpu() };
+    let part = Options {
+        crop: Some(region),
+        ..whole.clone()
+    };
+    let (whole, part) = (
+        wgray::render(&scene(), &whole).unwrap(),
+        wgray::render(&scene(), &part).unwrap(),
+    );
+    assert_eq!(part.region(), region);
+    for name in ["R", "G", "B", "depth.Z", "normal.X", "normal.Z"] {
+        let rows = floats(&whole, name);
+        let cut = rows.chunks(24).take(11).skip(3).flat_map(|row| row[5..20].to_vec());
+        assert_eq!(floats(&part, name), cut.collect::<Vec<_>>(), "{name}");
+    }
+    let Some(Channel::Whole(shapes)) = part.channel("primitive.ID") else {
+        panic!("no shapes")
+    };
+    assert!(shapes.contains(&0) && shapes.contains(&1));
+    assert_eq!(part.channel("uv.U"), None);
+}
+
+#[test]
+fn a_picture_is_saved_as_its_name_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let options = Options {
+        aovs: vec![Aov::Depth, Aov::Depth],
+        ..on_cpu()
+    };
+    let picture = wgray::render(&scene(), &options).unwrap();
+    assert_eq!(picture.aovs(), [Aov::Depth]);
+    picture.save(path("a.exr")).unwrap();
+    assert_eq!(read_exr(&path("a.exr")).unwrap(), picture.pixels());
+    picture.save(path("a.png")).unwrap();
+    let png = |name: &str| image::open(path(name)).unwrap().into_rgb8();
+    assert_eq!(png("a.png").into_raw(), picture.rgb8());
+    assert_eq!(png("a.depth.png").dimensions(), (24, 16));
+    let error = picture.save(path("a.gif")).unwrap_err().to_string();
+    assert!(error.ends_with("a.gif: must end in .png or .exr"), "{error}");
+    assert!(!path("a.gif").exists());
+}
+
+#[test]
+fn a_growing_picture_ends_as_the_rendered_one_and_can_be_cancelled() {
+    let mut adaptive = described();
+    adaptive.render.adaptive = Some(AdaptiveDescription {
+        error: 0.01,
+        max_samples: Some(64),
+    });
+    adaptive.image.width = 130; // more than a first call does
+    adaptive.image.height = 130;
+    let mut plain = adaptive.clone();
+    plain.render.adaptive = None;
+    for description in [plain, adaptive] {
+        let scene = description.validate().unwrap();
+        let options = Options {
+            aovs: vec![Aov::Depth],
+            crop: Some(Region {
+                x0: 1,
+                y0: 2,
+                x1: 130,
+                y1: 129,
+            }),
+            ..on_cpu()
+        };
+        let rendered = wgray::render(&scene, &options).unwrap();
+        let mut seen: Vec<(f64, Picture)> = Vec::new();
+        let grown = wgray::render_growing(&scene, &options, &mut |growing| {
+            seen.push((growing.share(), growing.picture()?));
+            Ok(ControlFlow::Continue(()))
+        });
+        assert!(grown.unwrap() == rendered);
+        assert!(seen.len() > 1, "{}", seen.len());
+        assert!(seen.is_sorted_by(|a, b| a.0 <= b.0));
+        let (share, last) = seen.pop().unwrap();
+        assert!((share - 1.0).abs() < 1e-9 && last == rendered, "{share}");
+        assert!(seen[0].1 != rendered, "the first picture is not the last");
+
+        let cancelled = wgray::render_growing(&scene, &options, &mut |_| Ok(ControlFlow::Break(())));
+        assert!(matches!(cancelled, Err(Error::Render(RenderError::Cancelled))));
+        let failed = wgray::render_growing(&scene, &options, &mut |_| {
+            Err(Error::Render(RenderError::Output(std::io::Error::other("no screen"))))
+        });
+        assert_eq!(failed.unwrap_err().to_string(), "no screen");
+    }
+}
+
+#[test]
+fn an_image_in_memory_is_that_of_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let colors: Vec<[u8; 3]> = (0..12).map(|i| [i * 20, 255 - i * 9, 40]).collect();
+    let bytes: Vec<u8> = colors.concat();
+    image::save_buffer(folder.path().join("a.png"), &bytes, 4, 3, image::ColorType::Rgb8).unwrap();
+    let described = described()
+        .with_texture("a", ImageTextureDescription::new("a.png"))
+        .with_material("red", PhongDescription::new(ColorDescription::texture("a")));
+    let with = |width, height, texels| {
+        let image = Image { width, height, texels };
+        let mut assets = Assets::default();
+        assets.images.insert("a.png".to_string(), Arc::new(image));
+        described.validate_with(&assets)
+    };
+    let read = described.validate_with(&Assets::beside(folder.path())).unwrap();
+    let made = with(4, 3, Texels::Bytes(Encoding::Srgb, colors.clone())).unwrap();
+    assert_eq!(read.textures, made.textures);
+    assert_eq!((read.files.len(), made.files.len()), (1, 0));
+    let told = |width, height, texels| with(width, height, texels).unwrap_err().to_string();
+    for (width, height, texels, rule) in [
+        (
+            4,
+            4,
+            Texels::Bytes(Encoding::Srgb, colors),
+            "has 12 texels; its size, 4 x 4,",
+        ),
+        (0, 1, Texels::Floats(Vec::new()), "must have a texel at least"),
+        (
+            1,
+            1,
+            Texels::Floats(vec![[f32::NAN; 3]]),
+            "has the texel [NaN, NaN, NaN] at (0, 0)",
+        ),
+        (20_000, 1, Texels::Floats(Vec::new()), "must have at most 16384 texels"),
+    ] {
+        let message = told(width, height, texels);
+        assert!(
+            message.starts_with("textures.a.file: \"a.png\"") && message.contains(rule),
+            "{message}"
+        );
+    }
+}
+
+#[test]
+fn names_of_devices_are_choices() {
+    for (name, device) in [
+        ("auto", Device::Auto),
+        ("CPU", Device::Cpu),
+        ("Gpu", Device::Gpu),
+        ("llvmpipe", Device::Named("llvmpipe".to_string())),
+    ] {
+        assert_eq!(Device::from(name), device);
+    }
+}
+
+#[cfg(not(feature = "gpu"))]
+#[test]
+fn without_the_feature_gpu_there_is_the_cpu_alone() {
+    let scene = scene();
+    let picture = wgray::render(&scene, &Options::default()).unwrap();
+    assert_eq!(picture.device().name, "cpu");
+    assert!(picture == wgray::render(&scene, &on_cpu()).unwrap());
+    for (device, asked) in [(Device::Gpu, "a GPU: "), (Device::from("llvmpipe"), "'llvmpipe': ")] {
+        let options = Options {
+            device,
+            ..Options::default()
+        };
+        let error = wgray::render(&scene, &options).unwrap_err();
+        assert!(matches!(error, Error::Render(RenderError::NoDevice(_))), "{error:?}");
+        let message = error.to_string();
+        assert!(
+            message.starts_with(asked) && message.contains("feature \"gpu\""),
+            "{message}"
+        );
+    }
+}
+
+#[cfg(all(feature = "cli", not(feature = "gpu")))]
+#[test]
+fn the_program_without_the_feature_gpu_renders_on_the_cpu() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("s.toml"), FILE).unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = assert_cmd::Command::new(Path::new(env!("CARGO_BIN_EXE_wgray")));
+        let output = command.current_dir(&folder).args(arguments).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let silent = (Some(0), String::new(), String::new());
+    assert_eq!(run(&["render", "s.toml", "-o", "s.exr"]), silent);
+    let picture = wgray::render(&scene(), &on_cpu()).unwrap();
+    assert_eq!(read_exr(&folder.path().join("s.exr")).unwrap(), picture.pixels());
+    let (code, _, told) = run(&["render", "s.toml", "-o", "gpu.exr", "--device", "gpu"]);
+    assert_eq!(code, Some(4), "{told}");
+    assert!(told.contains("built without its feature \"gpu\""), "{told}");
+    assert!(!folder.path().join("gpu.exr").exists());
+    let (code, listed, told) = run(&["devices"]);
+    assert_eq!((code, told.as_str()), (Some(0), ""));
+    assert!(
+        listed.contains("auto chooses: cpu") && listed.contains("feature \"gpu\""),
+        "{listed}"
+    );
+    let (code, good, told) = run(&["check", "s.toml"]);
+    assert_eq!((code, told.as_str()), (Some(0), ""));
+    assert!(good.starts_with("s.toml: good; 24 x 16 pixels"), "{good}");
+    assert_eq!(run(&["dev", "s.toml"]).0, Some(2));
+}
