@@ -42,7 +42,7 @@ fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
 mod tests {
     use super::*;
     use crate::pack::{Specialization, pack};
-    use crate::scene::{Overrides, Scene};
+    use crate::scene::Scene;
 
     /// A scene of so many spheres and point lights.
     fn scene(spheres: usize, lights: usize) -> Packed {
@@ -53,7 +53,7 @@ mod tests {
         let start = "image = { width = 4, height = 4 }\ncamera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }\n\
                      materials.m = { type = 'phong', color = [1, 1, 1] }\n";
         let text = format!("{start}{}{}{area}", sphere.repeat(spheres), light.repeat(lights));
-        pack(&Scene::parse(&text, "s", &Overrides::default()).unwrap())
+        pack(&Scene::parse(&text, "s").unwrap())
     }
 
     #[test]
