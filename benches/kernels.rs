@@ -5,6 +5,7 @@ use std::path::Path;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{UVec2, Vec3};
+use wgray::backend::Backend as _;
 use wgray::cpu::Cpu;
 use wgray::cpu::ellipsoid::intersect_ellipsoid;
 use wgray::cpu::light::segments_to_light;
@@ -16,7 +17,7 @@ use wgray::cpu::surface::surface_at;
 use wgray::cpu::triangle::intersect_triangle;
 use wgray::film::Region;
 use wgray::gpu::{self, Choice, Gpu, Options, compose::Shaders};
-use wgray::job::{self, Backend, Cut};
+use wgray::job::{self, Cut};
 use wgray::pack::{ELLIPSOID, FAR, GRID, Packed, RECTANGLE, TRIANGLE, pack};
 use wgray::scene::{Overrides, Scene};
 

@@ -1,11 +1,11 @@
 //! What renders: the choice among the CPU and the adapters of the machine, and the CPU that takes over where an adapter
 //! cannot do the work.
 
+use crate::backend::Backend;
 use crate::cpu::Cpu;
 use crate::error::{Error, RenderError};
 #[cfg(feature = "gpu")]
 use crate::gpu::{self, Gpu, Rounding, compose::Shaders};
-use crate::job::Backend;
 use crate::pack::Packed;
 use crate::render::Options;
 #[cfg(feature = "gpu")]

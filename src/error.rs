@@ -1,9 +1,11 @@
 //! What can go wrong, as types.
 
 use std::fmt;
+use std::ops::Range;
 
 use thiserror::Error;
 
+use crate::film::Region;
 use crate::scene::{Problem, SceneError};
 
 /// What can go wrong between a scene and its picture.
@@ -83,6 +85,38 @@ pub enum RenderError {
         device: String,
         /// What is too large, and what would fit.
         message: String,
+    },
+    /// Work or a look at a film where there is none.
+    #[error("there is no film: one is begun or resumed first")]
+    NoFilm,
+    /// A call while another is pending.
+    #[error("a call is pending: it is waited for, or polled until it is done, before anything else")]
+    Pending,
+    /// Work outside of the pixels that there are.
+    #[error("the {what} x0,y0,x1,y1 = {region} must lie in the {of} {limits}")]
+    Outside {
+        /// What lies outside.
+        what: &'static str,
+        /// Its pixels.
+        region: Region,
+        /// What it should lie in.
+        of: &'static str,
+        /// Its pixels.
+        limits: Region,
+    },
+    /// A film that cannot be gone on from.
+    #[error("a film of another form: {0}")]
+    WrongFilm(String),
+    /// Further samples under adaptive sampling, which the first ones of the pixels around decide on, before those.
+    #[error(
+        "samples {} to {} come too early: not all pixels of the film have their first {first}",
+        samples.start, samples.end
+    )]
+    TooEarly {
+        /// The samples.
+        samples: Range<u32>,
+        /// How many all pixels get first.
+        first: u32,
     },
     /// The work was cancelled.
     #[error("cancelled")]

@@ -1,7 +1,9 @@
 //! The film: what a render accumulates, in linear f32.
 
+use std::fmt;
+
 use bytemuck::Zeroable;
-use glam::Vec4;
+use glam::{Vec3, Vec4, Vec4Swizzles};
 
 /// A rectangle of pixels of a picture, half-open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,14 +29,19 @@ impl Region {
         }
     }
 
-    /// Columns.
+    /// Columns; 0 if the last is before the first.
     pub fn width(&self) -> u32 {
-        self.x1 - self.x0
+        self.x1.saturating_sub(self.x0)
     }
 
-    /// Rows.
+    /// Rows; 0 if the last is before the first.
     pub fn height(&self) -> u32 {
-        self.y1 - self.y0
+        self.y1.saturating_sub(self.y0)
+    }
+
+    /// Whether it has no pixels.
+    pub fn is_empty(&self) -> bool {
+        self.pixels() == 0
     }
 
     /// Pixels.
@@ -52,16 +59,22 @@ impl Region {
         }
     }
 
-    /// What is in another region too.
+    /// The part that is in another region too.
     pub fn within(&self, other: Region) -> Region {
-        let x = |x: u32| x.clamp(other.x0, other.x1);
-        let y = |y: u32| y.clamp(other.y0, other.y1);
+        let x = |x: u32| x.max(other.x0).min(other.x1);
+        let y = |y: u32| y.max(other.y0).min(other.y1);
         Region {
             x0: x(self.x0),
             y0: y(self.y0),
             x1: x(self.x1),
             y1: y(self.y1),
         }
+    }
+}
+
+impl fmt::Display for Region {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},{},{},{}", self.x0, self.y0, self.x1, self.y1)
     }
 }
 
@@ -99,7 +112,7 @@ impl Film {
         }
     }
 
-    /// A part of the film.
+    /// A part of the film, which must lie in it.
     pub fn part(self, part: Region) -> Film {
         if part == self.region {
             return self;
@@ -108,7 +121,7 @@ impl Film {
         let columns = (part.x0 - self.region.x0) as usize..(part.x1 - self.region.x0) as usize;
         let rows = (part.y0 - self.region.y0) as usize..(part.y1 - self.region.y0) as usize;
         let of_part = |records: &[Vec4]| {
-            let of_rows = records.chunks(width).take(rows.end).skip(rows.start);
+            let of_rows = records.chunks(width.max(1)).take(rows.end).skip(rows.start);
             of_rows.flat_map(|row| row[columns.clone()].to_vec()).collect()
         };
         Film {
@@ -133,15 +146,20 @@ impl Film {
     /// were independent: on average an upper bound for patterns that are more even. Where all samples are the same it is
     /// 0. It is not what decided on the pixel's samples, which is what its neighbours are like.
     pub fn variance(&self, pixel: usize) -> [f32; 3] {
-        let (sum, moments) = (self.sums[pixel], self.moments[pixel]);
-        let scale = moments.w / ((moments.w - 1.0) * sum.w * sum.w);
-        [moments.x, moments.y, moments.z].map(|deviations| deviations * scale)
+        variance_of_mean(self.sums[pixel], self.moments[pixel]).to_array()
     }
 
     /// The means of all pixels: linear RGB, row by row from the top.
     pub fn means(&self) -> impl Iterator<Item = [f32; 3]> {
         self.sums.iter().copied().map(mean)
     }
+}
+
+/// The variance of a pixel's mean in red, green and blue, by its sum and its moments, if its samples were independent.
+pub fn variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3 {
+    let n = moments.w;
+    let scale = n / ((n - 1.0) * sum.w * sum.w);
+    moments.xyz() * scale
 }
 
 /// The mean of a pixel's samples: linear RGB, black if there are none.

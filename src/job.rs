@@ -4,32 +4,10 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
+use crate::backend::Backend;
 use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::pack::FirstHit;
-
-/// What renders: a scene on a device. It has one film at a time.
-pub trait Backend {
-    /// Starts an empty film of a region of the picture.
-    fn begin(&mut self, region: Region) -> Result<(), RenderError>;
-    /// Adds a range of samples to the pixels of a tile of the film, and returns when this is done.
-    fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError>;
-    /// The film as it is now.
-    fn film(&mut self) -> Result<Film, RenderError>;
-    /// What the rays through the centres of a region's pixels meet first, row by row from the top.
-    fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError>;
-    /// The largest film that it can have, in pixels.
-    fn largest_film(&self) -> u64;
-    /// How many samples all pixels get; further ones are left out where they are not needed. They come first for all
-    /// pixels of the film, as they decide on the further ones.
-    fn samples_of_all(&self) -> u32 {
-        u32::MAX
-    }
-    /// The pixels whose samples decide on those of a region's pixels: itself, and what is around it.
-    fn around(&self, region: Region) -> Region {
-        region
-    }
-}
 
 /// How long one call of [`Backend::render`] aims to take: long enough to hide what a call costs, short enough for
 /// watchdogs, progress and cancelling.
@@ -57,11 +35,13 @@ impl Default for Cut {
     }
 }
 
-/// The bands that a region is rendered in, from the top: whole rows, as many as a film has room for.
+/// The bands that a region is rendered in, from the top: whole rows, as many as a film has room for. A region without
+/// pixels has none.
 pub fn bands(region: Region, cut: &Cut, largest_film: u64) -> impl Iterator<Item = Region> + use<> {
-    let pixels = cut.band_pixels.min(largest_film);
-    let rows = (pixels / u64::from(region.width())).clamp(1, u64::from(region.height())) as u32;
-    (region.y0..region.y1).step_by(rows as usize).map(move |y0| Region {
+    let [width, height] = [region.width(), region.height()].map(|n| u64::from(n.max(1)));
+    let rows = (cut.band_pixels.min(largest_film) / width).clamp(1, height) as u32;
+    let end = if region.is_empty() { region.y0 } else { region.y1 };
+    (region.y0..end).step_by(rows as usize).map(move |y0| Region {
         y0,
         y1: region.y1.min(y0 + rows),
         ..region
@@ -92,21 +72,64 @@ pub fn render(
     progress: &mut dyn FnMut(f64) -> bool,
     output: &mut dyn FnMut(Film) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
-    let total = region.pixels() as f64 * f64::from(samples);
-    let mut steps = Steps::new(cut, CALL, Order::Rows);
-    let mut done = 0.0;
-    for band in bands(region, cut, backend.largest_film()) {
-        steps.start(backend, band, samples);
-        backend.begin(steps.film)?;
-        while let Some(work) = steps.step(backend)? {
+    let mut bands = Bands::new(region, samples, cut, Order::Rows, backend.largest_film());
+    while let Some(film) = bands.render_next(backend, &mut |_, _, share| Ok(progress(share)))? {
+        output(film)?;
+    }
+    Ok(())
+}
+
+/// What is told of a band that is being rendered, and of the share of all bands' work that is done, from 0 to 1. Returns
+/// whether to go on.
+pub type Watch<'a> = dyn FnMut(&mut dyn Backend, Region, f64) -> Result<bool, RenderError> + 'a;
+
+/// The bands of a region, rendered one after the other from the top, at the pace that was learnt so far.
+pub struct Bands {
+    bands: std::vec::IntoIter<Region>,
+    samples: u32,
+    steps: Steps,
+    /// Samples of pixels, in the bands that are finished and in all.
+    done: f64,
+    total: f64,
+}
+
+impl Bands {
+    /// Those of a region, none of them rendered yet.
+    pub fn new(region: Region, samples: u32, cut: &Cut, order: Order, largest_film: u64) -> Bands {
+        let all: Vec<Region> = bands(region, cut, largest_film).collect();
+        Bands {
+            bands: all.into_iter(),
+            samples,
+            steps: Steps::new(cut, CALL, order),
+            done: 0.0,
+            total: region.pixels() as f64 * f64::from(samples),
+        }
+    }
+
+    /// Renders the next band; `None` once all are rendered. After an error it is the same band again, which another backend
+    /// may render.
+    ///
+    /// # Errors
+    ///
+    /// Those of the backend and of `watch`, and [`RenderError::Cancelled`] if `watch` says not to go on.
+    pub fn render_next(&mut self, backend: &mut dyn Backend, watch: &mut Watch) -> Result<Option<Film>, RenderError> {
+        let Some(&band) = self.bands.as_slice().first() else {
+            return Ok(None);
+        };
+        self.steps.start(backend, band, self.samples);
+        backend.begin(self.steps.film)?;
+        let mut done = self.done;
+        while let Some(work) = self.steps.step(backend)? {
             done += work;
-            if !progress(done / total) {
+            if !watch(backend, band, done / self.total)? {
                 return Err(RenderError::Cancelled);
             }
         }
-        output(backend.film()?.part(band))?;
+        let film = backend.film()?.part(band);
+        self.bands.next();
+        self.done = done;
+        Ok(Some(film))
     }
-    Ok(())
 }
 
 /// What comes first in a film. The picture is the same.
@@ -309,7 +332,19 @@ mod tests {
             Ok(())
         }
 
-        fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+        fn resume(&mut self, _: Film) -> Result<(), RenderError> {
+            Ok(())
+        }
+
+        fn poll(&mut self) -> Result<bool, RenderError> {
+            Ok(true)
+        }
+
+        fn wait(&mut self) -> Result<(), RenderError> {
+            Ok(())
+        }
+
+        fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
             self.0.push((tile, samples));
             Ok(())
         }
@@ -324,6 +359,14 @@ mod tests {
 
         fn largest_film(&self) -> u64 {
             u64::MAX
+        }
+
+        fn samples_of_all(&self) -> u32 {
+            u32::MAX
+        }
+
+        fn around(&self, region: Region) -> Region {
+            region
         }
     }
 
@@ -361,7 +404,19 @@ mod tests {
             Ok(())
         }
 
-        fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+        fn resume(&mut self, _: Film) -> Result<(), RenderError> {
+            Ok(())
+        }
+
+        fn poll(&mut self) -> Result<bool, RenderError> {
+            Ok(true)
+        }
+
+        fn wait(&mut self) -> Result<(), RenderError> {
+            Ok(())
+        }
+
+        fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
             self.calls.push((tile, samples));
             Ok(())
         }

@@ -62,6 +62,8 @@
 struct Readme;
 
 #[doc(hidden)]
+pub mod backend;
+#[doc(hidden)]
 pub mod cpu;
 #[cfg(feature = "dev")]
 #[doc(hidden)]

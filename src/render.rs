@@ -4,11 +4,12 @@ use std::ops::ControlFlow;
 
 use tracing::warn;
 
+use crate::backend::Backend;
 use crate::device::{Device, DeviceInfo, Renderer};
 use crate::error::{Error, RenderError};
 use crate::film::{Film, Region};
 use crate::image::{Aov, Layout};
-use crate::job::{self, Backend, Cut, Order, Steps};
+use crate::job::{self, Bands, Cut, Order};
 use crate::pack::{FirstHit, Packed, pack};
 use crate::picture::Picture;
 use crate::scene::{Problem, Scene};
@@ -98,21 +99,16 @@ pub fn render_growing(
     let packed = pack(scene);
     let mut prepared = Prepared::new(scene, &packed, options)?;
     let (layout, hits) = (&prepared.layout, &prepared.hits);
-    let total = layout.region.pixels() as f64 * f64::from(packed.pixel_samples);
     let mut failed = None;
     let film = prepared.renderer.work(|backend, device| {
-        let cut = Cut::default();
-        let mut steps = Steps::new(&cut, job::CALL, Order::Pixels);
+        let (cut, order) = (Cut::default(), Order::Pixels);
+        let mut bands = Bands::new(layout.region, packed.pixel_samples, &cut, order, backend.largest_film());
         let mut whole = empty(layout.region, packed.adaptive);
-        let mut done = 0.0;
-        for band in job::bands(layout.region, &cut, backend.largest_film()) {
-            steps.start(backend, band, packed.pixel_samples);
-            backend.begin(steps.film())?;
-            while let Some(work) = steps.step(backend)? {
-                done += work;
+        loop {
+            let mut look = |backend: &mut dyn Backend, band: Region, share: f64| {
                 let mut growing = Growing {
-                    share: done / total,
-                    backend: &mut *backend,
+                    share,
+                    backend,
                     device,
                     band,
                     whole: &mut whole,
@@ -120,17 +116,18 @@ pub fn render_growing(
                     layout,
                 };
                 match watch(&mut growing) {
-                    Ok(ControlFlow::Continue(())) => {}
-                    Ok(ControlFlow::Break(())) => return Err(RenderError::Cancelled),
+                    Ok(flow) => Ok(flow.is_continue()),
                     Err(error) => {
                         failed = Some(error);
-                        return Err(RenderError::Cancelled);
+                        Ok(false)
                     }
                 }
+            };
+            match bands.render_next(backend, &mut look)? {
+                Some(band) => put(&mut whole, &band),
+                None => return Ok(whole),
             }
-            put(&mut whole, &backend.film()?.part(band));
         }
-        Ok(whole)
     });
     match failed {
         Some(error) => Err(error),

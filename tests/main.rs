@@ -7,6 +7,7 @@ mod analytic;
 mod bounds;
 mod choices;
 mod cli;
+mod contract;
 mod cost;
 mod culling;
 #[cfg(feature = "dev")]

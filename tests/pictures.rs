@@ -1,11 +1,12 @@
 //! Pictures by every way to one: the CPU, and on the device the scene as constants, from buffers, and as plain WGSL.
 
 use glam::Vec4;
+use wgray::backend::Backend;
 use wgray::cpu::Cpu;
 use wgray::film::{Film, Region};
 use wgray::gpu::compose::Shaders;
 use wgray::gpu::{Gpu, Options, Rounding};
-use wgray::job::{Backend, Cut};
+use wgray::job::Cut;
 use wgray::pack::{FirstHit, Packed};
 
 use crate::{adapter, sources};

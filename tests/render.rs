@@ -4,8 +4,9 @@
 use std::ops::Range;
 
 use glam::Vec4;
+use wgray::backend::Backend;
 use wgray::film::{Film, Region};
-use wgray::job::{Backend, Cut};
+use wgray::job::Cut;
 use wgray::pack::{FirstHit, Packed};
 use wgray::scene::{Description, Pattern};
 

@@ -9,11 +9,12 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser as _};
 use tracing::info;
+use wgray::backend::Backend;
 use wgray::device::{Device, Renderer};
 use wgray::error::RenderError;
-use wgray::film::{Film, Region, mean};
+use wgray::film::{Region, mean};
 use wgray::image::{self, Aov, Band, Format, Layout, Pending};
-use wgray::job::{self, Cut};
+use wgray::job::{self, Bands, Cut, Order};
 use wgray::pack::{Packed, pack};
 use wgray::render::{Options, middle_depth};
 use wgray::scene::{Overrides, Pattern};
@@ -291,29 +292,24 @@ fn write_picture(
     let mut strange = 0;
     let mut camera_rays = 0;
     image::save(files, plan.format, &layout, &mut |sink| {
-        let cut = Cut::default();
-        let mut done = 0;
-        for band in job::bands(plan.region, &cut, renderer.largest_film()) {
+        let (cut, most) = (Cut::default(), renderer.largest_film());
+        let mut bands = Bands::new(plan.region, plan.scene.pixel_samples, &cut, Order::Rows, most);
+        let mut watch = |_: &mut dyn Backend, _: Region, share: f64| {
+            progress.update(share);
+            Ok(!stopped.load(Ordering::Relaxed))
+        };
+        loop {
             let start = Instant::now();
-            let mut update = |share: f64| {
-                progress.update((done as f64 + share * band.pixels() as f64) / plan.region.pixels() as f64);
-                !stopped.load(Ordering::Relaxed)
+            let Some(film) = renderer.work(|backend, _| bands.render_next(backend, &mut watch))? else {
+                return Ok(());
             };
-            let mut film = Film::new(Region::whole(0, 0));
-            let mut take = |rendered| {
-                film = rendered;
-                Ok(())
-            };
-            renderer.work(|backend, _| {
-                job::render(backend, band, plan.scene.pixel_samples, &cut, &mut update, &mut take)
-            })?;
             time += start.elapsed();
             camera_rays += match plan.scene.adaptive {
                 true => film.sample_counts().map(u64::from).sum(),
-                false => band.pixels() * u64::from(plan.scene.pixel_samples),
+                false => film.region.pixels() * u64::from(plan.scene.pixel_samples),
             };
             let hits = match plan.options.aovs.iter().any(|aov| !aov.is_of_film()) {
-                true => renderer.work(|backend, _| job::first_hits(backend, band))?,
+                true => renderer.work(|backend, _| job::first_hits(backend, film.region))?,
                 false => Vec::new(),
             };
             strange += film
@@ -325,9 +321,7 @@ fn write_picture(
                 film: &film,
                 hits: &hits,
             })?;
-            done += band.pixels();
         }
-        Ok(())
     })?;
     drop(progress);
     if strange > 0 && !plan.quiet {

@@ -4,6 +4,7 @@
 use glam::{Vec3, Vec4, Vec4Swizzles};
 
 use super::math::{max, min, power};
+use crate::film;
 use crate::pack::EVIDENCE;
 
 pub fn moments_with(moments: Vec4, sum: Vec4, sample: Vec4) -> Vec4 {
@@ -26,9 +27,7 @@ pub fn mean_of(sum: Vec4) -> Vec3 {
 }
 
 pub fn variance_of_mean(sum: Vec4, moments: Vec4) -> Vec3 {
-    let n = moments.w;
-    let scale = n / ((n - 1.0) * sum.w * sum.w);
-    moments.xyz() * scale
+    film::variance_of_mean(sum, moments)
 }
 
 pub fn display_variance(sum: Vec4, moments: Vec4) -> f32 {

@@ -4,12 +4,13 @@
 use std::ops::Range;
 use std::time::Duration;
 
+use crate::backend::Backend;
 use crate::cpu::Cpu;
 use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::gpu::Gpu;
 use crate::image::{Aov, Pixels};
-use crate::job::{Backend, Cut, Order, Steps};
+use crate::job::{Cut, Order, Steps};
 use crate::pack::{Camera, FirstHit, Packed};
 
 use super::picture::{Content, View, means};
@@ -170,9 +171,10 @@ impl Canvas {
         self.gpu.set_camera(&self.scene.camera)?;
         self.gpu.begin(region)?;
         if self.compare {
-            let mut cpu = Cpu::new(&self.scene);
-            cpu.begin(region)?;
-            self.cpu = cpu.film()?;
+            self.cpu = match self.scene.adaptive {
+                true => Film::adaptive(region),
+                false => Film::new(region),
+            };
         }
         let samples = if scale > self.finest {
             1
@@ -230,12 +232,14 @@ impl Canvas {
         let passes = self.steps.samples();
         if self.compare {
             let film = std::mem::replace(&mut self.cpu, Film::new(Region::whole(0, 0)));
+            let mut cpu = Cpu::new(&self.scene);
+            cpu.resume(film)?;
             let mut both = Both {
                 gpu: &mut self.gpu,
-                cpu: Cpu::resume(&self.scene, film),
+                cpu,
             };
             let result = self.steps.step(&mut both);
-            self.cpu = both.cpu.film()?;
+            self.cpu = both.cpu.into_film().unwrap_or(Film::new(Region::whole(0, 0)));
             result?;
         } else {
             self.steps.step(&mut self.gpu)?;
@@ -262,7 +266,8 @@ impl Canvas {
     }
 
     fn pixels(&self, film: &Film, under: Option<&Pixels>) -> Pixels {
-        means(film, under, &|y| self.steps.samples_of_row(y) > 0)
+        let steps = &self.steps;
+        means(film, under, &|y| steps.samples_of_row(y) > 0)
     }
 
     /// The picture as it is now, and its width and height.
@@ -353,9 +358,23 @@ impl Backend for Both<'_> {
         self.cpu.begin(region)
     }
 
-    fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
-        self.gpu.render(tile, samples.clone())?;
-        self.cpu.render(tile, samples)
+    fn resume(&mut self, film: Film) -> Result<(), RenderError> {
+        self.gpu.resume(film.clone())?;
+        self.cpu.resume(film)
+    }
+
+    fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+        self.gpu.submit(tile, samples.clone())?;
+        self.cpu.submit(tile, samples)
+    }
+
+    fn poll(&mut self) -> Result<bool, RenderError> {
+        Ok(self.cpu.poll()? & self.gpu.poll()?)
+    }
+
+    fn wait(&mut self) -> Result<(), RenderError> {
+        self.cpu.wait()?;
+        self.gpu.wait()
     }
 
     fn film(&mut self) -> Result<Film, RenderError> {

@@ -1,5 +1,7 @@
 //! Adapters, and the choice among them.
 
+use std::sync::mpsc;
+
 use bytemuck::{Pod, bytes_of, cast_slice};
 use wgpu::util::DeviceExt;
 use wgpu::{Backends, BufferUsages, DeviceType};
@@ -229,13 +231,22 @@ impl Device {
         }
     }
 
-    fn error(&self, error: impl std::fmt::Display) -> RenderError {
+    pub(super) fn error(&self, error: impl std::fmt::Display) -> RenderError {
         RenderError::Device {
             device: self.info.name.clone(),
             message: error.to_string(),
         }
     }
 
+    /// Lets wgpu notice what has ended. It does not wait.
+    pub(super) fn poll(&self) -> Result<(), RenderError> {
+        self.device
+            .poll(wgpu::PollType::Poll)
+            .map_err(|error| self.error(error))?;
+        Ok(())
+    }
+
+    /// Waits until all submitted work has ended.
     pub(super) fn wait(&self) -> Result<(), RenderError> {
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
@@ -283,20 +294,50 @@ impl Device {
 
     /// What a buffer that can be mapped holds, once all submitted work has ended.
     pub(super) fn read<T: Pod>(&self, staging: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
-        let (sender, receiver) = std::sync::mpsc::channel();
+        let mapping = self.checked(|| self.map(staging))?;
+        self.wait_for(&mapping)?;
+        self.mapped(staging)
+    }
+
+    /// Asks for a buffer's contents, which are there once the work that was submitted so far has ended.
+    pub(super) fn map(&self, staging: &wgpu::Buffer) -> Mapping {
+        let (sender, receiver) = mpsc::channel();
         staging.map_async(wgpu::MapMode::Read, .., move |result| {
             let _ = sender.send(result); // nobody waits any more if the wait has failed
         });
+        Mapping(receiver)
+    }
+
+    /// Waits until a buffer's contents are there.
+    pub(super) fn wait_for(&self, mapping: &Mapping) -> Result<(), RenderError> {
         self.wait()?;
-        receiver
-            .recv()
-            .map_err(|error| self.error(error))?
-            .map_err(|error| self.error(error))?;
+        match mapping.done() {
+            Some(result) => result.map_err(|message| self.error(message)),
+            None => Err(self.error("the device is idle, but a buffer cannot be read")),
+        }
+    }
+
+    /// What a buffer holds whose contents are there. They are given back.
+    pub(super) fn mapped<T: Pod>(&self, staging: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
         let view = staging.get_mapped_range(..).map_err(|error| self.error(error))?;
         let records = bytemuck::pod_collect_to_vec(&view);
         drop(view);
         staging.unmap();
         Ok(records)
+    }
+}
+
+/// A buffer's contents that were asked for.
+pub(super) struct Mapping(mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>);
+
+impl Mapping {
+    /// Whether they are there; `None` as long as nothing is known. It is told once.
+    pub(super) fn done(&self) -> Option<Result<(), String>> {
+        match self.0.try_recv() {
+            Ok(result) => Some(result.map_err(|error| error.to_string())),
+            Err(mpsc::TryRecvError::Empty) => None,
+            Err(error) => Some(Err(error.to_string())),
+        }
     }
 }
 

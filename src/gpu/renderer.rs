@@ -2,21 +2,21 @@
 
 use std::ops::Range;
 
-use bytemuck::bytes_of;
+use bytemuck::{bytes_of, cast_slice};
 use glam::{UVec2, Vec4};
 use wgpu::BufferUsages;
 
 use super::bake::bake_if_small;
 use super::compose::{ADAPTIVE, FIRST_HITS, Kernel, RENDER, Shaders};
-use super::device::Device;
+use super::device::{Device, Mapping};
 use super::pipeline::{WORKGROUP, bind_group, bind_group_layouts, pipeline};
 use super::rounding::Rounding;
 use super::rounds::samples_per_call;
 use super::scene::SceneBuffers;
 use super::texels::TexelParts;
+use crate::backend::{Backend, Rules, Started};
 use crate::error::RenderError;
 use crate::film::{Film, Region};
-use crate::job::Backend;
 use crate::pack::{Camera, FirstHit, Packed, Specialization, Work};
 
 /// How a scene is put on a device.
@@ -49,14 +49,24 @@ pub struct Gpu {
     work: wgpu::Buffer,
     /// The kernel's receipt of a call: as the kernel writes it, and as the host reads it.
     receipt: [wgpu::Buffer; 2],
-    /// What the last call of [`Backend::render`] has changed, as it was before.
+    /// What the last dispatch of a call has changed, as it was before.
     before: Option<wgpu::Buffer>,
-    film: Option<Target>,
-    adaptive: bool,
-    /// The most samples of a call that the driver is thought to run whole.
+    film: Option<(Target, Started)>,
+    pending: Option<Pending>,
+    rules: Rules,
+    /// The most samples of a dispatch that the driver is thought to run whole.
     samples_per_call: u32,
-    /// The whole picture.
-    picture: Region,
+}
+
+/// A call that was submitted: one dispatch of it is under way.
+struct Pending {
+    tile: Region,
+    /// The samples that are not known to be added.
+    samples: Range<u32>,
+    /// Where those of the dispatch end.
+    end: u32,
+    /// Tells when the dispatch has ended.
+    receipt: Mapping,
 }
 
 /// What it takes to compile another kernel for the same scene.
@@ -143,8 +153,8 @@ impl Gpu {
             receipt,
             before: None,
             film: None,
-            adaptive: packed.adaptive,
-            picture: Region::whole(packed.camera.width, packed.camera.height),
+            pending: None,
+            rules: Rules::of(packed),
         };
         let nothing = Region {
             x0: 0,
@@ -153,7 +163,9 @@ impl Gpu {
             y1: 1,
         };
         gpu.begin(nothing)?;
-        gpu.render(nothing, 0..0)?;
+        gpu.dispatch_part(nothing, 0..0)?;
+        gpu.wait()?;
+        gpu.film = None;
         Ok(gpu)
     }
 
@@ -164,28 +176,39 @@ impl Gpu {
 
     /// Uploads a changed scene that needs no other kernel. Returns whether it does not; if it does, nothing is done.
     /// The film is lost.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Pending`] while a call is pending.
     pub fn update(&mut self, packed: &Packed) -> Result<bool, RenderError> {
+        self.idle()?;
         let texels = TexelParts::of(&self.device.info, packed)?;
         let same_kernel = self.kernels.baked.is_none()
-            && (self.kernels.constants, self.adaptive) == (packed.specialization, packed.adaptive)
+            && (self.kernels.constants, self.rules.adaptive()) == (packed.specialization, packed.adaptive)
             && self.kernels.texels == texels;
         if same_kernel {
             self.film = None;
             self.scene = SceneBuffers::upload(&self.device, packed, texels, &self.kernels.layouts)?;
             self.samples_per_call = samples_per_call(packed, false);
-            self.picture = Region::whole(packed.camera.width, packed.camera.height);
+            self.rules = Rules::of(packed);
         }
         Ok(same_kernel)
     }
 
-    /// Changes the camera. Whoever does so starts a new film.
+    /// Changes the camera. The film is lost.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Pending`] while a call is pending.
     pub fn set_camera(&mut self, camera: &Camera) -> Result<(), RenderError> {
-        self.picture = Region::whole(camera.width, camera.height);
+        self.idle()?;
+        self.film = None;
+        self.rules.set_size(camera.width, camera.height);
         self.device.checked(|| self.scene.set_camera(&self.device, camera))
     }
 
     fn target(&self, kernel: &Kernel, region: Region) -> Result<Target, RenderError> {
-        let size = region.pixels() * kernel.record as u64;
+        let size = region.pixels().max(1) * kernel.record as u64; // a binding cannot be empty
         self.device.checked(|| {
             let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
             let buffer = self.device.buffer(size, usage);
@@ -195,8 +218,7 @@ impl Gpu {
         })
     }
 
-    /// Runs a kernel over a tile of a target, after these copies, waits for its end, and returns whether it ran whole for
-    /// every pixel: the driver has cut none of its loops short.
+    /// Runs a kernel over a tile of a target, after these copies. Its receipt is asked for.
     fn dispatch(
         &self,
         pipeline: &wgpu::ComputePipeline,
@@ -204,7 +226,7 @@ impl Gpu {
         tile: Region,
         samples: Range<u32>,
         copies: impl FnOnce(&mut wgpu::CommandEncoder),
-    ) -> Result<bool, RenderError> {
+    ) -> Result<Mapping, RenderError> {
         let work = Work {
             origin: UVec2::new(tile.x0, tile.y0),
             size: UVec2::new(tile.width(), tile.height()),
@@ -215,7 +237,7 @@ impl Gpu {
         };
         let Device { device, queue, .. } = &self.device;
         let [written, read] = &self.receipt;
-        let groups = [tile.width(), tile.height()].map(|pixels| pixels.div_ceil(WORKGROUP));
+        let [columns, rows] = groups(tile);
         self.device.checked(|| {
             queue.write_buffer(&self.work, 0, bytes_of(&work));
             let mut encoder = device.create_command_encoder(&Default::default());
@@ -227,18 +249,31 @@ impl Gpu {
             for (i, group) in (0..).zip(groups_of_bindings) {
                 pass.set_bind_group(i, group, &[]);
             }
-            pass.dispatch_workgroups(groups[0], groups[1], 1);
+            pass.dispatch_workgroups(columns, rows, 1);
             drop(pass);
             encoder.copy_buffer_to_buffer(written, 0, read, 0, read.size());
             queue.submit([encoder.finish()]);
-        })?;
-        let receipt: Vec<u32> = self.device.read(read)?;
-        Ok(receipt == [groups[0] * groups[1], 0])
+            self.device.map(read)
+        })
     }
 
-    /// Adds samples to a tile of a film in as many calls as it takes, and learns how long one may be. A call that was cut
-    /// short is undone.
-    fn render_whole(&mut self, film: &Target, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+    /// Whether a dispatch that has ended ran whole for every pixel of its tile: the driver has cut none of its loops short.
+    fn ran_whole(&self, tile: Region) -> Result<bool, RenderError> {
+        let receipt: Vec<u32> = self.device.mapped(&self.receipt[1])?;
+        let [columns, rows] = groups(tile);
+        Ok(receipt == [columns * rows, 0])
+    }
+
+    fn idle(&self) -> Result<(), RenderError> {
+        match self.pending {
+            Some(_) => Err(RenderError::Pending),
+            None => Ok(()),
+        }
+    }
+
+    /// Submits as much of a call as is thought to run whole, and keeps what it changes as it was before.
+    fn dispatch_part(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+        let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
         let rows = Rows::of(film, tile);
         let before = match self.before.take().filter(|before| before.size() >= rows.bytes()) {
             Some(before) => before,
@@ -247,33 +282,96 @@ impl Gpu {
                     .buffer(rows.bytes(), BufferUsages::COPY_SRC | BufferUsages::COPY_DST)
             })?,
         };
-        let mut first = samples.start;
-        loop {
-            let count = self.samples_per_call.min(samples.end - first);
-            let save = |encoder: &mut wgpu::CommandEncoder| {
-                for (start, copy) in rows.pieces() {
-                    encoder.copy_buffer_to_buffer(&film.buffer, start, &before, copy, rows.size);
-                }
-            };
-            if self.dispatch(&self.render, film, tile, first..first + count, save)? {
-                first += count;
-                if first == samples.end {
-                    self.before = Some(before);
-                    return Ok(());
-                }
-                continue;
+        let most = self.rules.end_of_part(&samples) - samples.start;
+        let end = samples.start + self.samples_per_call.min(most);
+        let save = |encoder: &mut wgpu::CommandEncoder| {
+            for (start, copy) in rows.pieces() {
+                encoder.copy_buffer_to_buffer(&film.buffer, start, &before, copy, rows.size);
             }
-            self.device.checked(|| {
-                let mut encoder = self.device.device.create_command_encoder(&Default::default());
-                for (start, copy) in rows.pieces() {
-                    encoder.copy_buffer_to_buffer(&before, copy, &film.buffer, start, rows.size);
+        };
+        let receipt = self.dispatch(&self.render, film, tile, samples.start..end, save)?;
+        self.before = Some(before);
+        self.pending = Some(Pending {
+            tile,
+            samples,
+            end,
+            receipt,
+        });
+        Ok(())
+    }
+
+    /// Brings a dispatch that has ended to its end, and submits the next one of the call, if there is any. One that was cut
+    /// short is undone, and the next ones have fewer samples.
+    fn end_part(&mut self, pending: Pending) -> Result<(), RenderError> {
+        let Pending { tile, samples, end, .. } = pending;
+        let rest = match self.ran_whole(tile)? {
+            true => end..samples.end,
+            false => {
+                self.undo(tile)?;
+                let count = end - samples.start;
+                if count <= 1 {
+                    return Err(self.cut_short());
                 }
-                self.device.queue.submit([encoder.finish()]);
-            })?;
-            if count <= 1 {
-                return Err(self.cut_short());
+                self.samples_per_call = count / 2;
+                samples
             }
-            self.samples_per_call = count / 2;
+        };
+        match rest.is_empty() {
+            true => Ok(()),
+            false => self.dispatch_part(tile, rest),
+        }
+    }
+
+    fn undo(&self, tile: Region) -> Result<(), RenderError> {
+        let (Some((film, _)), Some(before)) = (&self.film, &self.before) else {
+            return Ok(());
+        };
+        let rows = Rows::of(film, tile);
+        self.device.checked(|| {
+            let mut encoder = self.device.device.create_command_encoder(&Default::default());
+            for (start, copy) in rows.pieces() {
+                encoder.copy_buffer_to_buffer(before, copy, &film.buffer, start, rows.size);
+            }
+            self.device.queue.submit([encoder.finish()]);
+        })
+    }
+
+    /// The pending call's next step, if its dispatch has ended.
+    fn step(&mut self) -> Result<(), RenderError> {
+        let Some(pending) = self.pending.take() else {
+            return Ok(());
+        };
+        match pending.receipt.done() {
+            None => {
+                self.pending = Some(pending);
+                Ok(())
+            }
+            Some(Ok(())) => self.end_part(pending),
+            Some(Err(message)) => Err(self.device.error(message)),
+        }
+    }
+
+    /// After an error there is no film.
+    fn or_lost<T>(&mut self, result: Result<T, RenderError>) -> Result<T, RenderError> {
+        if result.is_err() {
+            self.pending = None;
+            self.film = None;
+        }
+        result
+    }
+
+    fn find_first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
+        let pipeline = match self.first_hits.take() {
+            Some(pipeline) => pipeline,
+            None => self.kernels.compile(&self.device, &FIRST_HITS)?,
+        };
+        let target = self.target(&FIRST_HITS, region)?;
+        let receipt = self.dispatch(&pipeline, &target, region, 0..0, |_| ())?;
+        self.first_hits = Some(pipeline);
+        self.device.wait_for(&receipt)?;
+        match self.ran_whole(region)? {
+            true => self.device.download(&target.buffer),
+            false => Err(self.cut_short()),
         }
     }
 
@@ -285,35 +383,83 @@ impl Gpu {
     }
 }
 
+/// The workgroups of a tile, along each side.
+fn groups(tile: Region) -> [u32; 2] {
+    [tile.width(), tile.height()].map(|pixels| pixels.div_ceil(WORKGROUP))
+}
+
 impl Backend for Gpu {
     fn begin(&mut self, region: Region) -> Result<(), RenderError> {
+        self.idle()?;
+        let started = self.rules.begin(region)?;
         self.film = None; // before the next one: the two together may not fit
-        self.film = Some(match self.adaptive {
+        let film = match self.rules.adaptive() {
             true => self.target(&ADAPTIVE, region)?,
             false => self.target(&RENDER, region)?,
-        });
+        };
+        self.film = Some((film, started));
         Ok(())
     }
 
-    fn render(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
-        let Some(film) = self.film.take() else {
-            return Ok(());
+    fn resume(&mut self, film: Film) -> Result<(), RenderError> {
+        self.idle()?;
+        let started = self.rules.resume(&film)?;
+        self.begin(film.region)?;
+        let result = match &self.film {
+            Some((target, _)) => self.device.checked(|| {
+                let mut at = 0;
+                for list in [&film.sums, &film.moments, &film.looks] {
+                    self.device.queue.write_buffer(&target.buffer, at, cast_slice(list));
+                    at += size_of_val(list.as_slice()) as u64;
+                }
+            }),
+            None => Err(RenderError::NoFilm),
         };
-        let result = self.render_whole(&film, tile, samples);
-        self.film = Some(film);
-        result
+        self.or_lost(result)?;
+        self.film = self.film.take().map(|(target, _)| (target, started));
+        Ok(())
+    }
+
+    fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+        self.idle()?;
+        let (_, started) = self.film.as_mut().ok_or(RenderError::NoFilm)?;
+        if !self.rules.call(started, tile, &samples)? {
+            return Ok(());
+        }
+        let result = self.dispatch_part(tile, samples);
+        self.or_lost(result)
+    }
+
+    fn poll(&mut self) -> Result<bool, RenderError> {
+        if self.pending.is_some() {
+            let result = self.device.poll().and_then(|()| self.step());
+            self.or_lost(result)?;
+        }
+        Ok(self.pending.is_none())
+    }
+
+    fn wait(&mut self) -> Result<(), RenderError> {
+        while self.pending.is_some() {
+            let result = self.device.wait().and_then(|()| self.step());
+            self.or_lost(result)?;
+        }
+        Ok(())
     }
 
     fn film(&mut self) -> Result<Film, RenderError> {
-        let Some(film) = &self.film else {
-            return Ok(Film::new(Region::whole(0, 0)));
-        };
-        let mut sums: Vec<Vec4> = self.device.download(&film.buffer)?;
-        let pixels = film.region.pixels() as usize;
+        self.idle()?;
+        let (film, _) = self.film.as_ref().ok_or(RenderError::NoFilm)?;
+        let region = film.region;
+        if region.is_empty() {
+            return Ok(self.rules.empty_film(region));
+        }
+        let result = self.device.download(&film.buffer);
+        let mut sums: Vec<Vec4> = self.or_lost(result)?;
+        let pixels = region.pixels() as usize;
         let mut moments = sums.split_off(pixels);
         let looks = moments.split_off(pixels.min(moments.len()));
         Ok(Film {
-            region: film.region,
+            region,
             sums,
             moments,
             looks,
@@ -321,39 +467,33 @@ impl Backend for Gpu {
     }
 
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
-        let pipeline = match self.first_hits.take() {
-            Some(pipeline) => pipeline,
-            None => self.kernels.compile(&self.device, &FIRST_HITS)?,
-        };
-        let target = self.target(&FIRST_HITS, region)?;
-        let whole = self.dispatch(&pipeline, &target, region, 0..0, |_| ())?;
-        self.first_hits = Some(pipeline);
-        match whole {
-            true => self.device.download(&target.buffer),
-            false => Err(self.cut_short()),
+        self.idle()?;
+        self.rules.in_picture(region)?;
+        if region.is_empty() {
+            return Ok(Vec::new());
         }
+        let result = self.find_first_hits(region);
+        self.or_lost(result)
     }
 
     fn samples_of_all(&self) -> u32 {
-        self.kernels.constants.first_look
+        self.rules.samples_of_all()
     }
 
     fn around(&self, region: Region) -> Region {
-        match self.adaptive {
-            true => region.with_neighbors().within(self.picture),
-            false => region,
-        }
+        self.rules.around(region)
     }
 
     fn largest_film(&self) -> u64 {
         let info = &self.device.info;
         let bytes = info.largest_binding.min(info.largest_buffer);
-        if !self.adaptive {
+        if !self.rules.adaptive() {
             return bytes / FIRST_HITS.record as u64;
         }
         let most = bytes / ADAPTIVE.record as u64;
-        let beside = 2 * (u64::from(self.picture.width()) + u64::from(self.picture.height())) + 4;
-        match self.picture.pixels() <= most {
+        let picture = self.rules.picture();
+        let beside = 2 * (u64::from(picture.width()) + u64::from(picture.height())) + 4;
+        match picture.pixels() <= most {
             true => most,
             false => most.saturating_sub(beside), // a part of it comes with the pixels around
         }

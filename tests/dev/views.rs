@@ -2,10 +2,10 @@
 
 use std::fs;
 
+use wgray::backend::Backend as _;
 use wgray::cpu::Cpu;
 use wgray::dev::{Command, Content, Move, View};
 use wgray::film::Region;
-use wgray::job::Backend as _;
 
 use super::running::{Files, KERNEL, RADIANCE, Running, SCENE, SETTLED};
 

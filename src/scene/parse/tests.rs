@@ -115,7 +115,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[[shapes]]\n[[shapes]]",
             1,
-            "shapes[0].type: is missing; it is one of \"rectangle\", \"ellipsoid\", \"sphere\", \"triangle\", \"tetrahedron\", \"plane\"",
+            "shapes[0].type: is missing; it is one of \"rectangle\", \"disk\", \"ellipsoid\", \"sphere\", \"triangle\", \"tetrahedron\", \"plane\"",
         ),
         (
             "[[lights]]\ntype = 'directional'\ndirection = [0, 0, 1]\ncolor = [1, 1, 1]\n[[lights]]\ntype = 'point'\nvertex = 3",

@@ -1,0 +1,397 @@
+//! The contract of backends (`wgray::backend::Backend`), sentence by sentence, held by one suite: the CPU and the device, the
+//! scene as constants and in buffers, with adaptive sampling and without. Backends that break it are found.
+
+use std::ops::Range;
+
+use wgray::backend::Backend;
+use wgray::cpu::Cpu;
+use wgray::error::RenderError;
+use wgray::film::{Film, Region};
+use wgray::pack::{FirstHit, Packed};
+use wgray::scene::AdaptiveDescription;
+
+use crate::pictures::{Way, backend, exact_ways};
+use crate::{patterns, scenes};
+
+const SIZE: (u32, u32) = (20, 12);
+const SAMPLES: u32 = 40;
+
+/// A small scene, and the same with adaptive sampling.
+fn subjects() -> [Packed; 2] {
+    let mut plain = scenes::scene("cornell.toml");
+    (plain.image.width, plain.image.height) = SIZE;
+    plain.render.pixel_samples = patterns::samples(wgray::scene::Pattern::Sobol, SAMPLES);
+    plain.render.light_samples = patterns::samples(wgray::scene::Pattern::Sobol, 2);
+    let mut adaptive = plain.clone();
+    adaptive.render.pixel_samples = patterns::samples(wgray::scene::Pattern::Sobol, 8);
+    adaptive.render.adaptive = Some(AdaptiveDescription {
+        error: 0.02,
+        max_samples: Some(SAMPLES),
+    });
+    [scenes::packed(&plain), scenes::packed(&adaptive)]
+}
+
+fn picture() -> Region {
+    Region::whole(SIZE.0, SIZE.1)
+}
+
+fn region(x0: u32, y0: u32, x1: u32, y1: u32) -> Region {
+    Region { x0, y0, x1, y1 }
+}
+
+/// A film's bits.
+fn bits(film: &Film) -> (Region, Vec<u32>) {
+    let all = [&film.sums, &film.moments, &film.looks].map(|list| bytemuck::cast_slice(list).to_vec());
+    (film.region, all.concat())
+}
+
+fn film_of(backend: &mut dyn Backend) -> (Region, Vec<u32>) {
+    bits(&backend.film().expect("a film"))
+}
+
+/// The whole picture in one piece for each look, by any backend.
+fn whole(backend: &mut dyn Backend) -> Film {
+    let all = backend.samples_of_all().min(SAMPLES);
+    backend.begin(picture()).expect("a film");
+    backend.render(picture(), 0..all).expect("first samples");
+    backend.render(picture(), all..SAMPLES).expect("further samples");
+    backend.film().expect("a film")
+}
+
+type Make<'a> = dyn Fn() -> Box<dyn Backend + 'a> + 'a;
+/// A sentence of the contract, and what holds a backend to it: the error says what it did instead.
+type Sentence = (&'static str, fn(&Packed, &Make) -> Result<(), String>);
+
+fn hold(what: bool, why: &str) -> Result<(), String> {
+    match what {
+        true => Ok(()),
+        false => Err(why.to_string()),
+    }
+}
+
+const SENTENCES: &[Sentence] = &[
+    ("there is no film at first", |_, make| {
+        let mut b = make();
+        hold(
+            matches!(b.film(), Err(RenderError::NoFilm)),
+            "a film is read before one is begun",
+        )?;
+        let rendered = b.render(picture(), 0..1);
+        hold(
+            matches!(rendered, Err(RenderError::NoFilm)),
+            "samples are taken without a film",
+        )
+    }),
+    ("a film starts empty", |_, make| {
+        let mut b = make();
+        whole(&mut *b);
+        b.begin(region(2, 3, 7, 9)).map_err(|e| e.to_string())?;
+        let film = b.film().map_err(|e| e.to_string())?;
+        hold(film.region == region(2, 3, 7, 9), "another region")?;
+        hold(
+            film.sums.iter().all(|sum| *sum == glam::Vec4::ZERO),
+            "sums of an earlier film",
+        )
+    }),
+    ("reading a film changes nothing", |_, make| {
+        let mut b = make();
+        b.begin(picture()).map_err(|e| e.to_string())?;
+        b.render(picture(), 0..4).map_err(|e| e.to_string())?;
+        let first = film_of(&mut *b);
+        hold(first == film_of(&mut *b), "the second copy differs")?;
+        b.render(picture(), 4..8).map_err(|e| e.to_string())?;
+        let mut other = make();
+        other.begin(picture()).map_err(|e| e.to_string())?;
+        other.render(picture(), 0..8).map_err(|e| e.to_string())?;
+        hold(
+            film_of(&mut *b) == film_of(&mut *other),
+            "what comes after a copy differs",
+        )
+    }),
+    ("a film is gone on from, by any backend", |packed, make| {
+        let mut b = make();
+        let expected = bits(&whole(&mut *b));
+        let all = b.samples_of_all().min(SAMPLES);
+        for middle in [1, all / 2, all, all + (SAMPLES - all) / 2] {
+            let mut start = Cpu::new(packed);
+            start.begin(picture()).map_err(|e| e.to_string())?;
+            start.render(picture(), 0..middle.min(all)).map_err(|e| e.to_string())?;
+            start
+                .render(picture(), all..middle.max(all))
+                .map_err(|e| e.to_string())?;
+            let film = start.film().map_err(|e| e.to_string())?;
+            let mut b = make();
+            b.resume(film.clone()).map_err(|e| e.to_string())?;
+            hold(film_of(&mut *b) == bits(&film), "a resumed film is another")?;
+            b.render(picture(), middle..all.max(middle))
+                .map_err(|e| e.to_string())?;
+            b.render(picture(), middle.max(all)..SAMPLES)
+                .map_err(|e| e.to_string())?;
+            hold(film_of(&mut *b) == expected, "a film that was gone on from differs")?;
+        }
+        Ok(())
+    }),
+    ("a film of another form is refused", |_, make| {
+        let mut b = make();
+        let film = whole(&mut *b);
+        let before = film_of(&mut *b);
+        for wrong in [
+            Film {
+                sums: film.sums[1..].to_vec(),
+                ..film.clone()
+            },
+            Film {
+                moments: vec![glam::Vec4::ZERO; 3],
+                ..film.clone()
+            },
+            Film {
+                looks: vec![glam::Vec4::ZERO; 3],
+                ..film.clone()
+            },
+        ] {
+            let told = b.resume(wrong);
+            hold(
+                matches!(told, Err(RenderError::WrongFilm(_))),
+                "a film of another form is taken",
+            )?;
+        }
+        hold(film_of(&mut *b) == before, "a refusal changes the film")
+    }),
+    ("every cut of the work gives the same film", |_, make| {
+        let mut b = make();
+        let expected = bits(&whole(&mut *b));
+        let all = b.samples_of_all().min(SAMPLES);
+        let tiles = [region(0, 0, 20, 1), region(0, 1, 9, 12), region(9, 1, 20, 12)];
+        b.begin(picture()).map_err(|e| e.to_string())?;
+        for (start, end) in [(0, all), (all, SAMPLES)] {
+            for tile in tiles.iter().rev() {
+                let mut first = start;
+                for length in (1..).map(|i| i * i) {
+                    let next = (first + length).min(end);
+                    b.render(*tile, first..next).map_err(|e| e.to_string())?;
+                    first = next;
+                    if first >= end {
+                        break;
+                    }
+                }
+            }
+        }
+        hold(film_of(&mut *b) == expected, "small tiles and ranges give another film")
+    }),
+    ("empty tiles and ranges change nothing", |_, make| {
+        let mut b = make();
+        let expected = bits(&whole(&mut *b));
+        for (tile, samples) in [
+            (picture(), 7..7),
+            (region(3, 3, 3, 9), 0..4),
+            (region(99, 99, 99, 99), 0..4),
+            (picture(), Range { start: 9, end: 3 }),
+        ] {
+            b.render(tile, samples).map_err(|e| e.to_string())?;
+        }
+        hold(film_of(&mut *b) == expected, "nothing has changed the film")?;
+        b.begin(region(5, 5, 5, 5)).map_err(|e| e.to_string())?;
+        let film = b.film().map_err(|e| e.to_string())?;
+        hold(film.sums.is_empty(), "a film without pixels has some")
+    }),
+    ("what is outside is refused", |_, make| {
+        let mut b = make();
+        let outside = |told: Result<(), RenderError>| matches!(told, Err(RenderError::Outside { .. }));
+        hold(outside(b.begin(region(0, 0, 21, 12))), "a film beyond the picture")?;
+        b.begin(region(4, 4, 10, 10)).map_err(|e| e.to_string())?;
+        for tile in [region(3, 4, 10, 10), region(4, 4, 11, 10), picture()] {
+            hold(outside(b.render(tile, 0..1)), "a tile beyond the film")?;
+        }
+        let hits = b.first_hits(region(0, 0, 20, 13)).map(|_| ());
+        hold(outside(hits), "first hits beyond the picture")?;
+        let film = b.film().map_err(|e| e.to_string())?;
+        hold(
+            film.sums.iter().all(|sum| *sum == glam::Vec4::ZERO),
+            "a refusal changes the film",
+        )
+    }),
+    ("submitting and waiting are two calls", |_, make| {
+        let mut b = make();
+        hold(b.poll().map_err(|e| e.to_string())?, "something is pending at first")?;
+        b.wait().map_err(|e| e.to_string())?;
+        b.begin(picture()).map_err(|e| e.to_string())?;
+        b.submit(picture(), 0..8).map_err(|e| e.to_string())?;
+        let pending = |told: Result<(), RenderError>| matches!(told, Err(RenderError::Pending));
+        hold(pending(b.submit(picture(), 8..9)), "a second call is taken")?;
+        hold(pending(b.film().map(|_| ())), "a film is read while a call is pending")?;
+        hold(pending(b.begin(picture())), "a film is begun while a call is pending")?;
+        hold(
+            pending(b.first_hits(picture()).map(|_| ())),
+            "first hits while a call is pending",
+        )?;
+        while !b.poll().map_err(|e| e.to_string())? {
+            std::thread::yield_now();
+        }
+        let polled = film_of(&mut *b);
+        b.begin(picture()).map_err(|e| e.to_string())?;
+        b.render(picture(), 0..8).map_err(|e| e.to_string())?;
+        hold(
+            film_of(&mut *b) == polled,
+            "what was polled for differs from what was waited for",
+        )
+    }),
+    (
+        "first samples of all pixels come before further ones",
+        |packed, make| {
+            if !packed.adaptive {
+                return Ok(());
+            }
+            let mut b = make();
+            let all = b.samples_of_all();
+            b.begin(picture()).map_err(|e| e.to_string())?;
+            b.render(region(0, 0, 20, 11), 0..all).map_err(|e| e.to_string())?;
+            let early = b.render(region(0, 0, 20, 1), all..all + 1);
+            hold(
+                matches!(early, Err(RenderError::TooEarly { .. })),
+                "further samples are taken too early",
+            )?;
+            b.render(region(0, 11, 20, 12), 0..all).map_err(|e| e.to_string())?;
+            b.render(region(0, 0, 20, 1), all..all + 1).map_err(|e| e.to_string())
+        },
+    ),
+    ("first hits need no film, and leave it as it is", |_, make| {
+        let mut b = make();
+        let hits = b.first_hits(picture()).map_err(|e| e.to_string())?;
+        hold(hits.len() == 240, "another number of first hits")?;
+        let before = bits(&whole(&mut *b));
+        let part = b.first_hits(region(0, 0, 20, 2)).map_err(|e| e.to_string())?;
+        hold(
+            bytemuck::cast_slice::<_, u8>(&part) == bytemuck::cast_slice::<_, u8>(&hits[..40]),
+            "a part differs",
+        )?;
+        hold(film_of(&mut *b) == before, "first hits change the film")
+    }),
+];
+
+/// The sentences that a backend does not keep to, with what it did.
+fn broken<'a>(packed: &'a Packed, make: &Make<'a>) -> Vec<String> {
+    let found = SENTENCES.iter().filter_map(|(sentence, holds)| {
+        let told = holds(packed, make).err()?;
+        Some(format!("{sentence}: {told}"))
+    });
+    found.collect()
+}
+
+#[test]
+fn every_backend_keeps_to_the_contract() {
+    for packed in &subjects() {
+        for way in exact_ways() {
+            let problems = broken(packed, &|| backend(packed, way));
+            assert_eq!(problems, Vec::<String>::new(), "{way:?}, adaptive {}", packed.adaptive);
+        }
+    }
+}
+
+/// A backend with one thing wrong.
+struct Wrong<'a> {
+    inner: Cpu<'a>,
+    how: How,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum How {
+    KeepsTheFilm,
+    EmptiesTheFilmByReading,
+    IgnoresAMissingFilm,
+    ForgetsTheFilmToGoOnFrom,
+    AddsASampleTwice,
+    ClampsTiles,
+    TakesASecondCall,
+    FirstHitsEndTheFilm,
+}
+
+const WRONGS: [How; 8] = [
+    How::KeepsTheFilm,
+    How::EmptiesTheFilmByReading,
+    How::IgnoresAMissingFilm,
+    How::ForgetsTheFilmToGoOnFrom,
+    How::AddsASampleTwice,
+    How::ClampsTiles,
+    How::TakesASecondCall,
+    How::FirstHitsEndTheFilm,
+];
+
+impl Backend for Wrong<'_> {
+    fn begin(&mut self, region: Region) -> Result<(), RenderError> {
+        match self.how == How::KeepsTheFilm && self.inner.film().is_ok() {
+            true => Ok(()),
+            false => self.inner.begin(region),
+        }
+    }
+
+    fn resume(&mut self, film: Film) -> Result<(), RenderError> {
+        match self.how {
+            How::ForgetsTheFilmToGoOnFrom => self.inner.begin(film.region),
+            _ => self.inner.resume(film),
+        }
+    }
+
+    fn submit(&mut self, tile: Region, samples: Range<u32>) -> Result<(), RenderError> {
+        let (mut tile, mut samples) = (tile, samples);
+        match self.how {
+            How::AddsASampleTwice if samples.start > 0 => samples.start -= 1,
+            How::ClampsTiles => tile = tile.within(self.inner.film()?.region),
+            How::TakesASecondCall => self.inner.wait()?,
+            _ => {}
+        }
+        match self.inner.submit(tile, samples) {
+            Err(RenderError::NoFilm) if self.how == How::IgnoresAMissingFilm => Ok(()),
+            told => told,
+        }
+    }
+
+    fn poll(&mut self) -> Result<bool, RenderError> {
+        self.inner.poll()
+    }
+
+    fn wait(&mut self) -> Result<(), RenderError> {
+        self.inner.wait()
+    }
+
+    fn film(&mut self) -> Result<Film, RenderError> {
+        let film = self.inner.film()?;
+        if self.how == How::EmptiesTheFilmByReading {
+            self.inner.begin(film.region)?;
+        }
+        Ok(film)
+    }
+
+    fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
+        if self.how == How::FirstHitsEndTheFilm {
+            self.inner.begin(region)?;
+        }
+        self.inner.first_hits(region)
+    }
+
+    fn largest_film(&self) -> u64 {
+        self.inner.largest_film()
+    }
+
+    fn samples_of_all(&self) -> u32 {
+        self.inner.samples_of_all()
+    }
+
+    fn around(&self, region: Region) -> Region {
+        self.inner.around(region)
+    }
+}
+
+#[test]
+fn a_backend_that_breaks_the_contract_is_found() {
+    let [plain, _] = &subjects();
+    assert_eq!(broken(plain, &|| backend(plain, Way::Cpu)), Vec::<String>::new());
+    for how in WRONGS {
+        let make = || -> Box<dyn Backend> {
+            Box::new(Wrong {
+                inner: Cpu::new(plain),
+                how,
+            })
+        };
+        assert!(!broken(plain, &make).is_empty(), "{how:?}");
+    }
+}
