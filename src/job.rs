@@ -11,7 +11,7 @@ use crate::pack::FirstHit;
 
 /// How long one call of [`Backend::render`] aims to take: long enough to hide what a call costs, short enough for
 /// watchdogs, progress and cancelling.
-pub(crate) const CALL: Duration = Duration::from_millis(60);
+const CALL: Duration = Duration::from_millis(60);
 
 /// How work is cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -194,11 +194,6 @@ impl Steps {
         };
         self.pace.start_film();
         self.begin_pass(0);
-    }
-
-    /// The film that the calls are for: the region, and the pixels around it that get the samples of all.
-    pub fn film(&self) -> Region {
-        self.film
     }
 
     /// Forgets the pace: other work comes.

@@ -91,11 +91,7 @@ impl Canvas {
 
     /// Whether it is this scene that is rendered.
     pub fn shows(&self, scene: &Packed) -> bool {
-        *scene
-            == Packed {
-                camera: self.camera,
-                ..self.scene.clone()
-            }
+        scene.camera == self.camera && scene.same_but_camera(&self.scene)
     }
 
     /// Starts a picture of a changed scene. Returns false, and does nothing, if it takes another kernel.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::faults::{Fault, Faults, faults, mark};
 use crate::film::{Film, mean};
-use crate::image::{Aov, Pixels, difference, encode};
+use crate::image::{self, Aov, Pixels, difference, encode};
 use crate::pack::{FirstHit, NOTHING};
 
 /// What is shown of the scene.
@@ -322,18 +322,11 @@ pub fn png_of(pixels: &Pixels) -> Vec<u8> {
 
 /// A PNG file of 8-bit RGB, packed for speed.
 fn png(width: u32, height: u32, rgb: &[u8]) -> Vec<u8> {
-    let mut file = Vec::new();
-    let mut encoder = png::Encoder::new(&mut file, width, height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_compression(png::Compression::Fast);
     // Writing to memory fails only if the sizes do not fit; the page then shows no picture, which the tests would see.
-    let written = encoder
-        .write_header()
-        .and_then(|mut writer| writer.write_image_data(rgb));
-    if let Err(error) = written {
+    image::in_memory(width, height, rgb).unwrap_or_else(|error| {
         tracing::error!("a picture of {width} x {height} cannot be made: {error}");
-    }
-    file
+        Vec::new()
+    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Adapters, and the choice among them.
 
-use std::sync::mpsc;
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
 
 use bytemuck::{Pod, bytes_of, cast_slice};
 use wgpu::util::DeviceExt;
@@ -53,8 +53,24 @@ pub struct Info {
 pub struct Device {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
+    failure: Failure,
     /// What it says of itself.
     pub info: Info,
+}
+
+/// What went wrong while nobody could be told, until somebody is.
+#[derive(Clone, Default)]
+struct Failure(Arc<Mutex<Option<String>>>);
+
+impl Failure {
+    fn keep(&self, what: &dyn std::fmt::Display) {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.get_or_insert_with(|| what.to_string());
+    }
+
+    fn take(&self) -> Option<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
 }
 
 /// Every adapter that wgpu finds, in the order in which [`Choice::Auto`] prefers them.
@@ -203,7 +219,20 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
             device: info.name.clone(),
             message: error.to_string(),
         })?;
-    Ok(Device { device, queue, info })
+    // By default wgpu panics. What goes wrong outside of `Device::checked`, or while nobody waits, is told by the next call.
+    let failure = Failure::default();
+    let (uncaptured, lost) = (failure.clone(), failure.clone());
+    device.on_uncaptured_error(Arc::new(move |error| uncaptured.keep(&error)));
+    device.set_device_lost_callback(move |reason, message| match reason {
+        wgpu::DeviceLostReason::Destroyed => {} // given up, or dropped
+        _ => lost.keep(&format!("the device was lost: {message}")),
+    });
+    Ok(Device {
+        device,
+        queue,
+        failure,
+        info,
+    })
 }
 
 impl Device {
@@ -227,7 +256,10 @@ impl Device {
         let errors = [validation.pop(), internal.pop(), memory.pop()].map(pollster::block_on);
         match errors.into_iter().flatten().next() {
             Some(error) => Err(self.error(error)),
-            None => Ok(value),
+            None => self
+                .failure
+                .take()
+                .map_or(Ok(value), |message| Err(self.error(message))),
         }
     }
 
@@ -311,10 +343,9 @@ impl Device {
     /// Waits until a buffer's contents are there.
     pub(super) fn wait_for(&self, mapping: &Mapping) -> Result<(), RenderError> {
         self.wait()?;
-        match mapping.done() {
-            Some(result) => result.map_err(|message| self.error(message)),
-            None => Err(self.error("the device is idle, but a buffer cannot be read")),
-        }
+        // Another thread that waits for the same device may be the one that is told, a little later.
+        let told = mapping.0.recv().map_err(|error| self.error(error))?;
+        told.map_err(|error| self.error(error))
     }
 
     /// What a buffer holds whose contents are there. They are given back.
@@ -344,6 +375,20 @@ impl Mapping {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_goes_wrong_outside_of_checks_is_told_by_the_next_call() {
+        let device = match choose(&Choice::Auto) {
+            Ok(device) => device,
+            Err(_) if std::env::var_os("WGRAY_TEST_WITHOUT_GPU").is_some() => return,
+            Err(error) => panic!("{error}"),
+        };
+        assert!(device.checked(|| ()).is_ok());
+        device.buffer(u64::MAX, BufferUsages::STORAGE); // no device has that much
+        let told = device.checked(|| ()).expect_err("the error of before").to_string();
+        assert!(told.starts_with(&device.info.name), "{told}");
+        assert!(device.checked(|| ()).is_ok(), "it is told once");
+    }
 
     fn adapter(name: &str, driver: &str, kind: &'static str) -> Info {
         Info {

@@ -1,10 +1,9 @@
 //! What a picture can show besides radiance ("arbitrary output variables"): the first hit through each pixel's centre, and
 //! what adaptive sampling knows of the pixel.
 
-use glam::{UVec4, Vec3};
+use glam::Vec3;
 
 use super::{Band, Layout};
-use crate::cpu::rng::hash4;
 use crate::pack::{FirstHit, NOTHING};
 
 /// A value of a pixel.
@@ -113,7 +112,7 @@ impl Aov {
 
     /// The colour of pixel `i` of a band in a PNG, before rounding to 8 bits; black where nothing is hit. The normal is
     /// moved from [-1, 1] to [0, 1]; the depth d is `1 / (1 + (d / middle)^4)`, near is bright; of texture coordinates the
-    /// fraction is shown in red and green; a shape has a colour that its number is hashed to. Sample counts are
+    /// fraction is shown in red and green; a shape has a colour by its number. Sample counts are
     /// `log(count) / log(most)`, variances the standard error to the power 1/2.2.
     pub fn color(self, band: Band, i: usize, layout: &Layout) -> Vec3 {
         match self {
@@ -135,10 +134,21 @@ impl Aov {
             Aov::Normal => hit.normal * 0.5 + 0.5,
             Aov::Depth => Vec3::splat(1.0 / (1.0 + (hit.depth / middle_depth).powi(4))),
             Aov::Uv => (hit.uv - hit.uv.floor()).extend(0.0),
-            _ => {
-                let bits = hash4(UVec4::new(hit.shape, 0, 0, 0)).truncate();
-                bits.as_vec3() * (0.75 / u32::MAX as f32) + 0.25 // never as dark as nothing is
-            }
+            _ => shape_color(hit.shape),
         }
     }
+}
+
+/// A colour for each shape's number: hues a golden section of the circle apart, so that no few numbers in a row look alike, in
+/// three lightnesses. None is as dark as nothing is.
+fn shape_color(shape: u32) -> Vec3 {
+    const GOLDEN_SECTION: u32 = 0x9e37_79b9; // of 2^32
+    let hue = shape.wrapping_mul(GOLDEN_SECTION) as f32 / u32::MAX as f32 * 6.0;
+    let pure = Vec3::new(
+        (hue - 3.0).abs() - 1.0,
+        2.0 - (hue - 2.0).abs(),
+        2.0 - (hue - 4.0).abs(),
+    );
+    let lightness = [1.0, 0.6, 0.8][shape as usize % 3];
+    (pure.clamp(Vec3::ZERO, Vec3::ONE) * 0.75 + 0.25) * lightness
 }

@@ -19,7 +19,7 @@ pub use difference::{Difference, difference};
 pub use exr::read_exr;
 pub use file::Pending;
 pub use output::Output;
-pub use png::encode;
+pub use png::{encode, in_memory};
 
 /// A kind of picture file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use ::png::{BitDepth, ColorType, Encoder, EncodingError, ScaledFloat};
+use ::png::{BitDepth, ColorType, Compression, Encoder, EncodingError, ScaledFloat};
 use rayon::prelude::*;
 
 use super::{Aov, Band, Layout, Pending, Sink};
@@ -23,6 +23,28 @@ fn quantize(value: f64) -> u8 {
     (value * 255.0 + 0.5) as u8 // the conversion saturates, and takes NaN to 0
 }
 
+/// A PNG file of 8-bit RGB in memory, packed for speed.
+///
+/// # Errors
+///
+/// Sizes that do not fit the number of bytes.
+pub fn in_memory(width: u32, height: u32, rgb: &[u8]) -> io::Result<Vec<u8>> {
+    let mut file = Vec::new();
+    let mut png = rgb8(&mut file, width, height);
+    png.set_compression(Compression::Fast);
+    png.write_header()
+        .and_then(|mut writer| writer.write_image_data(rgb))
+        .map_err(plain)?;
+    Ok(file)
+}
+
+fn rgb8<W: Write>(file: W, width: u32, height: u32) -> Encoder<'static, W> {
+    let mut png = Encoder::new(file, width, height);
+    png.set_color(ColorType::Rgb);
+    png.set_depth(BitDepth::Eight);
+    png
+}
+
 /// Writes the radiance to the first file and the AOVs to those after it.
 pub fn write(
     files: &mut [Pending],
@@ -32,9 +54,7 @@ pub fn write(
     let mut writers = Vec::new();
     let contents = [None].into_iter().chain(layout.aovs.iter().copied().map(Some));
     for (file, content) in files.iter_mut().zip(contents) {
-        let mut png = Encoder::new(file, layout.region.width(), layout.region.height());
-        png.set_color(ColorType::Rgb);
-        png.set_depth(BitDepth::Eight);
+        let mut png = rgb8(file, layout.region.width(), layout.region.height());
         if content.is_none() {
             png.set_source_gamma(ScaledFloat::new(DISPLAY as f32));
         }

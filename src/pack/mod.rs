@@ -75,6 +75,32 @@ impl Packed {
         u64::from(area_lights) * u64::from(self.specialization.light_samples) + u64::from(lights - area_lights)
     }
 
+    /// Whether another scene is the same, seen by whatever camera.
+    pub fn same_but_camera(&self, other: &Packed) -> bool {
+        let Packed {
+            origin,
+            camera: _,
+            environment,
+            primitives,
+            bounds,
+            materials,
+            lights,
+            counts,
+            textures,
+            texels,
+            filter_table,
+            pixel_samples,
+            adaptive,
+            specialization,
+        } = self;
+        (origin, environment, counts, specialization)
+            == (&other.origin, &other.environment, &other.counts, &other.specialization)
+            && (primitives, bounds, materials, lights)
+                == (&other.primitives, &other.bounds, &other.materials, &other.lights)
+            && (textures, texels, filter_table) == (&other.textures, &other.texels, &other.filter_table)
+            && (pixel_samples, adaptive) == (&other.pixel_samples, &other.adaptive)
+    }
+
     /// The kinds of primitives that there are, each with where its primitives are.
     pub fn kinds(&self) -> impl Iterator<Item = (u32, Range<usize>)> {
         let kinds = (0..).zip(self.counts.primitives);

@@ -338,6 +338,10 @@ fn moved(d: &mut Description, scale: f64, offset: DVec3) {
                 point(&mut s.center);
                 s.radius *= scale;
             }
+            ShapeDescription::Disk(s) => {
+                point(&mut s.center);
+                s.radius *= scale;
+            }
             ShapeDescription::Ellipsoid(s) => {
                 point(&mut s.center);
                 [&mut s.a, &mut s.b, &mut s.c]

@@ -383,9 +383,9 @@ fn what_cannot_be_is_told() {
         pixel_pattern: pattern,
         ..Overrides::default()
     };
-    let grid = "--adaptive: the pattern of pixel_samples is \"grid\", which has no further samples";
+    let grid = "adaptive: the pattern of pixel_samples is \"grid\", which has no further samples";
     assert!(told("", &option(0.1, None)).starts_with(grid));
-    assert!(told("", &option(-0.1, Some(Pattern::Sobol))).starts_with("--adaptive: -0.1 must be from 0 to 1"));
+    assert!(told("", &option(-0.1, Some(Pattern::Sobol))).starts_with("adaptive: -0.1 must be from 0 to 1"));
     let scene = Scene::parse_with(&text(""), "s.toml", &option(0.1, Some(Pattern::Sobol))).expect("a sound scene");
     let adaptive = scene.render.adaptive.expect("adaptive sampling");
     assert_eq!((adaptive.error, adaptive.max_samples), (0.1, 256));
