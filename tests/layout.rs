@@ -8,6 +8,8 @@ use wgray::pack::{
     Camera, Counts, Environment, FirstHit, Light, Material, Primitive, Record, Specialization, Sphere, Texture, Work,
 };
 
+use wgray::scene::Integrator;
+
 use crate::sources::{self, parse, shared_source};
 
 /// A record's name and its size in bytes, in Rust.
@@ -106,7 +108,7 @@ fn overrides_are_the_fields_of_the_specialization() {
     let constants = Specialization::default().constants();
     let names: Vec<&str> = constants.iter().map(|(name, _)| *name).collect();
     for kernel in KERNELS {
-        let module = parse(&sources::shaders().compose(kernel, None));
+        let module = parse(&sources::shaders().compose(kernel, Integrator::Phong, None));
         let declared: Vec<_> = module.overrides.iter().filter_map(|(_, o)| o.name.as_deref()).collect();
         assert_eq!(declared, names);
     }

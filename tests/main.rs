@@ -14,6 +14,7 @@ mod culling;
 mod dev;
 mod grounds;
 mod inputs;
+mod integrator;
 mod kernel;
 mod layout;
 mod loops;

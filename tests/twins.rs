@@ -7,6 +7,7 @@ use wgray::gpu::compose::{KERNELS, Kernel, RENDER, SHARED, Source, built_in};
 use wgray::gpu::spirv::instructions;
 use wgray::gpu::{FloatControls, Rounding, bake, check};
 use wgray::pack::Packed;
+use wgray::scene::Integrator;
 
 use crate::scenes;
 use crate::sources::{self, Signature, differences, parse, rust_functions, rust_records, shared_source};
@@ -82,7 +83,7 @@ fn twin_of(file: &str) -> syn::File {
 #[test]
 fn functions_and_records_are_the_same() {
     let shared = shared_source();
-    let kernel = sources::shaders().compose(&RENDER, None);
+    let kernel = sources::shaders().compose(&RENDER, Integrator::Phong, None);
     let mut problems = Vec::new();
     for (file, _) in built_in() {
         if file.starts_with("kernels/") || WITHOUT_TWIN.iter().any(|(f, _)| *f == file) {
@@ -257,7 +258,7 @@ fn kernels_hold_no_operation_that_devices_may_compute_differently() {
                 (Some(bake(&packed)), Rounding::Device),
                 (None, Rounding::Software),
             ] {
-                let source = sources::shaders().compose(kernel, baked.as_deref());
+                let source = sources::shaders().compose(kernel, packed.integrator, baked.as_deref());
                 let module = spirv(&source, kernel, &packed, rounding);
                 operations += instructions(&module)
                     .filter(|(op, _)| opcode::PROTECTED.contains(op))
@@ -278,7 +279,7 @@ fn kernels_hold_no_operation_that_devices_may_compute_differently() {
 #[test]
 fn an_operation_that_devices_may_compute_differently_is_found() {
     let (_, packed) = scenes::all().remove(0);
-    let source = sources::shaders().compose(&RENDER, None);
+    let source = sources::shaders().compose(&RENDER, Integrator::Phong, None);
     let from = "    var sum = environment.ambient * material.ambient;\n";
     assert!(source.text.contains(from));
     for to in [

@@ -5,9 +5,10 @@ use glam::{UVec2, Vec2, Vec3, Vec4};
 use super::camera::{camera_differential, camera_ray};
 use super::differential::Differential;
 use super::filter::{filter_bin, filter_offset};
-use super::integrators::phong::radiance;
+use super::integrators::phong;
 use super::sampling::{sample_key, sample_square};
 use crate::pack::Packed;
+use crate::scene::Integrator;
 
 pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> Vec4 {
     let s = &scene.specialization;
@@ -17,7 +18,10 @@ pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> Vec4 {
     let at = filtered(scene, u);
     let place = pixel.as_vec2() + at.truncate();
     let (ray, differential) = (camera_ray(&scene.camera, place), differential_at(scene, place));
-    (radiance(scene, ray, differential, pixel, sample) * at.z).extend(at.z)
+    let radiance = match scene.integrator {
+        Integrator::Phong => phong::radiance(scene, ray, differential, pixel, sample),
+    };
+    (radiance * at.z).extend(at.z)
 }
 
 pub fn differential_at(scene: &Packed, place: Vec2) -> Differential {

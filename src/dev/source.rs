@@ -8,7 +8,7 @@ use std::time::SystemTime;
 use super::diagnostic::Diagnostic;
 use crate::gpu::compose::{self, Shaders};
 use crate::pack::{Packed, Specialization, pack};
-use crate::scene::{CameraDescription, Description, Overrides, Scene, TextureDescription};
+use crate::scene::{CameraDescription, Description, Integrator, Overrides, Scene, TextureDescription};
 
 /// Where the files are.
 #[derive(Clone, Debug)]
@@ -34,12 +34,12 @@ pub struct Loaded {
     pub packed: Packed,
 }
 
-/// What a kernel is compiled for: its constants, and whether sampling is adaptive.
-pub type Constants = (Specialization, bool);
+/// What a kernel is compiled for: its constants, the integrator, and whether sampling is adaptive.
+pub type Constants = (Specialization, Integrator, bool);
 
 /// What a scene's kernel is compiled for.
 pub fn constants(packed: &Packed) -> Constants {
-    (packed.specialization, packed.adaptive)
+    (packed.specialization, packed.integrator, packed.adaptive)
 }
 
 /// What the files say at one moment.

@@ -7,6 +7,7 @@ use glam::Vec4;
 
 use super::bake::tables;
 use crate::pack::{self, FirstHit, Specialization};
+use crate::scene::Integrator;
 
 /// The file of quotients and square roots by software.
 pub const ROUNDING: &str = "rounding.wgsl";
@@ -54,7 +55,6 @@ static ROUNDING_FILE: &[File] = files!["rounding.wgsl"];
 static KERNEL: &[File] = files!["bindings.wgsl", "receipt.wgsl", "traverse.wgsl", "geometry.wgsl"];
 /// What takes samples of a pixel.
 static SAMPLES: &[File] = files!["texture.wgsl", "pixel.wgsl"];
-/// An integrator: what light a sample sees.
 static PHONG: &[File] = files!["integrators/phong.wgsl"];
 /// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.
 static FROM_BUFFERS: &[File] = files!["buffers.wgsl"];
@@ -76,8 +76,11 @@ pub fn built_in() -> impl Iterator<Item = File> {
 pub struct Kernel {
     /// The entry point's name.
     pub entry_point: &'static str,
-    /// What it is made of besides [`SHARED`] and the scene. The last file has the entry point, and declares what it writes.
+    /// What it is made of besides [`SHARED`], the scene and an integrator. The last file has the entry point, and declares
+    /// what it writes.
     pub files: &'static [&'static [File]],
+    /// Whether it asks an integrator for radiance.
+    pub integrates: bool,
     /// The size in bytes of what it writes for a pixel.
     pub record: usize,
 }
@@ -85,23 +88,33 @@ pub struct Kernel {
 /// Accumulates samples in the film.
 pub static RENDER: Kernel = Kernel {
     entry_point: "render",
-    files: &[KERNEL, SAMPLES, PHONG, RENDER_FILE],
+    files: &[KERNEL, SAMPLES, RENDER_FILE],
+    integrates: true,
     record: size_of::<Vec4>(),
 };
 /// Accumulates samples as long as a pixel needs them.
 pub static ADAPTIVE: Kernel = Kernel {
     entry_point: "adaptive",
-    files: &[KERNEL, SAMPLES, PHONG, ADAPTIVE_FILE],
+    files: &[KERNEL, SAMPLES, ADAPTIVE_FILE],
+    integrates: true,
     record: size_of::<[Vec4; 3]>(),
 };
 /// Writes what the ray through each pixel's centre meets first.
 pub static FIRST_HITS: Kernel = Kernel {
     entry_point: "first_hits",
     files: &[KERNEL, FIRST_HITS_FILE],
+    integrates: false,
     record: size_of::<FirstHit>(),
 };
 /// Every kernel.
 pub static KERNELS: [&Kernel; 3] = [&RENDER, &ADAPTIVE, &FIRST_HITS];
+
+/// What an integrator is made of: what light a sample sees.
+fn integrator_files(integrator: Integrator) -> &'static [File] {
+    match integrator {
+        Integrator::Phong => PHONG,
+    }
+}
 
 impl Kernel {
     /// The file that has the entry point.
@@ -158,18 +171,27 @@ impl Shaders {
 
     /// A kernel that reads the scene from buffers, or, if `baked` is the text of the functions that know the scene, has
     /// it as constants.
-    pub fn compose(&self, kernel: &Kernel, baked: Option<&str>) -> Source {
-        self.compose_with_texels(kernel, baked, None)
+    pub fn compose(&self, kernel: &Kernel, integrator: Integrator, baked: Option<&str>) -> Source {
+        self.compose_with_texels(kernel, integrator, baked, None)
     }
 
     /// [`Shaders::compose`] where `texels` is the text of the function that reads texels from several buffers.
-    pub fn compose_with_texels(&self, kernel: &Kernel, baked: Option<&str>, texels: Option<&str>) -> Source {
+    pub fn compose_with_texels(
+        &self,
+        kernel: &Kernel,
+        integrator: Integrator,
+        baked: Option<&str>,
+        texels: Option<&str>,
+    ) -> Source {
         let mut source = Source::default();
         self.append(&mut source, ROUNDING_FILE);
         source.extend(&self.shared());
         source.append("src/pack/specialization.rs", &Specialization::declarations());
         for files in kernel.files {
             self.append(&mut source, files);
+        }
+        if kernel.integrates {
+            self.append(&mut source, integrator_files(integrator));
         }
         match baked {
             Some(text) => source.append("(the scene as constants)", text),

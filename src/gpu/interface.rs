@@ -10,16 +10,18 @@ use super::compose::{Kernel, Shaders, Source};
 use super::functions::functions;
 use super::wording::type_name;
 use crate::error::ShaderError;
+use crate::scene::Integrator;
 
 /// What is wrong with the interface of a kernel that naga accepts. What it writes is looked at if it is `whole`, with the
 /// bodies of all its functions.
 pub fn mistakes(
     kernel: &Kernel,
+    integrator: Integrator,
     source: &Source,
     checked: &Checked,
     whole: bool,
 ) -> Result<Vec<ShaderError>, ShaderError> {
-    let built_in = Shaders::built_in().compose(kernel, None);
+    let built_in = Shaders::built_in().compose(kernel, integrator, None);
     let right = check(&built_in)?;
     let sides = Sides {
         kernel,

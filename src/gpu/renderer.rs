@@ -18,6 +18,7 @@ use crate::backend::{Backend, Rules, Started};
 use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::pack::{Camera, FirstHit, Packed, Specialization, Work};
+use crate::scene::Integrator;
 
 /// How a scene is put on a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,6 +73,7 @@ struct Pending {
 /// What it takes to compile another kernel for the same scene.
 struct Kernels {
     shaders: Shaders,
+    integrator: Integrator,
     baked: Option<String>,
     constants: Specialization,
     /// Of the groups of bindings.
@@ -127,6 +129,7 @@ impl Gpu {
         let texels = TexelParts::of(&device.info, packed)?;
         let kernels = Kernels {
             shaders: shaders.clone(),
+            integrator: packed.integrator,
             baked: options.baked.then(|| bake_if_small(packed)).flatten(),
             constants: packed.specialization,
             layouts: bind_group_layouts(device, texels.count - 1),
@@ -185,7 +188,7 @@ impl Gpu {
         let texels = TexelParts::of(&self.device.info, packed)?;
         let same_kernel = self.kernels.baked.is_none()
             && (self.kernels.constants, self.rules.adaptive()) == (packed.specialization, packed.adaptive)
-            && self.kernels.texels == texels;
+            && (self.kernels.integrator, self.kernels.texels) == (packed.integrator, texels);
         if same_kernel {
             self.film = None;
             self.scene = SceneBuffers::upload(&self.device, packed, texels, &self.kernels.layouts)?;
@@ -503,7 +506,8 @@ impl Backend for Gpu {
 impl Kernels {
     fn compile(&self, device: &Device, kernel: &Kernel) -> Result<wgpu::ComputePipeline, RenderError> {
         let texels = self.texels.wgsl();
-        let source = (self.shaders).compose_with_texels(kernel, self.baked.as_deref(), texels.as_deref());
+        let (baked, texels) = (self.baked.as_deref(), texels.as_deref());
+        let source = self.shaders.compose_with_texels(kernel, self.integrator, baked, texels);
         pipeline(device, &self.layouts, kernel, &source, &self.constants, self.exact)
     }
 }

@@ -40,7 +40,7 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result
         .collect();
     let found: Vec<Vec<ShaderError>> = all
         .into_par_iter()
-        .map(|(kernel, scene)| mistakes(kernel, shaders.compose(kernel, scene), packed))
+        .map(|(kernel, scene)| mistakes(kernel, shaders.compose(kernel, packed.integrator, scene), packed))
         .collect();
     let mut errors: Vec<ShaderError> = Vec::new();
     for error in found.into_iter().flatten() {
@@ -58,7 +58,7 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result
 fn mistakes(kernel: &Kernel, source: Source, packed: &Packed) -> Vec<ShaderError> {
     let (mut errors, rest) = mistakes_of_functions(source);
     let Some((source, checked)) = rest else { return errors };
-    match interface::mistakes(kernel, &source, &checked, errors.is_empty()) {
+    match interface::mistakes(kernel, packed.integrator, &source, &checked, errors.is_empty()) {
         Ok(more) => errors.extend(more),
         Err(error) => errors.push(error),
     }

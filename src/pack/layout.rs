@@ -51,7 +51,7 @@ records! {
         pub shape: u32,
         /// Second row.
         pub y: Vec3,
-        /// [`RECTANGLE`], [`TRIANGLE`], [`ELLIPSOID`], [`PLANE`] or [`DISK`].
+        /// What kind it is, such as [`RECTANGLE`].
         pub kind: u32,
         /// Third row.
         pub z: Vec3,

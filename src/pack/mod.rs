@@ -23,7 +23,9 @@ pub use self::constants::*;
 pub use self::layout::*;
 pub use self::record::{Field, Record};
 pub use self::specialization::Specialization;
-use crate::scene::{self, Geometry, Parallelogram, Pattern, PixelFilter, PixelFilterKind, Projection, Samples, Scene};
+use crate::scene::{
+    self, Geometry, Integrator, Parallelogram, Pattern, PixelFilter, PixelFilterKind, Projection, Samples, Scene,
+};
 
 /// How far shadow rays to a directional light go: beyond any scene, yet small enough to be squared.
 const DISTANT: f32 = 1e10;
@@ -42,6 +44,8 @@ pub struct Packed {
     pub origin: DVec3,
     /// The camera.
     pub camera: Camera,
+    /// What light is simulated.
+    pub integrator: Integrator,
     /// What belongs to the scene as a whole.
     pub environment: Environment,
     /// The primitives, sorted by kind and in each kind by whether they can cast a shadow; lights' rectangles among them.
@@ -80,6 +84,7 @@ impl Packed {
         let Packed {
             origin,
             camera: _,
+            integrator,
             environment,
             primitives,
             bounds,
@@ -98,7 +103,7 @@ impl Packed {
             && (primitives, bounds, materials, lights)
                 == (&other.primitives, &other.bounds, &other.materials, &other.lights)
             && (textures, texels, filter_table) == (&other.textures, &other.texels, &other.filter_table)
-            && (pixel_samples, adaptive) == (&other.pixel_samples, &other.adaptive)
+            && (integrator, pixel_samples, adaptive) == (&other.integrator, &other.pixel_samples, &other.adaptive)
     }
 
     /// The kinds of primitives that there are, each with where its primitives are.
@@ -188,6 +193,7 @@ pub fn pack(scene: &Scene) -> Packed {
     Packed {
         origin,
         camera: pack_camera(&scene.camera, origin, scene.width, scene.height, scene.render.seed),
+        integrator: scene.render.integrator,
         environment: Environment {
             ambient: scene.render.ambient.as_vec3(),
             shadow_epsilon: scene.render.shadow_epsilon.max(LEAST_EPSILON) as f32,

@@ -1,0 +1,107 @@
+//! An integrator is one file over a few functions that are not its own. Here is another one in the place of `phong`, with its
+//! twin: what share of the light comes from where a random ray leaves the scene, and how that looks by the surface's colour.
+//! It uses the geometry, materials, lights and random numbers as any integrator does.
+
+use glam::{UVec2, Vec3, Vec4};
+use wgray::cpu::camera::camera_ray;
+use wgray::cpu::geometry::{material_of, surface_of};
+use wgray::cpu::light::{segment, segments_to_light};
+use wgray::cpu::math::{dot, normalize};
+use wgray::cpu::ray::Ray;
+use wgray::cpu::rng::unit_float;
+use wgray::cpu::sampling::{decision_bits, sample_key, sample_square};
+use wgray::cpu::shadow::Block;
+use wgray::cpu::traverse::{closest_hit, hidden_samples};
+use wgray::pack::{NOTHING, Packed, RANDOM};
+
+use crate::pictures::{Way, differing, exact_ways, reference, render_with};
+use crate::{scenes, sources};
+
+const FILE: &str = "integrators/phong.wgsl";
+
+const WGSL: &str = "
+fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> vec3f {
+    let hit = closest_hit(ray, NOTHING, NOTHING);
+    if hit.primitive == NOTHING {
+        return environment.background;
+    }
+    let surface = surface_of(hit, ray);
+    let bits = decision_bits(pixel, camera.seed, sample, 1u, 77u);
+    let random = vec3f(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
+    let up = normalize(surface.shading_normal + random);
+    let next = closest_hit(Ray(surface.start, up), surface.above, surface.below);
+    var sum = vec3f(select(0.0, 0.5, next.primitive == NOTHING));
+    for (var i = 0u; i < light_counts().y; i++) {
+        let light = load_light(i);
+        let block = Block(RANDOM, 1u, 0u, 1u, sample, sample_key(pixel, camera.seed, 1u + light.number));
+        let seen = (hidden_samples(surface, light, block) & 1u) == 0u;
+        let to = segment(segments_to_light(light, surface.position), sample_square(RANDOM, 1u, 0u, sample, block.key));
+        sum += light.color * select(0.0, abs(dot(normalize(to), surface.normal)), seen);
+    }
+    return sum * material_of(hit).diffuse;
+}
+";
+
+/// The same in Rust.
+fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
+    let hit = closest_hit(scene, ray, NOTHING, NOTHING);
+    if hit.primitive == NOTHING {
+        return scene.environment.background;
+    }
+    let surface = surface_of(scene, hit, ray);
+    let bits = decision_bits(pixel, scene.camera.seed, sample, 1, 77);
+    let random = Vec3::new(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
+    let up = Ray {
+        origin: surface.start,
+        direction: normalize(surface.shading_normal + random),
+    };
+    let next = closest_hit(scene, up, surface.above, surface.below);
+    let mut sum = Vec3::splat(if next.primitive == NOTHING { 0.5 } else { 0.0 });
+    for light in &scene.lights {
+        let key = sample_key(pixel, scene.camera.seed, 1 + light.number);
+        let block = Block {
+            pattern: RANDOM,
+            side: 1,
+            first: 0,
+            count: 1,
+            group: sample,
+            key,
+        };
+        let seen = hidden_samples(scene, &surface, light, block) & 1 == 0;
+        let at = sample_square(RANDOM, 1, 0, sample, key);
+        let to = segment(segments_to_light(light, surface.position), at);
+        let cosine = dot(normalize(to), surface.normal).abs();
+        sum += light.color * if seen { cosine } else { 0.0 };
+    }
+    sum * material_of(scene, hit).diffuse
+}
+
+#[test]
+fn another_integrator_is_one_file() {
+    let mut description = scenes::scene("turntable.toml");
+    (description.image.width, description.image.height) = (96, 72);
+    description.render.pixel_samples = crate::patterns::samples(wgray::scene::Pattern::Grid, 4);
+    let packed = scenes::packed(&description);
+    let shaders = sources::shaders_with(FILE, WGSL);
+    let mut expected = reference(&packed);
+    for (i, sum) in (0..).zip(&mut expected.sums) {
+        let pixel = UVec2::new(i % 96, i / 96);
+        *sum = Vec4::ZERO;
+        for sample in 0..4 {
+            let at = sample_square(0, 2, sample, 0, UVec2::ZERO);
+            let ray = camera_ray(&packed.camera, pixel.as_vec2() + at);
+            *sum += radiance(&packed, ray, pixel, sample).extend(1.0);
+        }
+    }
+    for way in exact_ways().into_iter().filter(|way| *way != Way::Cpu) {
+        let found = render_with(&packed, way, &shaders);
+        assert_eq!(differing(&found, &expected), 0, "{way:?}");
+        let phong = render_with(&packed, way, sources::shaders());
+        assert!(differing(&phong, &expected) > 1000, "{way:?}: it is not used");
+        let other_numbers = sources::shaders_with(FILE, &WGSL.replace("77u", "78u"));
+        assert!(
+            differing(&render_with(&packed, way, &other_numbers), &expected) > 1000,
+            "{way:?}"
+        );
+    }
+}
