@@ -5,7 +5,7 @@ fn texture_color(t: Texture, surface: Footprint) -> vec3f {
     var x = vec3f(0.0);
     if (TEXTURE_KINDS & 3u) != 0u {
         if t.kind <= LINES {
-            x = vec3f(pattern_share(t.kind, t.parameter, f));
+            x = vec3f(procedural_share(t.kind, t.parameter, f));
         }
     }
     if (TEXTURE_KINDS & 4u) != 0u {

@@ -44,7 +44,7 @@ const EDGES: &[f32] = &[
     8_388_608.0,
     16_777_216.0,
     -126.5,
-    0.0001, // the least and the largest width of pattern.wgsl
+    0.0001, // the least and the largest width of procedural.wgsl
     4096.0,
     0.333_333_34,
 ];

@@ -288,7 +288,7 @@ impl<'a> Oracle<'a> {
                 let even = (square.x + square.y).rem_euclid(2.0) == 0.0;
                 if even { texture.even } else { texture.odd }
             }
-            TextureDescription::Grid(texture) => {
+            TextureDescription::Lines(texture) => {
                 let at = place(texture.scale, texture.rotate, texture.offset);
                 let on_line = (at - at.round()).abs().min_element() < texture.line_width / 2.0;
                 if on_line { texture.line } else { texture.cell }

@@ -21,15 +21,15 @@ use wgray::cpu::math::{
 };
 use wgray::cpu::normal_map::mapped_normal;
 use wgray::cpu::path::{Path, Scattered, glass_path, mirrored_path, reflected_path, refracted_path, usable_normal};
-use wgray::cpu::pattern::{
-    along_edge, around_footprint, far_product, nearest_step, pattern_share, phase, sine_ratio, wave_integral,
-    wave_integral_2, wave_mean, wave_value, widened_edge,
-};
 use wgray::cpu::phong::{Lobes, phong_block, phong_lobes, phong_power};
 use wgray::cpu::plane::{intersect_plane, plane_blocks};
 use wgray::cpu::primitive::{
     Tangents, blocks, intersect, is_centered, is_round, local_tangents, primitive_gradient, primitive_normal,
     primitive_uv, uv_derivative,
+};
+use wgray::cpu::procedural::{
+    along_edge, around_footprint, far_product, nearest_step, phase, procedural_share, sine_ratio, wave_integral,
+    wave_integral_2, wave_mean, wave_value, widened_edge,
 };
 use wgray::cpu::ray::{
     Hit, Ray, closer, crosses_plane, plane_distance, point_to_local, scaled_crossing, vector_to_local, vector_to_world,
@@ -190,7 +190,7 @@ probes! {
     uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2;
     texture_footprint(t: &Texture, f: Footprint) -> Footprint;
     footprint_ellipse(dx: Vec2, dy: Vec2, anisotropy: f32) -> Ellipse;
-    pattern_share(kind: u32, line_width: f32, f: Footprint) -> f32;
+    procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32;
     phase(x: f32) -> f32;
     widened_edge(long: Vec2, short: Vec2) -> Vec2;
     nearest_step(x: f32, on: f32) -> f32;

@@ -7,7 +7,7 @@ use super::footprint::{Footprint, footprint_ellipse, texture_footprint};
 use super::geometry::footprint_of;
 use super::math::{floor, log2, max};
 use super::normal_map::mapped_normal;
-use super::pattern::pattern_share;
+use super::procedural::procedural_share;
 use super::ray::Hit;
 use super::surface::Surface;
 
@@ -20,7 +20,7 @@ use crate::pack::{
 pub fn texture_color(scene: &Packed, t: &Texture, surface: Footprint) -> Vec3 {
     let f = texture_footprint(t, surface);
     let x = if t.kind <= LINES {
-        Vec3::splat(pattern_share(t.kind, t.parameter, f))
+        Vec3::splat(procedural_share(t.kind, t.parameter, f))
     } else if t.kind == NEAREST {
         nearest_color(scene, t, f.uv)
     } else if t.kind == EWA {

@@ -43,7 +43,7 @@ pub static SHARED: &[File] = files![
     "specular.wgsl",
     "path.wgsl",
     "footprint.wgsl",
-    "pattern.wgsl",
+    "procedural.wgsl",
     "texel.wgsl",
     "normal_map.wgsl",
     "filter.wgsl",

@@ -11,7 +11,7 @@ use super::{
     MIRROR, MIRRORED, Material, NEAREST, PHONG, REPEAT, SRGB8, TRILINEAR, Texture,
 };
 use crate::pack::BILINEAR;
-use crate::scene::{self, Color, Encoding, Filter, Image, Scene, Texels, TexturePattern, Wrap};
+use crate::scene::{self, Color, Encoding, Image, Scene, Texels, TextureFilter, TextureKind, Wrap};
 
 /// The records of a scene's materials and of the textures that they use.
 #[derive(Default)]
@@ -31,7 +31,7 @@ impl Appearances {
     pub fn of(scene: &Scene) -> Appearances {
         let mut appearances = Appearances::default();
         for texture in &scene.textures {
-            if let TexturePattern::Image { image, filter, .. } = &texture.pattern {
+            if let TextureKind::Image { image, filter, .. } = &texture.kind {
                 let levels = appearances.levels.entry(address(image)).or_default();
                 *levels = levels_of(image, *filter).max(*levels);
             }
@@ -82,8 +82,8 @@ impl Appearances {
         let mut lookups = Lookups::default();
         let mut color = |color: &Color, purpose: u32| match *color {
             Color::Plain(color) => color.as_vec3(),
-            Color::Texture(i) => match scene.textures[i].pattern {
-                TexturePattern::Constant(color) => color.as_vec3(),
+            Color::Texture(i) => match scene.textures[i].kind {
+                TextureKind::Constant(color) => color.as_vec3(),
                 _ => {
                     lookups.add(self.texture(scene, i, None), purpose);
                     Vec3::ZERO
@@ -138,8 +138,8 @@ impl Appearances {
             ..bytemuck::Zeroable::zeroed()
         };
         let between = |first: DVec3, second: DVec3| (first.as_vec3(), second.as_vec3());
-        let record = match &texture.pattern {
-            TexturePattern::Constant(color) => {
+        let record = match &texture.kind {
+            TextureKind::Constant(color) => {
                 let (first, second) = between(*color, *color);
                 Texture {
                     first,
@@ -148,7 +148,7 @@ impl Appearances {
                     ..plain
                 }
             }
-            TexturePattern::Checker { even, odd } => {
+            TextureKind::Checker { even, odd } => {
                 let (first, second) = between(*even, *odd);
                 Texture {
                     first,
@@ -157,7 +157,7 @@ impl Appearances {
                     ..plain
                 }
             }
-            TexturePattern::Grid { cell, line, line_width } => {
+            TextureKind::Lines { cell, line, line_width } => {
                 let (first, second) = between(*cell, *line);
                 Texture {
                     first,
@@ -167,7 +167,7 @@ impl Appearances {
                     ..plain
                 }
             }
-            TexturePattern::Image {
+            TextureKind::Image {
                 image,
                 wrap,
                 filter,
@@ -184,10 +184,10 @@ impl Appearances {
                 Texture {
                     first,
                     kind: match filter {
-                        Filter::Nearest => NEAREST,
-                        Filter::Bilinear => BILINEAR,
-                        Filter::Trilinear => TRILINEAR,
-                        Filter::Ewa => EWA,
+                        TextureFilter::Nearest => NEAREST,
+                        TextureFilter::Bilinear => BILINEAR,
+                        TextureFilter::Trilinear => TRILINEAR,
+                        TextureFilter::Ewa => EWA,
                     },
                     second,
                     parameter: *max_anisotropy as f32,
@@ -221,7 +221,7 @@ fn address(image: &Arc<Image>) -> usize {
     Arc::as_ptr(image).addr()
 }
 
-fn levels_of(image: &Image, filter: Filter) -> u32 {
+fn levels_of(image: &Image, filter: TextureFilter) -> u32 {
     if filter.needs_levels() { image.levels() } else { 1 }
 }
 

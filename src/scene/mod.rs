@@ -22,7 +22,7 @@ pub use description::*;
 pub use error::{KeyPath, Problem, SceneError};
 pub use image_file::Assets;
 pub use load::Overrides;
-pub use texture::{Color, Encoding, Filter, Image, NormalMap, Texels, Texture, TexturePattern, Wrap};
+pub use texture::{Color, Encoding, Image, NormalMap, Texels, Texture, TextureFilter, TextureKind, Wrap};
 
 /// A checked scene. Lengths have no unit; colours are linear RGB; angles are radians.
 #[derive(Clone, Debug, PartialEq)]

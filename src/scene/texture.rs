@@ -17,7 +17,7 @@ pub enum Color {
 /// A texture in tangent space that gives normals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalMap {
-    /// Index into [`Scene::textures`](super::Scene::textures) of a [`TexturePattern::Image`] with linear texels.
+    /// Index into [`Scene::textures`](super::Scene::textures) of a [`TextureKind::Image`] with linear texels.
     pub texture: usize,
     /// Factor of the slopes.
     pub strength: f64,
@@ -27,14 +27,14 @@ pub struct NormalMap {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     /// What is on it.
-    pub pattern: TexturePattern,
+    pub kind: TextureKind,
     /// Rows of the map from a surface's (u, v, 1) to the plane's (u, v); invertible.
     pub transform: [DVec3; 2],
 }
 
 /// What is on a texture. Colours are linear RGB.
 #[derive(Clone, Debug, PartialEq)]
-pub enum TexturePattern {
+pub enum TextureKind {
     /// One colour.
     Constant(DVec3),
     /// Squares of side 1, the one from (0, 0) to (1, 1) being even.
@@ -45,7 +45,7 @@ pub enum TexturePattern {
         odd: DVec3,
     },
     /// Lines around all whole numbers.
-    Grid {
+    Lines {
         /// Between the lines.
         cell: DVec3,
         /// On the lines.
@@ -60,8 +60,8 @@ pub enum TexturePattern {
         /// Beyond the square.
         wrap: Wrap,
         /// How its colours are found.
-        filter: Filter,
-        /// The largest ratio of a footprint's axes that [`Filter::Ewa`] follows, at least 1.
+        filter: TextureFilter,
+        /// The largest ratio of a footprint's axes that [`TextureFilter::Ewa`] follows, at least 1.
         max_anisotropy: f64,
     },
 }
@@ -82,7 +82,7 @@ pub enum Wrap {
 /// How an image's colours are found. In a file the names are in snake case: `"ewa"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Filter {
+pub enum TextureFilter {
     /// The texel that the point lies in.
     Nearest,
     /// Between the four nearest texels.
@@ -94,10 +94,10 @@ pub enum Filter {
     Ewa,
 }
 
-impl Filter {
+impl TextureFilter {
     /// Whether it reads the coarser levels of a mip pyramid.
     pub const fn needs_levels(self) -> bool {
-        matches!(self, Filter::Trilinear | Filter::Ewa)
+        matches!(self, TextureFilter::Trilinear | TextureFilter::Ewa)
     }
 }
 

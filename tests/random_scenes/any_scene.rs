@@ -64,7 +64,7 @@ fn textures() -> impl Strategy<Value = BTreeMap<String, TextureDescription>> {
             rotate,
             offset,
         };
-        let lines = GridDescription {
+        let lines = LinesDescription {
             cell: even,
             line: odd,
             line_width,
@@ -74,7 +74,7 @@ fn textures() -> impl Strategy<Value = BTreeMap<String, TextureDescription>> {
         };
         BTreeMap::from([
             ("checker".to_string(), TextureDescription::Checker(checker)),
-            ("lines".to_string(), TextureDescription::Grid(lines)),
+            ("lines".to_string(), TextureDescription::Lines(lines)),
             (
                 "constant".to_string(),
                 TextureDescription::Constant(ConstantDescription { color: even }),

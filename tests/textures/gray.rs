@@ -1,7 +1,7 @@
 //! EXR files of one channel are gray images.
 
 use exr::prelude::*;
-use wgray::scene::{Scene, Texels, TexturePattern};
+use wgray::scene::{Scene, Texels, TextureKind};
 
 const SIZE: (usize, usize) = (3, 2);
 
@@ -22,7 +22,7 @@ fn load(folder: &std::path::Path) -> std::result::Result<Texels, String> {
         [textures.t]\ntype = 'image'\nfile = 't.exr'\n";
     std::fs::write(folder.join("s.toml"), text).unwrap();
     let scene = Scene::load(folder.join("s.toml")).map_err(|error| error.to_string())?;
-    let TexturePattern::Image { image, .. } = &scene.textures[0].pattern else {
+    let TextureKind::Image { image, .. } = &scene.textures[0].kind else {
         panic!("an image");
     };
     assert_eq!((image.width as usize, image.height as usize), SIZE);

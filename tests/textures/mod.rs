@@ -9,7 +9,7 @@ mod filters;
 mod generated;
 mod gray;
 mod normal_maps;
-mod patterns;
+mod procedural;
 mod specular;
 
 use std::path::Path;

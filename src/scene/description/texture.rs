@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::tagged::{ReadError, Tagged, tagged};
-use crate::scene::{Encoding, Filter, Wrap};
+use crate::scene::{Encoding, TextureFilter, Wrap};
 
 /// A colour of a material: `[r, g, b]` or `{ texture = "NAME" }`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -93,7 +93,7 @@ tagged! {
         /// Squares of two colours.
         "checker" => Checker(CheckerDescription),
         /// Lines.
-        "grid" => Grid(GridDescription),
+        "grid" => Lines(LinesDescription),
         /// An image file.
         "image" => Image(ImageTextureDescription),
     }
@@ -149,7 +149,7 @@ impl CheckerDescription {
 /// Lines around whole numbers.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub struct GridDescription {
+pub struct LinesDescription {
     /// Between the lines; linear RGB.
     pub cell: DVec3,
     /// On the lines.
@@ -167,7 +167,7 @@ pub struct GridDescription {
     pub offset: [f64; 2],
 }
 
-impl GridDescription {
+impl LinesDescription {
     /// Lines of this width around cells, in these colours, in linear RGB.
     pub fn new(cell: impl Into<DVec3>, line: impl Into<DVec3>, line_width: f64) -> Self {
         Self {
@@ -194,7 +194,7 @@ pub struct ImageTextureDescription {
     pub wrap: Wrap,
     /// How its colours are found.
     #[serde(default)]
-    pub filter: Filter,
+    pub filter: TextureFilter,
     /// The largest ratio of a footprint's axes.
     #[serde(default = "sixteen")]
     pub max_anisotropy: f64,
@@ -216,7 +216,7 @@ impl ImageTextureDescription {
             file: file.into(),
             encoding: None,
             wrap: Wrap::default(),
-            filter: Filter::default(),
+            filter: TextureFilter::default(),
             max_anisotropy: sixteen(),
             scale: ones(),
             rotate: 0.0,

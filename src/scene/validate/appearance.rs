@@ -9,7 +9,7 @@ use super::super::image_file::{File, Place};
 use super::super::texture::{levels, words};
 use super::super::{
     Assets, ColorDescription, Encoding, Image, ImageTextureDescription, Material, MaterialDescription, NormalMap,
-    NormalMapDescription, PhongDescription, Texels, Texture, TextureDescription, TexturePattern,
+    NormalMapDescription, PhongDescription, Texels, Texture, TextureDescription, TextureKind,
 };
 use super::{At, BTreeMap, Checked, Color, Problem, between, check, color, list, number, show_pair};
 
@@ -92,24 +92,24 @@ impl Images<'_> {
 fn texture(description: &TextureDescription, images: &mut Images) -> Checked<Texture> {
     Ok(match description {
         TextureDescription::Constant(constant) => Texture {
-            pattern: TexturePattern::Constant(color(constant.color).at("color")?),
+            kind: TextureKind::Constant(color(constant.color).at("color")?),
             transform: [DVec3::X, DVec3::Y],
         },
         TextureDescription::Checker(checker) => Texture {
-            pattern: TexturePattern::Checker {
+            kind: TextureKind::Checker {
                 even: color(checker.even).at("even")?,
                 odd: color(checker.odd).at("odd")?,
             },
             transform: transform(checker.scale, checker.rotate, checker.offset)?,
         },
-        TextureDescription::Grid(grid) => {
+        TextureDescription::Lines(grid) => {
             let line_width = grid.line_width;
             check(line_width > 0.0 && line_width < 1.0, || {
                 format!("{} must be greater than 0 and less than 1", number(line_width))
             })
             .at("line_width")?;
             Texture {
-                pattern: TexturePattern::Grid {
+                kind: TextureKind::Lines {
                     cell: color(grid.cell).at("cell")?,
                     line: color(grid.line).at("line")?,
                     line_width,
@@ -122,7 +122,7 @@ fn texture(description: &TextureDescription, images: &mut Images) -> Checked<Tex
             let transform = transform(texture.scale, texture.rotate, texture.offset)?;
             let image = images.image(texture).map_err(Problem::new).at("file")?;
             Texture {
-                pattern: TexturePattern::Image {
+                kind: TextureKind::Image {
                     image,
                     wrap: texture.wrap,
                     filter: texture.filter,
@@ -205,7 +205,7 @@ impl Textures<'_> {
             return Ok(None);
         };
         let texture = self.find(name)?;
-        let TexturePattern::Image { image, .. } = &self.textures[texture].pattern else {
+        let TextureKind::Image { image, .. } = &self.textures[texture].kind else {
             return Err(Problem::new(format!("{name:?} must be a texture of type \"image\"")).at("texture"));
         };
         check(!matches!(image.texels, Texels::Bytes(Encoding::Srgb, _)), || {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::{DVec2, Vec2};
 use wgray::cpu::footprint::Footprint;
-use wgray::cpu::pattern::pattern_share;
+use wgray::cpu::procedural::procedural_share;
 use wgray::cpu::texture::texture_color;
 use wgray::pack::{CHECKER, LINES};
 
@@ -137,10 +137,10 @@ fn footprints_of_any_size_and_angle_have_the_exact_mean() {
                 let aspects = if size < 300.0 { &aspects } else { &aspects[3..] };
                 let f = slanted(size, aspects, &numbers);
                 let truth = exact(kind, f64::from(width), f);
-                let error = f64::from(pattern_share(kind, width, f)) - truth;
+                let error = f64::from(procedural_share(kind, width, f)) - truth;
                 assert!(error.abs() < bound, "{kind} {width} {size} {f:?}: {error}");
                 let longer = Footprint { dx: f.dx * 1.2, ..f };
-                control = control.max((f64::from(pattern_share(kind, width, longer)) - truth).abs());
+                control = control.max((f64::from(procedural_share(kind, width, longer)) - truth).abs());
             }
         }
         assert!(control > 0.02, "{kind} {width}: {control}");
@@ -159,7 +159,7 @@ fn slanted_checkers_have_their_contrast() {
                 dx: edge(1.0),
                 dy: edge(3.0),
             };
-            let (share, truth) = (f64::from(pattern_share(CHECKER, 0.0, f)), exact(CHECKER, 0.0, f));
+            let (share, truth) = (f64::from(procedural_share(CHECKER, 0.0, f)), exact(CHECKER, 0.0, f));
             (low, high) = (truth.min(low), truth.max(high));
             assert!((share - truth).abs() < 1e-5, "{size} {}: {share} {truth}", f.uv);
         }
@@ -199,14 +199,14 @@ fn footprints_without_an_area_have_a_share() {
                     (edge * a, edge.perp() * b),
                     (edge * a, Vec2::new(b, a)),
                 ] {
-                    let share = pattern_share(kind, 0.2, Footprint { uv, dx, dy });
+                    let share = procedural_share(kind, 0.2, Footprint { uv, dx, dy });
                     assert!((0.0..=1.0).contains(&share), "{kind} {uv} {dx} {dy}: {share}");
                 }
             }
         }
     }
     // A thin line is the mean along it, from 0.7 to 1.6 along the diagonal and along an axis.
-    let along = |uv: Vec2, dx: Vec2| f64::from(pattern_share(CHECKER, 0.0, Footprint { uv, dx, dy: Vec2::ZERO }));
+    let along = |uv: Vec2, dx: Vec2| f64::from(procedural_share(CHECKER, 0.0, Footprint { uv, dx, dy: Vec2::ZERO }));
     assert!((along(Vec2::new(1.15, 0.55), Vec2::new(0.9, 0.0)) - 0.6 / 0.9).abs() < 2e-3);
     assert!((along(Vec2::new(1.15, 0.65), Vec2::splat(0.9)) - 0.5 / 0.9).abs() < 5e-3);
 }
@@ -227,7 +227,7 @@ fn upright_footprints_have_the_exact_mean() {
         };
         let (dx, dy) = (Vec2::new(width, 0.0), Vec2::new(0.0, height));
         let f = Footprint { uv, dx, dy };
-        let found = f64::from(pattern_share(kind, 0.2, f));
+        let found = f64::from(procedural_share(kind, 0.2, f));
         let exact = mean(kind, f64::from(0.2f32), f, 1000);
         assert!((found - exact).abs() < 6e-3, "{kind} {f:?}: {found} {exact}");
         unfiltered = unfiltered.max((point(kind, 0.2, f64::from(uv.x), f64::from(uv.y)) - exact).abs());
@@ -241,7 +241,7 @@ fn without_a_footprint_the_pattern_is_its_points() {
     for i in 0..1000 {
         let kind = [CHECKER, LINES][i % 2];
         let uv = Vec2::new(numbers.between(-9.0, 9.0) as f32, numbers.between(-9.0, 9.0) as f32);
-        let share = pattern_share(
+        let share = procedural_share(
             kind,
             0.25,
             Footprint {
@@ -263,8 +263,8 @@ fn footprints_without_bound_see_the_whole_pattern() {
     for size in [1e4, 1e20, 1e38, f32::INFINITY, f32::NAN] {
         let (dx, dy) = (Vec2::new(size, size), Vec2::new(0.0, size));
         for uv in [Vec2::new(0.3, 0.4), Vec2::splat(1e30), Vec2::splat(f32::NAN)] {
-            assert_eq!(pattern_share(CHECKER, 0.0, Footprint { uv, dx, dy }), 0.5);
-            let lines = pattern_share(LINES, 0.25, Footprint { uv, dx, dy });
+            assert_eq!(procedural_share(CHECKER, 0.0, Footprint { uv, dx, dy }), 0.5);
+            let lines = procedural_share(LINES, 0.25, Footprint { uv, dx, dy });
             assert!((lines - 0.4375).abs() < 1e-6, "{lines}");
         }
     }

@@ -3,7 +3,7 @@
 // integrals have a closed form, and so has the mean of both waves' product over a parallelogram.
 
 // The share of the second colour in a footprint: its mean over the parallelogram.
-fn pattern_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
+fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let checker = kind == CHECKER;
     let scale = select(1.0, 0.5, checker);
     let on = select(line_width, 0.5, checker);

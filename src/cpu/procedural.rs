@@ -1,4 +1,4 @@
-//! Twin of `shaders/pattern.wgsl`: a checker and a grid of lines, averaged over the footprint.
+//! Twin of `shaders/procedural.wgsl`: a checker and a grid of lines, averaged over the footprint.
 
 use std::f32::consts::PI;
 
@@ -8,7 +8,7 @@ use super::footprint::Footprint;
 use super::math::{floor, max, min, sine};
 use crate::pack::CHECKER;
 
-pub fn pattern_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
+pub fn procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32 {
     let checker = kind == CHECKER;
     let scale = if checker { 0.5 } else { 1.0 };
     let on = if checker { 0.5 } else { line_width };
