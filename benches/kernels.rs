@@ -5,7 +5,7 @@ use std::path::Path;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{UVec2, Vec3};
-use wgray::backend::Backend as _;
+use wgray::backend::Backend;
 use wgray::cpu::Cpu;
 use wgray::cpu::ellipsoid::intersect_ellipsoid;
 use wgray::cpu::light::segments_to_light;
@@ -118,7 +118,7 @@ fn twins(criterion: &mut Criterion) {
             diffuse: 0.0,
             specular: 0.0,
         };
-        b.iter(|| phong_block(surface, &scene.materials[0], to, block, black_box(0), 5, none))
+        b.iter(|| phong_block(&surface, &scene.materials[0], to, block, black_box(0), 5, none))
     });
     group.finish();
 }

@@ -62,7 +62,7 @@ class Mutation:
 
 def all_mutations():
     out = subprocess.run(
-        ["cargo", "mutants", "--list", "--json", "--file", "src/cpu/*.rs"], cwd=ROOT, stdout=subprocess.PIPE, check=True
+        ["cargo", "mutants", "--list", "--json", "--file", "src/cpu/**/*.rs"], cwd=ROOT, stdout=subprocess.PIPE, check=True
     ).stdout
     text = {path: (ROOT / path).read_text() for path in {entry["file"] for entry in json.loads(out)}}
     return [Mutation(number, entry, text[entry["file"]]) for number, entry in enumerate(json.loads(out), 1)]
