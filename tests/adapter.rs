@@ -65,8 +65,8 @@ pub const KNOWN: &[Known] = &[
     swiftshader("grid_sample", ROUNDED_TWICE, 0.0008),
     swiftshader("rotated_grid_sample", ROUNDED_TWICE, 0.0005),
     swiftshader("jittered_sample", ROUNDED_TWICE, 0.0065),
-    swiftshader("sample_square", ROUNDED_TWICE, 0.0005),
-    swiftshader("filter_offset", ROUNDED_TWICE, 0.0093),
+    swiftshader("sample_square", ROUNDED_TWICE, 0.0008),
+    swiftshader("filter_offset", ROUNDED_TWICE, 0.0101),
 ];
 
 /// An integer that is made a float in two steps, each of which rounds. No picture has an index as large.
