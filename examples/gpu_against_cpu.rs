@@ -27,6 +27,10 @@ fn main() -> Result<ExitCode, Error> {
         wgray::render(&scene, &options)
     };
     let (gpu, cpu) = (render(Device::Gpu)?, render(Device::Cpu)?);
+    if gpu.device() == cpu.device() {
+        eprintln!("the adapter cannot render this scene, and the CPU did so");
+        return Ok(ExitCode::FAILURE);
+    }
     let Some(apart) = difference(&gpu.pixels(), &cpu.pixels(), 0.0) else {
         return Ok(ExitCode::FAILURE); // of two sizes: never so
     };

@@ -9,7 +9,7 @@ fn camera_ray(camera: Camera, at: vec2f) -> Ray {
     return Ray(camera.position, normalize(camera.forward + offset));
 }
 
-// Its differential, section 3 of Igehy's paper, where samples are `spacing` pixels apart.
+// The differential of a camera's ray, section 3 of Igehy's paper, where samples are `spacing` pixels apart.
 fn camera_differential(camera: Camera, at: vec2f, spacing: f32) -> Differential {
     return Differential(camera_derivative(camera, at, camera.right * (2.0 / f32(camera.width) * spacing)),
                         camera_derivative(camera, at, camera.up * (-2.0 / f32(camera.height) * spacing)));

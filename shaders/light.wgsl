@@ -11,7 +11,7 @@ fn segments_to_light(light: Light, p: vec3f) -> Segments {
     return Segments(light.center - p * light.finite, light.u, light.v);
 }
 
-// The same vectors in a primitive's local space.
+// The vectors to a light's samples in a primitive's local space.
 fn segments_to_local(q: Primitive, to: Segments) -> Segments {
     return Segments(vector_to_local(q, to.towards), vector_to_local(q, to.u), vector_to_local(q, to.v));
 }

@@ -93,7 +93,7 @@ struct Tangents {
     v: vec3f,
 }
 
-// Those of the local point. Where an ellipsoid's u has no direction, at its poles, that of the nearest meridian is taken.
+// The derivatives of a point of local space by u and by v. Where an ellipsoid's u has no direction, at its poles, that of the nearest meridian is taken.
 fn local_tangents(q: Primitive, local: vec3f) -> Tangents {
     if q.kind == ELLIPSOID {
         let r = sqrt(max(local.x * local.x + local.y * local.y, 1e-12));

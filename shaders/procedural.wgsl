@@ -74,7 +74,7 @@ fn wave_value(x: f32, on: f32, near: bool) -> f32 {
     return select(select(-on, 1.0 - on, x - floor(x) < on), select(1.0, -1.0, x < 0.0), near);
 }
 
-// Its integral, with the mean 0 over a period.
+// The wave's integral, with the mean 0 over a period.
 fn wave_integral(x: f32, on: f32, near: bool) -> f32 {
     let r = x - floor(x);
     return select(min(r * (1.0 - on), (1.0 - r) * on) - 0.5 * on * (1.0 - on), abs(x), near);

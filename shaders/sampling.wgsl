@@ -28,7 +28,7 @@ fn grid_sample(side: u32, index: u32) -> vec2f {
     return vec2f((f32(index % side) + 0.5) * cell, (f32(index / side) + 0.5) * cell);
 }
 
-// The same, turned by atan(1/2) around the middle of the square. What leaves the square enters on its other side.
+// Cell centres of a regular grid that is turned by atan(1/2) around the middle of the square. What leaves the square enters on its other side.
 fn rotated_grid_sample(side: u32, index: u32) -> vec2f {
     let p = grid_sample(side, index) - 0.5;
     let x = 0.8944272 * p.x - 0.4472136 * p.y;

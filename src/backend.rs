@@ -116,16 +116,19 @@ impl Rules {
     }
 
     /// Whether a film has moments and looks.
+    #[cfg(feature = "gpu")]
     pub fn adaptive(&self) -> bool {
         self.adaptive
     }
 
     /// The whole picture.
+    #[cfg(feature = "gpu")]
     pub fn picture(&self) -> Region {
         self.picture
     }
 
     /// A picture of another size.
+    #[cfg(feature = "gpu")]
     pub fn set_size(&mut self, width: u32, height: u32) {
         self.picture = Region::whole(width, height);
     }

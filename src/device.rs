@@ -109,7 +109,7 @@ impl<'a> Renderer<'a> {
     ///
     /// # Errors
     ///
-    /// Those of the work.
+    /// The errors of the work.
     pub fn work<T>(
         &mut self,
         mut work: impl FnMut(&mut dyn Backend, &DeviceInfo) -> Result<T, RenderError>,

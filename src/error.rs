@@ -118,6 +118,9 @@ pub enum RenderError {
         /// How many all pixels get first.
         first: u32,
     },
+    /// There is no memory for a picture of so many bytes.
+    #[error("a picture in memory takes {} MiB here, which there are not; a crop takes less", .0 >> 20)]
+    Memory(u64),
     /// The work was cancelled.
     #[error("cancelled")]
     Cancelled,

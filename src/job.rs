@@ -94,7 +94,7 @@ pub struct Bands {
 }
 
 impl Bands {
-    /// Those of a region, none of them rendered yet.
+    /// The bands of a region, none of them rendered yet. A region without pixels has none.
     pub fn new(region: Region, samples: u32, cut: &Cut, order: Order, largest_film: u64) -> Bands {
         let all: Vec<Region> = bands(region, cut, largest_film).collect();
         Bands {
@@ -111,11 +111,23 @@ impl Bands {
     ///
     /// # Errors
     ///
-    /// Those of the backend and of `watch`, and [`RenderError::Cancelled`] if `watch` says not to go on.
+    /// The errors of the backend and of `watch`, and [`RenderError::Cancelled`] if `watch` says not to go on.
     pub fn render_next(&mut self, backend: &mut dyn Backend, watch: &mut Watch) -> Result<Option<Film>, RenderError> {
         let Some(&band) = self.bands.as_slice().first() else {
             return Ok(None);
         };
+        let film = self.render_band(band, backend, watch);
+        match &film {
+            Ok(_) => {
+                self.bands.next();
+                self.done += band.pixels() as f64 * f64::from(self.samples);
+            }
+            Err(_) => self.steps.forget_pace(), // another backend may be slower
+        }
+        film.map(Some)
+    }
+
+    fn render_band(&mut self, band: Region, backend: &mut dyn Backend, watch: &mut Watch) -> Result<Film, RenderError> {
         self.steps.start(backend, band, self.samples);
         backend.begin(self.steps.film)?;
         let mut done = self.done;
@@ -125,10 +137,7 @@ impl Bands {
                 return Err(RenderError::Cancelled);
             }
         }
-        let film = backend.film()?.part(band);
-        self.bands.next();
-        self.done = done;
-        Ok(Some(film))
+        Ok(backend.film()?.part(band))
     }
 }
 
@@ -160,6 +169,16 @@ pub struct Steps {
     pass: Range<u32>,
     /// The first row that does not have them.
     y: u32,
+    /// The call that is under way.
+    call: Option<Call>,
+}
+
+/// A call that was submitted.
+#[derive(Clone, Copy, Debug)]
+struct Call {
+    tile: Region,
+    samples: u32,
+    start: Instant,
 }
 
 impl Steps {
@@ -179,6 +198,7 @@ impl Steps {
             of_all: 0,
             pass: 0..0,
             y: 0,
+            call: None,
         }
     }
 
@@ -192,6 +212,7 @@ impl Steps {
         } else {
             region
         };
+        self.call = None;
         self.pace.start_film();
         self.begin_pass(0);
     }
@@ -203,26 +224,46 @@ impl Steps {
 
     /// Makes the next call, and returns how many samples of pixels it was; `None` once the film has them all.
     pub fn step(&mut self, backend: &mut dyn Backend) -> Result<Option<f64>, RenderError> {
-        if self.is_done() {
+        if !self.submit(backend)? {
             return Ok(None);
         }
-        let count = self.pass.len() as u32;
+        backend.wait()?;
+        Ok(self.end_call())
+    }
+
+    /// Submits the next call and does not wait for it; [`Steps::poll`] tells when it has ended. Returns whether there is one.
+    pub fn submit(&mut self, backend: &mut dyn Backend) -> Result<bool, RenderError> {
+        if self.is_done() {
+            return Ok(false);
+        }
+        let samples = self.pass.len() as u32;
         let region = self.region_of_pass();
-        let rows = self.cut.rows_per_call.unwrap_or_else(|| self.pace.rows(region, count));
+        let rows = (self.cut.rows_per_call).unwrap_or_else(|| self.pace.rows(region, samples));
         let tile = Region {
             y0: self.y,
             y1: self.y + rows.min(region.y1 - self.y),
             ..region
         };
         let start = Instant::now();
-        backend.render(tile, self.pass.clone())?;
-        let work = tile.pixels() as f64 * f64::from(count);
+        backend.submit(tile, self.pass.clone())?;
+        self.call = Some(Call { tile, samples, start });
+        Ok(true)
+    }
+
+    /// How many samples of pixels the submitted call was, if it has ended; `None` if it has not, or if there is none.
+    pub fn poll(&mut self, backend: &mut dyn Backend) -> Result<Option<f64>, RenderError> {
+        Ok(if backend.poll()? { self.end_call() } else { None })
+    }
+
+    fn end_call(&mut self) -> Option<f64> {
+        let Call { tile, samples, start } = self.call.take()?;
+        let work = tile.pixels() as f64 * f64::from(samples);
         self.pace.took(work, start.elapsed(), self.pass.end <= self.of_all);
         self.y = tile.y1;
-        if self.y >= region.y1 {
+        if self.y >= self.region_of_pass().y1 {
             self.begin_pass(self.pass.end);
         }
-        Ok(Some(tile.within(self.region).pixels() as f64 * f64::from(count)))
+        Some(tile.within(self.region).pixels() as f64 * f64::from(samples))
     }
 
     /// The pixels that the pass is for.
@@ -276,7 +317,7 @@ struct Pace {
     call: Duration,
     /// Samples of pixels per second.
     speed: Option<f64>,
-    /// The same where no pixel leaves samples out.
+    /// Samples of pixels per second, where no pixel leaves samples out.
     speed_of_all: f64,
 }
 

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use glam::Vec4;
 use tracing::warn;
 
 use crate::backend::Backend;
@@ -55,8 +56,10 @@ impl Options {
 
 /// Renders a scene. The picture is kept in memory, in 16 bytes a pixel.
 ///
-/// Where [`Device::Auto`] finds no adapter, or one that cannot do the work, the CPU renders, and a warning by `tracing`
-/// says why; [`Picture::device`] tells what has rendered.
+/// Where [`Device::Auto`] finds no adapter, or one that has no room for the scene, the CPU renders. So it does, whatever
+/// device was chosen, where the driver ends long loops early and a single sample has longer ones. A warning by `tracing` says
+/// why; [`Picture::device`] tells what has rendered. Mesa's drivers print a line on standard error if the environment has no
+/// `XDG_RUNTIME_DIR`.
 ///
 /// # Errors
 ///
@@ -66,7 +69,7 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
     let mut prepared = Prepared::new(scene, &packed, options)?;
     let region = prepared.layout.region;
     let film = prepared.renderer.work(|backend, _| {
-        let mut whole = empty(region, packed.adaptive);
+        let mut whole = empty(region, packed.adaptive)?;
         let mut take = |band: Film| {
             put(&mut whole, &band);
             Ok(())
@@ -90,7 +93,7 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
 ///
 /// # Errors
 ///
-/// Those of [`render`] and of `watch`, and [`RenderError::Cancelled`] if `watch` breaks off.
+/// The errors of [`render`] and of `watch`, and [`RenderError::Cancelled`] if `watch` breaks off.
 pub fn render_growing(
     scene: &Scene,
     options: &Options,
@@ -103,7 +106,7 @@ pub fn render_growing(
     let film = prepared.renderer.work(|backend, device| {
         let (cut, order) = (Cut::default(), Order::Pixels);
         let mut bands = Bands::new(layout.region, packed.pixel_samples, &cut, order, backend.largest_film());
-        let mut whole = empty(layout.region, packed.adaptive);
+        let mut whole = empty(layout.region, packed.adaptive)?;
         loop {
             let mut look = |backend: &mut dyn Backend, band: Region, share: f64| {
                 let mut growing = Growing {
@@ -159,7 +162,7 @@ impl Growing<'_> {
     ///
     /// # Errors
     ///
-    /// Those of the device.
+    /// What the device's driver refuses or loses.
     pub fn picture(&mut self) -> Result<Picture, Error> {
         put(self.whole, &self.backend.film()?.part(self.band));
         Ok(Picture {
@@ -213,10 +216,15 @@ impl<'a> Prepared<'a> {
     }
 }
 
-fn empty(region: Region, adaptive: bool) -> Film {
-    match adaptive {
-        true => Film::adaptive(region),
-        false => Film::new(region),
+fn empty(region: Region, adaptive: bool) -> Result<Film, RenderError> {
+    let lists = if adaptive { 3 } else { 1 };
+    let bytes = region.pixels().saturating_mul(lists * size_of::<Vec4>() as u64);
+    // Taken and given back: what is not there is an error here, and would end the program later.
+    let there = usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
+    match there {
+        true if adaptive => Ok(Film::adaptive(region)),
+        true => Ok(Film::new(region)),
+        false => Err(RenderError::Memory(bytes)),
     }
 }
 
@@ -239,7 +247,7 @@ fn put(whole: &mut Film, band: &Film) {
 ///
 /// # Errors
 ///
-/// Those of the device.
+/// What the device's driver refuses or loses.
 pub fn middle_depth(scene: &Packed, aovs: &[Aov], backend: &mut dyn Backend) -> Result<f32, RenderError> {
     if !aovs.contains(&Aov::Depth) {
         return Ok(1.0);

@@ -53,7 +53,7 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// Those of a picture of this width.
+    /// Counts the faults of a picture, given row by row from the top, of this width in pixels.
     pub fn count(faults: &[Option<Fault>], width: u32) -> Faults {
         let width = width as usize;
         let height = faults.len().div_ceil(width.max(1));

@@ -42,7 +42,7 @@ pub struct Session {
     asked: Arc<Mutex<u64>>,
     /// What is known.
     pub state: watch::Receiver<Arc<State>>,
-    /// The newest picture, once there is one. Whoever is slow misses some.
+    /// The newest picture, once there is one. A slow reader misses some.
     pub frames: watch::Receiver<Option<Arc<Frame>>>,
     viewers: Viewers,
     watch: Option<Watch>,

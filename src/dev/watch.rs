@@ -14,7 +14,7 @@ use super::source::{Snapshot, Sources};
 
 /// Files are read once nothing has happened to them for so long: an editor's save is several events.
 const QUIET: Duration = Duration::from_millis(20);
-/// They are read after so long even if it goes on.
+/// Files are read after so long, even if something still happens to them.
 const PATIENCE: Duration = Duration::from_millis(150);
 
 /// What wakes the watcher.

@@ -10,7 +10,8 @@ use crate::pack::{BLOCK, Field as _, Light, Material, Packed, Record, Texture};
 
 /// Larger scenes are read from buffers: compiling grows with every primitive.
 pub const MOST_PRIMITIVES: usize = 64;
-/// Likewise with every material, light and texture, and faster than in proportion.
+/// Scenes of more materials, lights and textures are read from buffers: compiling grows with every one of them, faster than
+/// in proportion.
 pub const MOST_RECORDS: usize = 512;
 
 /// [`bake`], if the scene is small enough.

@@ -26,7 +26,7 @@ pub fn check(source: &Source) -> Result<Checked, ShaderError> {
     check_at(source).map_err(|(error, _)| error)
 }
 
-/// The same; an error comes with its place in the whole text, if it has one.
+/// Parses and validates a kernel. An error comes with its place in the whole text, if it has one.
 pub fn check_at(source: &Source) -> Result<Checked, (ShaderError, Option<usize>)> {
     let start = |span: Option<Span>| span.and_then(Span::to_range).map(|range| range.start);
     let module = naga::front::wgsl::parse_str(&source.text).map_err(|error| {
@@ -71,7 +71,7 @@ impl Checked {
         self.exact_entry(kernel.entry_point, &constants.constants(), rounding, controls)
     }
 
-    /// The same for any compute entry point, with the values of its overrides.
+    /// Any compute entry point as SPIR-V, for these values of its overrides, computed on the device exactly as it is written.
     pub fn exact_entry(
         &self,
         entry: &str,
@@ -116,7 +116,7 @@ impl Checked {
         Ok(spirv::ask_for(controls, &spirv::forbid_contraction(&words)))
     }
 
-    /// The same kernel with quotients and square roots by `shaders/rounding.wgsl`.
+    /// This kernel with quotients and square roots by `shaders/rounding.wgsl`.
     fn rounded_in_software(&self) -> Result<Checked, ShaderError> {
         let mut module = self.module.clone();
         round_in_software(&mut module, &self.info).map_err(|error| ShaderError::other(ROUNDING, &error))?;

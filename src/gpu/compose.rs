@@ -152,7 +152,7 @@ impl Shaders {
         })
     }
 
-    /// The same with another text of a file.
+    /// These shaders with another text of a file.
     #[cfg(test)]
     pub(super) fn with(mut self, name: &str, text: String) -> Shaders {
         self.files.retain(|(file, _)| file != name);

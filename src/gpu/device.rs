@@ -20,7 +20,8 @@ pub enum Choice {
     Auto,
     /// Any adapter.
     Gpu,
-    /// The adapter with this as part of its name, driver or type, or with this number in [`adapters`], counted from 1.
+    /// The adapter with this as part of its name, driver or type, or with this number in [`adapters`], counted from 1. A
+    /// number that is not in the list is a whole word of a name, such as 7900.
     /// Several of one name are one choice, of which the first that can be opened is taken.
     Named(String),
 }
@@ -113,6 +114,8 @@ fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, String> {
     let all = |fits: &dyn Fn(&Info) -> bool| -> Vec<usize> { (0..infos.len()).filter(|i| fits(&infos[*i])).collect() };
     let whole = all(&|info| info.name.to_lowercase() == name.to_lowercase());
     let found = match whole.is_empty() {
+        // No digit of some version is meant by a number that is not in the list.
+        true if name.bytes().all(|byte| byte.is_ascii_digit()) => all(&|info| has_word(&info.name, name)),
         true => all(&|info| matches(info, name)),
         false => whole,
     };
@@ -185,6 +188,12 @@ fn info(adapter: &wgpu::Adapter) -> Info {
         storage_buffers: limits.max_storage_buffers_per_shader_stage,
         name: info.name,
     }
+}
+
+/// Whether a word of a text is this one: `7900` is one of "Radeon RX 7900 XT", `15` none of "llvmpipe (LLVM 15.0.6)".
+fn has_word(text: &str, word: &str) -> bool {
+    let mut words = text.split(|c: char| !c.is_alphanumeric() && c != '.');
+    words.any(|known| known == word)
 }
 
 /// Whether a name that a person types means this adapter.
@@ -464,7 +473,12 @@ mod tests {
         for (number, i) in [("1", 0), ("4", 3), ("5", 4)] {
             assert_eq!(found(number), Ok(vec![i]));
         }
-        assert_eq!(found("15"), Ok(vec![4]), "no number of an adapter, so a part of a name");
+        for digit in ["0", "6", "7", "23"] {
+            let none = found(digit).unwrap_err();
+            assert!(none.contains(&format!("contains '{digit}'")), "{none}");
+        }
+        assert_eq!(found("15"), Ok(vec![4]), "a word of a name");
+        assert!(found("7900").unwrap_err().starts_with("'7900' means several adapters"));
         let several = found("discrete").unwrap_err();
         assert_eq!(
             several,

@@ -162,7 +162,7 @@ impl Sides<'_> {
                 self.tell(Some(own.global_variables.get_span(handle)), message);
             }
         }
-        // Whoever writes nothing into a buffer that the program reads leaves it black.
+        // A kernel that writes nothing into a buffer that the program reads leaves it black.
         for (handle, known) in right.global_variables.iter() {
             let stores = AddressSpace::Storage {
                 access: StorageAccess::LOAD | StorageAccess::STORE,

@@ -143,8 +143,7 @@ impl Gpu {
         let scene = SceneBuffers::upload(device, packed, texels, &kernels.layouts)?;
         let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         let written = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
-        let receipt = [written, BufferUsages::COPY_DST | BufferUsages::MAP_READ]
-            .map(|usage| device.buffer(size_of::<[u32; 2]>() as u64, usage));
+        let receipt = [device.buffer(RECEIPT, written), receipt_to_read(device)];
         let mut gpu = Gpu {
             samples_per_call: samples_per_call(packed, kernels.baked.is_some()),
             device: device.clone(),
@@ -354,11 +353,12 @@ impl Gpu {
         }
     }
 
-    /// After an error there is no film.
+    /// After an error there is no film. The receipt may still be mapped then, and takes no copy: there is a new one.
     fn or_lost<T>(&mut self, result: Result<T, RenderError>) -> Result<T, RenderError> {
         if result.is_err() {
             self.pending = None;
             self.film = None;
+            self.receipt[1] = receipt_to_read(&self.device);
         }
         result
     }
@@ -384,6 +384,14 @@ impl Gpu {
             device: self.device.info.name.clone(),
         }
     }
+}
+
+/// The size of a receipt in bytes.
+const RECEIPT: u64 = size_of::<[u32; 2]>() as u64;
+
+/// A buffer for a receipt that the host reads.
+fn receipt_to_read(device: &Device) -> wgpu::Buffer {
+    device.buffer(RECEIPT, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
 }
 
 /// The workgroups of a tile, along each side.

@@ -22,7 +22,7 @@ type Calls = HashMap<Handle<Expression>, (Handle<Function>, Vec<Handle<Expressio
 
 /// What takes the place of a quotient, by the number of components.
 const QUOTIENTS: [&str; 4] = ["quotient", "quotient2", "quotient3", "quotient4"];
-/// The same for square roots.
+/// What takes the place of a square root, by the number of components.
 const SQUARE_ROOTS: [&str; 4] = ["square_root", "square_root2", "square_root3", "square_root4"];
 
 /// A function that `shaders/rounding.wgsl` lacks.

@@ -125,7 +125,8 @@ impl Aov {
         }
     }
 
-    /// The same of a first hit; for values of the film it is that of [`Aov::Primitive`].
+    /// The colour of a first hit in a PNG, before rounding to 8 bits, as [`Aov::color`] gives it. A layer of the film has that
+    /// of [`Aov::Primitive`].
     pub(crate) fn color_of_hit(self, hit: &FirstHit, middle_depth: f32) -> Vec3 {
         if hit.shape == NOTHING {
             return Vec3::ZERO;

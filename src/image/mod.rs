@@ -95,7 +95,7 @@ pub fn files(path: &Path, format: Format, aovs: &[Aov]) -> Vec<PathBuf> {
 ///
 /// # Errors
 ///
-/// Those of `render`, and [`RenderError::Output`] if a file cannot be written.
+/// The errors of `render`, and [`RenderError::Output`] if a file cannot be written.
 pub fn save(
     mut pending: Vec<Pending>,
     format: Format,

@@ -33,7 +33,7 @@ struct Things<'a> {
     scene: &'a Scene,
     /// Of the shapes, an infinite one's point among them, and then the lights that have a place.
     places: ExtentTree,
-    /// The same numbers for what is infinitely far away.
+    /// Of the shapes and lights that are infinitely far away, by the same numbers.
     directions: ExtentTree,
 }
 
@@ -181,7 +181,7 @@ fn each_place(scene: &Scene, i: usize, normal: DVec3, mut point: impl FnMut(DVec
     }
 }
 
-/// Likewise the points infinitely far away.
+/// The directions of a shape's or a light's points that are infinitely far away.
 fn each_direction(scene: &Scene, i: usize, mut direction: impl FnMut(DVec3)) {
     match scene.shapes.get(i).map(|shape| &shape.geometry) {
         Some(Geometry::Plane { tangent, bitangent, .. }) => {

@@ -23,7 +23,7 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// That of an image that was read.
+    /// The header that an image in memory would have in a file.
     pub fn of(image: &Image) -> Header {
         Header {
             width: image.width,

@@ -20,9 +20,9 @@ const BRIGHTEST: f32 = 1e6;
 /// Where the images that a scene names are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assets {
-    /// Their names are relative to this folder, the scene file's.
+    /// The folder that images' names are relative to, that of the scene file.
     pub folder: PathBuf,
-    /// They must lie in this one.
+    /// The folder that images must lie in.
     pub root: PathBuf,
     /// Images in memory by their names: a texture that names one of them as its file has it, and no file is read.
     pub images: BTreeMap<String, Arc<Image>>,

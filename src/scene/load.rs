@@ -77,7 +77,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// Those of [`Scene::load`], and bad overrides.
+    /// The errors of [`Scene::load`], and bad overrides.
     pub fn load_with(path: impl AsRef<Path>, overrides: &Overrides) -> Result<Scene, SceneError> {
         let path = path.as_ref();
         let bytes = read(path).map_err(|error| SceneError::Read {
@@ -109,7 +109,7 @@ impl Scene {
     ///
     /// # Errors
     ///
-    /// Those of [`Scene::parse`], and bad overrides.
+    /// The errors of [`Scene::parse`], and bad overrides.
     pub fn parse_with(text: &str, origin: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
         parse_beside(text, origin, folder_of(Path::new(origin)), overrides)
     }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// A colour of a material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Color {
-    /// The same everywhere; linear RGB.
+    /// One colour for all of the surface; linear RGB.
     Plain(DVec3),
     /// From a texture: index into [`Scene::textures`](super::Scene::textures).
     Texture(usize),

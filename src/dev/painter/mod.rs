@@ -111,9 +111,9 @@ struct Pending {
 pub struct Told {
     /// The terminal.
     pub report: Box<dyn Fn(Report) + Send>,
-    /// Whoever looks at the state.
+    /// Those who are told the state.
     pub state: watch::Sender<Arc<State>>,
-    /// Whoever looks at the picture.
+    /// Those who are sent the picture.
     pub frames: watch::Sender<Option<Arc<Frame>>>,
 }
 

@@ -258,13 +258,19 @@ fn shape(description: &ShapeDescription, indices: &BTreeMap<&str, usize>, materi
             (Geometry::Rectangle(rectangle), &shape.material)
         }
         ShapeDescription::Disk(shape) => {
+            let center = point(shape.center).at("center")?;
             let radius = length(shape.radius).at("radius")?;
             let tangent = match shape.tangent {
                 Some(tangent) => tangent,
                 None if unit(shape.normal).at("normal")?.x.abs() < 0.9 => DVec3::X,
                 None => DVec3::Y,
             };
-            let disk = rectangle(shape.center, [2.0 * radius; 2], shape.normal, tangent)?;
+            let (tangent, bitangent) = frame(shape.normal, tangent)?;
+            let disk = Parallelogram {
+                center,
+                u: tangent * radius,
+                v: bitangent * radius,
+            };
             (Geometry::Disk(disk), &shape.material)
         }
         ShapeDescription::Ellipsoid(shape) => (ellipsoid(shape)?, &shape.material),

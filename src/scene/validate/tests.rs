@@ -438,3 +438,27 @@ fn the_page_has_the_limits() {
         assert!(page.contains(&limit), "{limit}");
     }
 }
+
+#[test]
+fn a_disk_has_the_radii_that_lengths_have() {
+    let scene = |radius: &str, normal: &str| {
+        let text = format!(
+            "image = {{ width = 1, height = 1 }}\ncamera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }}\n\
+             materials.m = {{ type = 'mirror' }}\nshapes = [{{ type = 'disk', material = 'm', center = [0, 0, 0], \
+             radius = {radius}, normal = {normal} }}]\n"
+        );
+        crate::scene::Scene::parse(&text, "s.toml").map_err(|error| error.to_string())
+    };
+    for radius in ["1e-9", "1", "1e9"] {
+        for normal in ["[1, 0, 0]", "[-1, 0, 0]", "[0, 1, 0]", "[0, 0, -1]", "[0.9, 0.1, 0.42]"] {
+            let scene = scene(radius, normal).unwrap();
+            let Geometry::Disk(disk) = &scene.shapes[0].geometry else {
+                panic!("a disk");
+            };
+            let radius: f64 = radius.parse().unwrap();
+            assert!((disk.u.length() / radius - 1.0).abs() < 1e-12 && (disk.v.length() / radius - 1.0).abs() < 1e-12);
+        }
+    }
+    let told = scene("1.1e9", "[0, 0, 1]").unwrap_err();
+    assert!(told.contains("shapes[0].radius: 1.1e9 must be"), "{told}");
+}
