@@ -127,6 +127,7 @@ mod unix {
 
     #[test]
     fn an_interrupted_render_leaves_no_trace() {
+        crate::cli::heed_interrupts();
         for (device, signal) in [("cpu", "-INT"), ("gpu", "-INT"), ("cpu", "-TERM"), ("cpu", "-HUP")] {
             let place = Place::new();
             place.write("out.exr", "old");

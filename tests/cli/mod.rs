@@ -15,6 +15,16 @@ use tempfile::TempDir;
 
 use crate::sources::path as project;
 
+/// Lets the programs that this process starts be interrupted. A shell starts jobs in the background so that they ignore it,
+/// and so would the programs.
+#[cfg(unix)]
+pub fn heed_interrupts() {
+    // SAFETY: setting the default action of a signal has no precondition; no handler of this process is lost.
+    unsafe {
+        libc::signal(libc::SIGINT, libc::SIG_DFL);
+    }
+}
+
 /// What a run of the program left.
 struct Ran {
     code: i32,

@@ -408,6 +408,7 @@ mod unix {
     /// A pipe that nobody reads keeps the program waiting, and Ctrl+C still ends it.
     #[test]
     fn waiting_for_a_reader_can_be_interrupted() {
+        crate::cli::heed_interrupts();
         let place = Place::new();
         let made = Command::new("mkfifo").arg(place.path("p.png")).status().unwrap();
         assert!(made.success());

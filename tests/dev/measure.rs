@@ -9,6 +9,7 @@ use super::running::{Files, LONGEST, SCENE};
 
 #[test]
 fn an_interrupted_measurement_leaves_no_files() {
+    crate::cli::heed_interrupts();
     let files = Files::new(SCENE);
     let temporary = tempfile::tempdir().unwrap();
     let mut program = Command::new(assert_cmd::cargo::cargo_bin!("wgray"))
