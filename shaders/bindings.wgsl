@@ -16,3 +16,5 @@
 // With the scene's shapes.
 @group(2) @binding(0) var<storage, read> primitives: array<Primitive>;
 @group(2) @binding(1) var<storage, read> bounds: array<Sphere>;
+@group(2) @binding(2) var<storage, read> nodes: array<vec4u>; // the rows of trees, of their items and of instances
+@group(2) @binding(3) var<storage, read> meshes: array<vec4u>; // the rows of triangles and vertices

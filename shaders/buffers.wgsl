@@ -1,4 +1,4 @@
-// The scene from buffers, by loops over all primitives.
+// The scene from buffers, by loops over all primitives outside of the tree.
 
 fn load_primitive(i: u32) -> Primitive {
     return primitives[i];
@@ -9,10 +9,10 @@ fn light_counts() -> vec2u {
     return counts.lights;
 }
 
-// The nearest primitive that a ray meets; not the one that it has left. It may start on the wall of a round one, inside
-// of it.
-fn closest_hit(ray: Ray, left: u32, wall: u32) -> Hit {
-    var hit = Hit(FAR, NOTHING);
+// The nearest primitive that a ray meets, of those outside of the tree; not the one that it has left. It may start on the wall
+// of a round one, inside of it.
+fn closest_primitive(ray: Ray, left: u32, wall: u32) -> Hit {
+    var hit = no_hit();
     if (PRIMITIVES & (1u << RECTANGLE)) != 0u {
         hit = closest_of(RECTANGLE, hit, ray, left, wall);
     }
@@ -41,9 +41,8 @@ fn closest_of(kind: u32, before: Hit, ray: Ray, left: u32, wall: u32) -> Hit {
     return hit;
 }
 
-// Bit i is set where any primitive hides sample i of the block from a surface. The one that the surface is of hides none
-// that are above it, unless it is seen from inside.
-fn hidden_samples(surface: Surface, light: Light, block: Block) -> u32 {
+// Bit i is set where any of these primitives hides sample i of the block from a surface.
+fn hidden_by_primitives(surface: Surface, light: Light, block: Block) -> u32 {
     let cone = cone_to_light(light, surface.start);
     var bits = 0u;
     if (SHADOW_CASTERS & (1u << RECTANGLE)) != 0u {

@@ -1,10 +1,48 @@
 // The scene's geometry, as integrators know it. A ray meets it by `closest_hit`, and light is hidden by it as
-// `hidden_samples` says; these two are written for each way to store a geometry (`buffers.wgsl`, or the scene as constants).
-// What a hit is like is here.
+// `hidden_samples` says. Primitives that are few are looked at one by one, in buffers (`buffers.wgsl`) or as constants; all else
+// by trees (`tree.wgsl`). What a hit is like is here.
+
+// The nearest thing that a ray meets; not what it has left. It may start on the wall of a round primitive, inside of it.
+fn closest_hit(ray: Ray, left: vec2u, wall: vec2u) -> Hit {
+    if IN_TREE == 0u {
+        return closest_primitive(ray, left.y, wall.y);
+    }
+    return closest_in_tree(closest_primitive(ray, by_itself(left), by_itself(wall)), ray, left, wall);
+}
+
+// Bit i is set where anything hides sample i of the block from a surface. What the surface is of hides none that are above it,
+// unless it is round and seen from inside.
+fn hidden_samples(surface: Surface, light: Light, block: Block) -> u32 {
+    let bits = hidden_by_primitives(surface, light, block);
+    if IN_TREE == 0u {
+        return bits;
+    }
+    return hidden_by_tree(bits, surface, light, block);
+}
+
+// Whether a hit is on a mesh.
+fn is_on_mesh(hit: Hit) -> bool {
+    if (IN_TREE & (1u << INSTANCE)) == 0u {
+        return false;
+    }
+    return hit.instance != 0u;
+}
+
+// What was hit.
+fn spot_of(hit: Hit) -> Spot {
+    if is_on_mesh(hit) {
+        return face_of(load_instance(hit.instance - 1u), hit);
+    }
+    return spot_by_itself(load_primitive(hit.primitive));
+}
 
 // The point of a surface where a ray met it.
-fn surface_of(hit: Hit, ray: Ray) -> Surface {
-    let q = load_primitive(hit.primitive);
+fn surface_of(spot: Spot, hit: Hit, ray: Ray) -> Surface {
+    if is_on_mesh(hit) {
+        let place = vec2u(hit.instance, hit.primitive);
+        return face_surface(spot, place, hit.barycentric, ray.direction, environment.shadow_epsilon);
+    }
+    let q = spot.primitive;
     let surface = surface_at(q, hit.primitive, ray, hit.t, environment.shadow_epsilon);
     if LOOKUPS + SPECULAR_LOOKUPS == 0u {
         return surface;
@@ -13,29 +51,40 @@ fn surface_of(hit: Hit, ray: Ray) -> Surface {
 }
 
 // What it is made of, textures aside.
-fn material_of(hit: Hit) -> Material {
-    return load_material(load_primitive(hit.primitive).material);
+fn material_of(spot: Spot) -> Material {
+    return load_material(spot.primitive.material);
 }
 
 // How the hit changes with the point of the picture.
-fn arrival_of(hit: Hit, surface: Surface, ray: Ray, differential: Differential) -> Arrival {
+fn arrival_of(spot: Spot, hit: Hit, surface: Surface, ray: Ray, differential: Differential) -> Arrival {
     if DIFFERENTIALS == 0u {
         return Arrival();
     }
-    return arrival(load_primitive(hit.primitive), differential, ray, hit.t, surface);
+    if is_on_mesh(hit) {
+        return face_arrival(spot, hit.barycentric, differential, ray, hit.t, surface);
+    }
+    return arrival(spot.primitive, differential, ray, hit.t, surface);
 }
 
 // The part of the surface that the hit stands for, in texture coordinates.
-fn footprint_of(hit: Hit, surface: Surface, at: Arrival) -> Footprint {
-    return surface_footprint(load_primitive(hit.primitive), surface, at.x.position, at.y.position);
+fn footprint_of(spot: Spot, hit: Hit, surface: Surface, at: Arrival) -> Footprint {
+    if is_on_mesh(hit) {
+        return face_footprint(spot, surface, at.x.position, at.y.position);
+    }
+    return surface_footprint(spot.primitive, surface, at.x.position, at.y.position);
 }
 
 // What the ray through a pixel's centre meets.
 fn pixel_first_hit(pixel: vec2u) -> FirstHit {
     let ray = camera_ray(camera, vec2f(pixel) + 0.5);
-    let hit = closest_hit(ray, NOTHING, NOTHING);
+    let hit = closest_hit(ray, NOWHERE, NOWHERE);
     if hit.primitive == NOTHING {
-        return FirstHit(vec3f(0.0), 0.0, vec2f(0.0), NOTHING, NOTHING);
+        let zero = vec3f(0.0);
+        return FirstHit(zero, 0.0, zero.xy, NOTHING, NOTHING, zero, NOTHING, zero.xy, vec2u(0u));
     }
-    return first_hit(load_primitive(hit.primitive), ray, hit.t);
+    let spot = spot_of(hit);
+    if is_on_mesh(hit) {
+        return face_first_hit(spot, hit);
+    }
+    return first_hit(spot.primitive, ray, hit.t);
 }

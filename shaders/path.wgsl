@@ -6,8 +6,8 @@ struct Path {
     throughput: vec3f,     // factor of the light that comes along the ray
     depth: u32,            // bounces so far
     branch: u32,           // bit i is set if this is the reflection at the split of bounce i
-    left: u32,             // the primitive that the ray starts on and cannot meet again, else NOTHING
-    wall: u32,             // the ellipsoid that it starts on and goes through
+    left: vec2u,           // the instance and primitive that the ray starts on and cannot meet again, else NOWHERE
+    wall: vec2u,           // the ellipsoid that it starts on and goes through
 }
 
 // What becomes of a path at a mirror or at glass.

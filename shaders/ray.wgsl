@@ -9,7 +9,20 @@ struct Ray {
 // The nearest intersection so far: FAR and NOTHING where there is none.
 struct Hit {
     t: f32,
-    primitive: u32,
+    instance: u32,         // 0 for a primitive by itself, else one more than the number of a mesh's instance
+    primitive: u32,        // its number among the scene's, or that of a triangle in its mesh
+    slot: u32,             // where the triangle is in its mesh
+    barycentric: vec2f,    // of the triangle's second and third vertex
+}
+
+// No hit.
+fn no_hit() -> Hit {
+    return Hit(FAR, 0u, NOTHING, 0u, vec2f(0.0));
+}
+
+// The number of a primitive by itself at a place, which is an instance and a primitive; NOTHING for a triangle of a mesh.
+fn by_itself(place: vec2u) -> u32 {
+    return select(NOTHING, place.y, place.x == 0u);
 }
 
 fn point_to_local(q: Primitive, p: vec3f) -> vec3f {
@@ -44,8 +57,16 @@ fn scaled_crossing(o: vec3f, d: vec3f) -> vec2f {
     return vec2f(o.x * a + s * d.x, o.y * a + s * d.y);
 }
 
-// The hit, or the one at t of primitive i if that is nearer and not the one that the ray has left.
+// The hit on a primitive by itself, or the one at t of primitive i if that is nearer and not the one that the ray has left.
 fn closer(hit: Hit, t: f32, i: u32, left: u32) -> Hit {
     let nearer = (t < hit.t) & (i != left);
-    return Hit(select(hit.t, t, nearer), select(hit.primitive, i, nearer));
+    return Hit(select(hit.t, t, nearer), hit.instance, select(hit.primitive, i, nearer), hit.slot, hit.barycentric);
+}
+
+// Of two hits, the second of which may be none at FAR, the nearer one; of equally near ones that of the lower instance and primitive.
+fn nearer_hit(a: Hit, b: Hit) -> Hit {
+    let lower = (b.instance < a.instance) | ((b.instance == a.instance) & (b.primitive < a.primitive));
+    let nearer = (b.t < FAR) & ((b.t < a.t) | ((b.t == a.t) & lower));
+    return Hit(select(a.t, b.t, nearer), select(a.instance, b.instance, nearer), select(a.primitive, b.primitive, nearer),
+               select(a.slot, b.slot, nearer), select(a.barycentric, b.barycentric, nearer));
 }

@@ -6,9 +6,10 @@ struct Surface {
     shading_normal: vec3f, // what light is reflected and refracted by: a normal map's, else the same
     wo: vec3f,             // unit vector to the viewer
     start: vec3f,          // where rays that leave it begin: a little above it
+    bulge: vec3f,          // from there to where shadow rays begin, on a mesh that stands for a smooth surface
     side: f32,             // 1 where the normal is the outward one, -1 where it is the opposite
-    above: u32,            // the primitive's number if no ray that leaves it on the viewer's side can meet it again
-    below: u32,            // the same for rays that leave it on the other side; else NOTHING
+    above: vec2u,          // the instance and primitive if no ray that leaves it on the viewer's side can meet it again
+    below: vec2u,          // the same for rays that leave it on the other side; else NOWHERE
     uv: vec2f,             // texture coordinates
     du: vec3f,             // the position's derivatives by them, which span the tangent frame
     dv: vec3f,
@@ -36,9 +37,10 @@ fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
     let normal = outward * side;
     let size = max(largest(position), largest(way));
     let start = position + normal * (epsilon * size);
-    let above = select(i, NOTHING, round & inside);
-    let below = select(i, NOTHING, round & !inside);
-    return Surface(position, normal, normal, -ray.direction, start, side, above, below, vec2f(0.0), vec3f(0.0), vec3f(0.0));
+    let above = vec2u(0u, select(i, NOTHING, round & inside));
+    let below = vec2u(0u, select(i, NOTHING, round & !inside));
+    return Surface(position, normal, normal, -ray.direction, start, vec3f(0.0), side, above, below, vec2f(0.0), vec3f(0.0),
+                   vec3f(0.0));
 }
 
 // A surface of the primitive q with texture coordinates and their frame.
@@ -52,10 +54,15 @@ fn with_coordinates(surface: Surface, q: Primitive) -> Surface {
     return result;
 }
 
+fn with_positive_zeros(v: vec3f) -> vec3f {
+    return vec3f(positive_zero(v.x), positive_zero(v.y), positive_zero(v.z));
+}
+
 fn first_hit(q: Primitive, ray: Ray, t: f32) -> FirstHit {
     let local = point_to_local(q, ray.origin + ray.direction * t);
     let n = primitive_normal(q, local);
-    let normal = vec3f(positive_zero(n.x), positive_zero(n.y), positive_zero(n.z));
+    let normal = with_positive_zeros(n);
     let uv = primitive_uv(q, local);
-    return FirstHit(normal, t, vec2f(positive_zero(uv.x), positive_zero(uv.y)), q.shape, q.material);
+    return FirstHit(normal, t, vec2f(positive_zero(uv.x), positive_zero(uv.y)), q.shape, q.material, normal, q.shape,
+                    vec2f(0.0), vec2u(0u));
 }

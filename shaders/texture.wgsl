@@ -170,12 +170,12 @@ struct Appearance {
 }
 
 // `lookups` is how many the material has at most.
-fn appearance(hit: Hit, material: Material, surface: Surface, at: Arrival, lookups: u32) -> Appearance {
-    var look = Appearance(material, surface.normal);
+fn appearance(spot: Spot, hit: Hit, material: Material, surface: Surface, at: Arrival, lookups: u32) -> Appearance {
+    var look = Appearance(material, surface.shading_normal);
     if lookups == 0u {
         return look;
     }
-    let footprint = footprint_of(hit, surface, at);
+    let footprint = footprint_of(spot, hit, surface, at);
     for (var i = 0u; i < lookups; i++) {
         let lookup = material.lookups[i];
         if lookup != 0u {

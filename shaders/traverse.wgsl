@@ -5,13 +5,13 @@
 fn hidden_by(kind: u32, range: vec2u, surface: Surface, cone: Cone, light: Light, block: Block) -> u32 {
     var bits = 0u;
     for (var first = range.x; first < range.y; first += 32u) {
-        let own = surface.above - first;
+        let own = by_itself(surface.above) - first;
         var candidates = shadow_candidates(first, range.y, cone);
         candidates &= ~select(0u, 1u << (own & 31u), own < 32u);
         while candidates != 0u {
             let i = first + firstTrailingBit(candidates);
             candidates &= candidates - 1u;
-            bits |= shadow_bits(kind, load_blocker(kind, i), cone.apex, i == surface.below, light, block);
+            bits |= shadow_bits(kind, load_blocker(kind, i), cone.apex, i == by_itself(surface.below), light, block);
         }
     }
     return bits;

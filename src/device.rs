@@ -14,7 +14,8 @@ use crate::scene::Problem;
 /// Which device a render asks for. Without the feature `gpu` there is the CPU alone.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Device {
-    /// A real GPU, else software Vulkan, else the CPU.
+    /// A real GPU; else software Vulkan for scenes without trees (meshes, or more than 64 bounded primitives), and the CPU for
+    /// those with, which it walks faster; the CPU where there is no adapter.
     #[default]
     Auto,
     /// The CPU, without any driver.
@@ -57,6 +58,7 @@ pub struct Renderer<'a> {
     scene: &'a Packed,
     backend: Box<dyn Backend + 'a>,
     info: DeviceInfo,
+    why: Option<String>,
     on_cpu: Box<dyn FnMut(&RenderError) + 'a>,
 }
 
@@ -74,9 +76,13 @@ impl<'a> Renderer<'a> {
         mut on_cpu: Box<dyn FnMut(&RenderError) + 'a>,
     ) -> Result<Renderer<'a>, Error> {
         let device = &options.device;
+        let why = match device {
+            Device::Auto => faster_on_cpu(scene),
+            _ => None,
+        };
         let (backend, info) = match device {
             Device::Cpu => cpu(scene),
-            Device::Auto if !cfg!(feature = "gpu") => cpu(scene),
+            Device::Auto if !cfg!(feature = "gpu") || why.is_some() => cpu(scene),
             _ => match adapter(scene, device, options.exact_rounding) {
                 Err(Error::Render(why @ (RenderError::NoDevice(_) | RenderError::TooLarge { .. })))
                     if *device == Device::Auto =>
@@ -91,8 +97,14 @@ impl<'a> Renderer<'a> {
             scene,
             backend,
             info,
+            why,
             on_cpu,
         })
+    }
+
+    /// Why [`Device::Auto`] chose the CPU though there is an adapter.
+    pub fn why(&self) -> Option<&str> {
+        self.why.as_deref()
     }
 
     /// What it renders on now.
@@ -133,6 +145,24 @@ fn cpu(scene: &Packed) -> Ready<'_> {
         interface: "cpu".to_string(),
     };
     (Box::new(Cpu::new(scene)), info)
+}
+
+/// Whether the CPU is faster for a scene than what else there is, and why: measured in `docs/performance.md`.
+#[cfg(feature = "gpu")]
+fn faster_on_cpu(scene: &Packed) -> Option<String> {
+    if scene.specialization.in_tree == 0 {
+        return None;
+    }
+    let adapter = gpu::adapters().into_iter().next()?;
+    (adapter.kind == "software").then(|| {
+        let name = adapter.name;
+        format!("rendering on the CPU: there is no GPU, and the CPU walks trees of boxes faster than {name}, which --device gpu asks for")
+    })
+}
+
+#[cfg(not(feature = "gpu"))]
+fn faster_on_cpu(_: &Packed) -> Option<String> {
+    None
 }
 
 #[cfg(feature = "gpu")]

@@ -78,6 +78,7 @@ pub mod gpu;
 pub mod image;
 #[doc(hidden)]
 pub mod job;
+pub mod mesh;
 #[doc(hidden)]
 pub mod pack;
 mod picture;

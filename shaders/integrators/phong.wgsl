@@ -4,32 +4,45 @@
 // path as far as its end, and the branches that wait are fewer than LEAVES. A path that meets a mirror or glass after
 // BOUNCES bounces is cut off: there it sees the background.
 fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> vec3f {
-    var path = Path(ray, differential, vec3f(1.0), 0u, 0u, NOTHING, NOTHING);
+    var path = Path(ray, differential, vec3f(1.0), 0u, 0u, NOWHERE, NOWHERE);
     if BOUNCES == 0u {
-        return radiance_from(closest_hit(path.ray, NOTHING, NOTHING), path, pixel, sample);
+        let hit = closest_hit(path.ray, NOWHERE, NOWHERE);
+        if hit.primitive == NOTHING {
+            return environment.background;
+        }
+        return radiance_from(spot_of(hit), hit, path, pixel, sample);
     }
     var sum = vec3f(0.0);
     var pending: array<Path, SPLITS>;
     var waiting = 0u;
     for (var leaf = 0u; leaf < LEAVES; leaf++) {
-        var hit = Hit(FAR, NOTHING);
+        var hit = no_hit();
+        var spot: Spot;
         while path.depth <= BOUNCES {
             hit = closest_hit(path.ray, path.left, path.wall);
-            if !is_specular(hit) {
+            if hit.primitive == NOTHING {
+                break;
+            }
+            spot = spot_of(hit);
+            if !is_specular(material_of(spot)) {
                 break;
             }
             if path.depth == BOUNCES {
                 hit.primitive = NOTHING;
                 break;
             }
-            let scattered = scatter(hit, path, pixel, sample);
+            let scattered = scatter(spot, hit, path, pixel, sample);
             path = scattered.onward;
             if scattered.splits {
                 pending[waiting] = scattered.other;
                 waiting++;
             }
         }
-        sum += path.throughput * radiance_from(hit, path, pixel, sample);
+        var seen = environment.background;
+        if hit.primitive != NOTHING {
+            seen = radiance_from(spot, hit, path, pixel, sample);
+        }
+        sum += path.throughput * seen;
         if waiting == 0u {
             break;
         }
@@ -39,19 +52,15 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
     return sum;
 }
 
-// Whether light is mirrored or refracted there.
-fn is_specular(hit: Hit) -> bool {
-    if hit.primitive == NOTHING {
-        return false;
-    }
-    let kind = material_of(hit).kind;
-    return (kind == MIRROR) | (kind == GLASS);
+// Whether light is mirrored or refracted.
+fn is_specular(material: Material) -> bool {
+    return (material.kind == MIRROR) | (material.kind == GLASS);
 }
 
-fn scatter(hit: Hit, path: Path, pixel: vec2u, sample: u32) -> Scattered {
-    var surface = surface_of(hit, path.ray);
-    let at = arrival_of(hit, surface, path.ray, path.differential);
-    let look = appearance(hit, material_of(hit), surface, at, SPECULAR_LOOKUPS);
+fn scatter(spot: Spot, hit: Hit, path: Path, pixel: vec2u, sample: u32) -> Scattered {
+    var surface = surface_of(spot, hit, path.ray);
+    let at = arrival_of(spot, hit, surface, path.ray, path.differential);
+    let look = appearance(spot, hit, material_of(spot), surface, at, SPECULAR_LOOKUPS);
     let material = look.material;
     surface.shading_normal = usable_normal(surface, look.normal);
     if material.kind == MIRROR {
@@ -62,18 +71,19 @@ fn scatter(hit: Hit, path: Path, pixel: vec2u, sample: u32) -> Scattered {
 }
 
 // The radiance of what a path ends at.
-fn radiance_from(hit: Hit, path: Path, pixel: vec2u, sample: u32) -> vec3f {
-    if hit.primitive == NOTHING {
-        return environment.background;
-    }
-    let plain = material_of(hit);
+fn radiance_from(spot: Spot, hit: Hit, path: Path, pixel: vec2u, sample: u32) -> vec3f {
+    let plain = material_of(spot);
     if plain.kind == EMITTER {
         return plain.emission;
     }
-    var surface = surface_of(hit, path.ray);
-    let look = appearance(hit, plain, surface, arrival_of(hit, surface, path.ray, path.differential), LOOKUPS);
+    var surface = surface_of(spot, hit, path.ray);
+    let at = arrival_of(spot, hit, surface, path.ray, path.differential);
+    let look = appearance(spot, hit, plain, surface, at, LOOKUPS);
     let material = look.material;
     surface.shading_normal = look.normal;
+    if (IN_TREE & (1u << INSTANCE)) != 0u {
+        surface.start += surface.bulge;
+    }
     var sum = environment.ambient * material.ambient;
     let lights = light_counts();
     if (LIGHTS & 1u) != 0u {

@@ -20,7 +20,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     shaders: Option<PathBuf>,
 
-    /// Folder that files named by the scenes, their textures, must lie in, in place of the scenes' own
+    /// Folder that files named by the scenes, their textures and meshes, must lie in, in place of the scenes' own
     #[arg(long, value_name = "DIR")]
     asset_root: Option<PathBuf>,
 }
@@ -64,16 +64,30 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &Shaders) -> anyhow::Result<String> {
     let scene = super::load(path, overrides)?;
+    for note in &scene.notes {
+        super::say(&format!("warning: {}: {note}", path.display()));
+    }
     let packed = pack(&scene);
     #[cfg(feature = "gpu")]
     check_kernels(&packed, shaders, Forms::All)?;
+    let triangles = packed.meshes.iter().map(|mesh| mesh.triangles.len());
+    let bytes = packed.meshes.iter().map(|mesh| mesh.bytes()).sum::<u64>();
+    let meshes = match packed.instances.len() {
+        0 => String::new(),
+        instances => format!(
+            "; meshes: {} of {} triangles in {:.1} MiB, instances of them: {instances}",
+            packed.meshes.len(),
+            triangles.sum::<usize>(),
+            bytes as f64 / f64::from(1 << 20),
+        ),
+    };
     Ok(format!(
-        "good; {} x {} pixels, {} samples each, {} of light; shapes: {} of {} primitives; lights: {}",
+        "good; {} x {} pixels, {} samples each, {} of light; shapes: {} of {} primitives{meshes}; lights: {}",
         scene.width,
         scene.height,
         packed.pixel_samples,
         packed.light_samples(),
-        scene.shapes.len(),
+        scene.shapes.len() - packed.instances.len(),
         packed.primitives.len(),
         scene.lights.len(),
     ))

@@ -133,7 +133,7 @@ fn checked(out: &Path, sources: &Sources) -> anyhow::Result<PathBuf> {
         return Err(Usage(format!("--out: {}: must be a file, which is replaced", out.display())).into());
     };
     let text = std::fs::read_to_string(&sources.scene).unwrap_or_default();
-    let described = Description::parse(&text, "").ok();
+    let described = Description::parse(&text, &sources.scene.display().to_string()).ok();
     let folder = sources.scene.parent().unwrap_or(Path::new(""));
     let named = described.iter().flat_map(|described| described.files(folder));
     let scene = std::iter::once(sources.scene.clone());
@@ -195,6 +195,7 @@ impl Terminal {
                 );
             }
             Report::Finished { seconds } => self.line("", &format!("all samples after another {}", time(*seconds))),
+            Report::Note(note) => self.line("", &format!("note: {note}")),
             Report::Smaller([width, height], [less_wide, less_high]) => self.line(
                 "",
                 &format!(

@@ -1,6 +1,8 @@
 //! How far a render is, on standard error.
 
 use std::io::IsTerminal;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
@@ -75,6 +77,32 @@ impl Drop for Progress {
             bar.finish_and_clear();
         }
     }
+}
+
+/// Does work that has no shares to tell of. On a terminal it is named, with its time, while it takes longer than a second.
+pub fn named<T>(mode: Mode, name: &'static str, work: impl FnOnce() -> T) -> T {
+    if mode != Mode::Auto || !std::io::stderr().is_terminal() {
+        return work();
+    }
+    let (done, ended) = mpsc::channel::<()>();
+    let watch = thread::spawn(move || {
+        if ended.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
+            let bar = ProgressBar::new_spinner().with_elapsed(PATIENCE);
+            bar.set_style(spinner_style());
+            bar.set_message(name);
+            bar.enable_steady_tick(Duration::from_millis(100));
+            let _ = ended.recv(); // until the work has ended
+            bar.finish_and_clear();
+        }
+    });
+    let result = work();
+    drop(done);
+    let _ = watch.join();
+    result
+}
+
+fn spinner_style() -> ProgressStyle {
+    ProgressStyle::with_template("{spinner} {msg}, {elapsed}").unwrap_or_else(|_| ProgressStyle::default_spinner())
 }
 
 fn new_bar(elapsed: Duration) -> ProgressBar {

@@ -20,7 +20,7 @@ use wgray::render::{Options, middle_depth};
 use wgray::scene::{Overrides, Pattern};
 
 use super::outputs::Outputs;
-use super::progress::{Mode, Progress};
+use super::progress::{self, Mode, Progress};
 use super::stats::Stats;
 use super::{say, signal};
 
@@ -66,7 +66,7 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
 
-    /// Folder that pictures named by the scene must lie in, if not the scene's own
+    /// Folder that pictures and meshes named by the scene must lie in, if not the scene's own
     #[arg(long, value_name = "DIR")]
     asset_root: Option<PathBuf>,
 
@@ -74,7 +74,8 @@ pub struct Args {
     #[arg(long, value_name = "x0,y0,x1,y1", value_parser = parse_crop, allow_hyphen_values = true)]
     crop: Option<Region>,
 
-    /// What renders. auto: a real GPU, else software Vulkan, else the CPU; gpu: any adapter; cpu: the CPU without any
+    /// What renders. auto: a real GPU, else software Vulkan, else the CPU, which goes before software Vulkan where a scene has
+    /// meshes or more than 64 primitives; gpu: any adapter; cpu: the CPU without any
     /// driver; NAME: the adapter with this as a part of its name, driver or type ("lavapipe" for Mesa's software Vulkan),
     /// or with this number in the list of wgray devices
     #[arg(long, value_name = "auto|gpu|cpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
@@ -90,7 +91,8 @@ pub struct Args {
     pub threads: Option<u16>,
 
     /// What else to write, of the first hit through each pixel's centre. In an EXR these are further layers: normal.X,
-    /// .Y, .Z, outwards; depth.Z, along the ray, 0 where nothing is; uv.U, .V; primitive.ID. Beside a PNG they are
+    /// .Y, .Z, outwards, and shading_normal; depth.Z, along the ray, 0 where nothing is; uv.U, .V; instance.ID, the shape's
+    /// number; primitive.ID, that or a triangle's number in its mesh; barycentric.U, .V. Beside a PNG they are
     /// further files, NAME.normal.png and so on: normals moved to 0..1, depth bright where near (half bright at the picture's middle), fractions of texture coordinates in
     /// red and green, shapes in colours. Under adaptive sampling also what it is like: sample_count.N; variance.R, .G, .B
     /// of the pixel's value. Beside a PNG counts are shown on a logarithmic scale, variances by their square root
@@ -162,7 +164,6 @@ struct Plan {
     format: Format,
     region: Region,
     options: Options,
-    threads: Option<u16>,
     progress: Mode,
     quiet: bool,
 }
@@ -189,7 +190,11 @@ impl Plan {
             adaptive: args.adaptive,
             asset_root: args.asset_root,
         };
-        let scene = super::load(&args.scene, &overrides)?;
+        let progress = if args.quiet { Mode::None } else { args.progress };
+        let scene = progress::named(progress, "reading the scene", || super::load(&args.scene, &overrides))?;
+        for note in scene.notes.iter().filter(|_| !args.quiet) {
+            say(&format!("warning: {}: {note}", args.scene.display()));
+        }
         outputs.check(&[&[args.scene][..], &scene.files].concat())?;
         let options = Options {
             device: Device::from(args.device.as_str()),
@@ -199,12 +204,11 @@ impl Plan {
         };
         let region = options.region(&scene).map_err(|problem| super::option(&problem))?;
         let plan = Plan {
-            scene: pack(&scene),
+            scene: progress::named(progress, "building trees", || pack(&scene)),
             format: outputs.format,
             region,
             options,
-            threads: args.threads,
-            progress: if args.quiet { Mode::None } else { args.progress },
+            progress,
             quiet: args.quiet,
         };
         Ok((plan, outputs))
@@ -212,24 +216,26 @@ impl Plan {
 
     /// Makes the device ready for the scene.
     fn renderer(&self) -> anyhow::Result<Renderer<'_>> {
-        if let Some(threads) = self.threads {
-            rayon::ThreadPoolBuilder::new()
-                .num_threads(threads.into())
-                .build_global()
-                .context("threads")?;
-        }
         let on_cpu = |why: &RenderError| {
             if !self.quiet {
                 say(&format!("warning: rendering on the CPU: {why}"));
             }
         };
-        Renderer::new(&self.scene, &self.options, Box::new(on_cpu)).map_err(super::plain)
+        let renderer = Renderer::new(&self.scene, &self.options, Box::new(on_cpu)).map_err(super::plain)?;
+        if let Some(why) = renderer.why().filter(|_| !self.quiet) {
+            say(&format!("note: {why}"));
+        }
+        Ok(renderer)
     }
 }
 
 pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
     if args.verbose {
         speak();
+    }
+    if let Some(threads) = args.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+        pool.build_global().context("threads")?; // before anything else is done in parallel
     }
     let (plan, outputs) = Plan::resolve(args)?;
     info!(seconds = start.elapsed().as_secs_f64(), "scene read");

@@ -1,52 +1,156 @@
-//! Twin of `shaders/geometry.wgsl`: what a hit is like.
+//! Twin of `shaders/geometry.wgsl` and `shaders/meshes.wgsl`: the scene's geometry, as integrators know it.
 
 use bytemuck::Zeroable;
-use glam::UVec2;
+use glam::{UVec2, UVec4, Vec2, Vec3, Vec4Swizzles as _};
 
 use super::camera::camera_ray;
 use super::differential::{Arrival, Differential, arrival};
 use super::footprint::{Footprint, surface_footprint};
-use super::ray::{Hit, Ray};
+use super::mesh::{
+    Spot, face_arrival, face_first_hit, face_footprint, face_primitive, face_surface, normal_from_mesh, spot_by_itself,
+    vector_from_mesh,
+};
+use super::ray::{Hit, Ray, by_itself};
+use super::shadow::Block;
 use super::surface::{Surface, first_hit, surface_at, with_coordinates};
-use super::traverse::closest_hit;
-use crate::pack::{FirstHit, Material, NOTHING, Packed};
+use super::traverse::{closest_primitive, hidden_by_primitives};
+use super::tree::{closest_in_tree, hidden_by_tree};
+use crate::pack::{FirstHit, Instance, Light, Material, NO_SHADOW, NOTHING, NOWHERE, Packed, SOME_SHADOWS};
 
-pub fn surface_of(scene: &Packed, hit: Hit, ray: Ray) -> Surface {
+pub fn closest_hit(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
+    if scene.specialization.in_tree == 0 {
+        return closest_primitive(scene, ray, left.y, wall.y);
+    }
+    let hit = closest_primitive(scene, ray, by_itself(left), by_itself(wall));
+    closest_in_tree(scene, hit, ray, left, wall)
+}
+
+pub fn hidden_samples(scene: &Packed, surface: &Surface, light: &Light, block: Block) -> u32 {
+    let bits = hidden_by_primitives(scene, surface, light, block);
+    if scene.specialization.in_tree == 0 {
+        return bits;
+    }
+    hidden_by_tree(scene, bits, surface, light, block)
+}
+
+pub fn is_on_mesh(hit: Hit) -> bool {
+    hit.instance != 0
+}
+
+/// The instance that a hit on a mesh is of.
+fn instance_of(scene: &Packed, hit: Hit) -> &Instance {
+    &scene.instances[hit.instance as usize - 1]
+}
+
+pub fn group_word(scene: &Packed, i: &Instance, slot: u32) -> u32 {
+    let groups = &scene.meshes[i.mesh as usize].groups;
+    let group = groups.get(slot as usize).copied().unwrap_or(0);
+    scene.group_words[(i.materials + group) as usize]
+}
+
+pub fn triangle_casts(scene: &Packed, i: &Instance, slot: u32) -> bool {
+    i.shadows != SOME_SHADOWS || group_word(scene, i, slot) & NO_SHADOW == 0
+}
+
+fn face_of(scene: &Packed, i: &Instance, hit: Hit) -> Spot {
+    let mesh = &scene.meshes[i.mesh as usize];
+    let UVec4 { x, y, z, .. } = mesh.triangles[hit.slot as usize];
+    let corners = [x, y, z].map(|vertex| vertex as usize);
+    let [p0, p1, p2] = corners.map(|vertex| mesh.vertices[vertex]);
+    let v0 = p0.xyz();
+    let edge_1 = vector_from_mesh(i, p1.xyz() - v0);
+    let edge_2 = vector_from_mesh(i, p2.xyz() - v0);
+    let mut face = Spot {
+        primitive: face_primitive(i, v0, edge_1, edge_2, group_word(scene, i, hit.slot) & !NO_SHADOW),
+        edge_1,
+        edge_2,
+        uv_0: Vec2::ZERO,
+        uv_1: Vec2::X,
+        uv_2: Vec2::Y,
+        normal_0: Vec3::ZERO,
+        normal_1: Vec3::ZERO,
+        normal_2: Vec3::ZERO,
+        anchor: i.anchor,
+        condition: i.condition,
+    };
+    if i.attributes != NOTHING {
+        let [n0, n1, n2] = corners.map(|vertex| mesh.attributes[vertex]);
+        face.normal_0 = normal_from_mesh(i, n0.xyz());
+        face.normal_1 = normal_from_mesh(i, n1.xyz());
+        face.normal_2 = normal_from_mesh(i, n2.xyz());
+        if i.has_uvs != 0 {
+            face.uv_0 = Vec2::new(p0.w, n0.w);
+            face.uv_1 = Vec2::new(p1.w, n1.w);
+            face.uv_2 = Vec2::new(p2.w, n2.w);
+        }
+    }
+    face
+}
+
+pub fn spot_of(scene: &Packed, hit: Hit) -> Spot {
+    if is_on_mesh(hit) {
+        return face_of(scene, instance_of(scene, hit), hit);
+    }
+    spot_by_itself(&scene.primitives[hit.primitive as usize])
+}
+
+pub fn surface_of(scene: &Packed, spot: &Spot, hit: Hit, ray: Ray) -> Surface {
     let s = &scene.specialization;
-    let q = &scene.primitives[hit.primitive as usize];
-    let surface = surface_at(q, hit.primitive, ray, hit.t, scene.environment.shadow_epsilon);
+    let epsilon = scene.environment.shadow_epsilon;
+    if is_on_mesh(hit) {
+        let place = UVec2::new(hit.instance, hit.primitive);
+        return face_surface(spot, place, hit.barycentric, ray.direction, epsilon);
+    }
+    let q = &spot.primitive;
+    let surface = surface_at(q, hit.primitive, ray, hit.t, epsilon);
     if s.lookups + s.specular_lookups == 0 {
         return surface;
     }
     with_coordinates(surface, q)
 }
 
-pub fn material_of(scene: &Packed, hit: Hit) -> &Material {
-    &scene.materials[scene.primitives[hit.primitive as usize].material as usize]
+pub fn material_of<'a>(scene: &'a Packed, spot: &Spot) -> &'a Material {
+    &scene.materials[spot.primitive.material as usize]
 }
 
-pub fn arrival_of(scene: &Packed, hit: Hit, surface: Surface, ray: Ray, differential: Differential) -> Arrival {
+pub fn arrival_of(
+    scene: &Packed,
+    spot: &Spot,
+    hit: Hit,
+    surface: Surface,
+    ray: Ray,
+    differential: Differential,
+) -> Arrival {
     if scene.specialization.differentials == 0 {
         return Arrival::default();
     }
-    let q = &scene.primitives[hit.primitive as usize];
-    arrival(q, differential, ray, hit.t, surface)
+    if is_on_mesh(hit) {
+        return face_arrival(spot, hit.barycentric, differential, ray, hit.t, surface);
+    }
+    arrival(&spot.primitive, differential, ray, hit.t, surface)
 }
 
-pub fn footprint_of(scene: &Packed, hit: Hit, surface: Surface, at: Arrival) -> Footprint {
-    let q = &scene.primitives[hit.primitive as usize];
-    surface_footprint(q, surface, at.x.position, at.y.position)
+pub fn footprint_of(spot: &Spot, hit: Hit, surface: Surface, at: Arrival) -> Footprint {
+    if is_on_mesh(hit) {
+        return face_footprint(spot, surface, at.x.position, at.y.position);
+    }
+    surface_footprint(&spot.primitive, surface, at.x.position, at.y.position)
 }
 
 pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {
     let ray = camera_ray(&scene.camera, pixel.as_vec2() + 0.5);
-    let hit = closest_hit(scene, ray, NOTHING, NOTHING);
+    let hit = closest_hit(scene, ray, NOWHERE, NOWHERE);
     if hit.primitive == NOTHING {
         return FirstHit {
             shape: NOTHING,
             material: NOTHING,
+            primitive: NOTHING,
             ..FirstHit::zeroed()
         };
     }
-    first_hit(&scene.primitives[hit.primitive as usize], ray, hit.t)
+    let spot = spot_of(scene, hit);
+    if is_on_mesh(hit) {
+        return face_first_hit(&spot, hit);
+    }
+    first_hit(&spot.primitive, ray, hit.t)
 }

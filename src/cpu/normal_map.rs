@@ -10,7 +10,7 @@ pub fn mapped_normal(surface: Surface, t: &Texture, n: Vec3) -> Vec3 {
     let sign = if t.u.x * t.v.y - t.u.y * t.v.x > 0.0 { 1.0 } else { -1.0 };
     let along_u = (surface.du * t.v.y - surface.dv * t.v.x) * sign;
     let along_v = (surface.dv * t.u.x - surface.du * t.u.y) * sign;
-    let outward = surface.normal * surface.side;
+    let outward = surface.shading_normal * surface.side;
     let tangent = normalize(along_u - outward * dot(outward, along_u));
     let across = cross(outward, tangent);
     let bitangent = across * if dot(across, along_v) > 0.0 { 1.0 } else { -1.0 };

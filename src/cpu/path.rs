@@ -1,6 +1,6 @@
 //! Twin of `shaders/path.wgsl`: paths from the camera through mirrors and glass.
 
-use glam::Vec3;
+use glam::{UVec2, Vec3};
 
 use super::differential::{Arrival, Differential, reflected_differential, refracted_differential};
 use super::math::{dot, max};
@@ -16,8 +16,8 @@ pub struct Path {
     pub throughput: Vec3,
     pub depth: u32,
     pub branch: u32,
-    pub left: u32,
-    pub wall: u32,
+    pub left: UVec2,
+    pub wall: UVec2,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 //! Twin of `shaders/ray.wgsl`: rays, and the local space that every primitive is intersected in.
 
-use glam::{Vec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 
 use super::math::{cross, dot};
-use crate::pack::Primitive;
+use crate::pack::{FAR, NOTHING, Primitive};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
@@ -14,7 +14,24 @@ pub struct Ray {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     pub t: f32,
+    pub instance: u32,
     pub primitive: u32,
+    pub slot: u32,
+    pub barycentric: Vec2,
+}
+
+pub fn no_hit() -> Hit {
+    Hit {
+        t: FAR,
+        instance: 0,
+        primitive: NOTHING,
+        slot: 0,
+        barycentric: Vec2::ZERO,
+    }
+}
+
+pub fn by_itself(place: UVec2) -> u32 {
+    if place.x == 0 { place.y } else { NOTHING }
 }
 
 pub fn point_to_local(q: &Primitive, p: Vec3) -> Vec3 {
@@ -49,5 +66,12 @@ pub fn closer(hit: Hit, t: f32, i: u32, left: u32) -> Hit {
     Hit {
         t: if nearer { t } else { hit.t },
         primitive: if nearer { i } else { hit.primitive },
+        ..hit
     }
+}
+
+pub fn nearer_hit(a: Hit, b: Hit) -> Hit {
+    let lower = (b.instance < a.instance) | ((b.instance == a.instance) & (b.primitive < a.primitive));
+    let nearer = (b.t < FAR) & ((b.t < a.t) | ((b.t == a.t) & lower));
+    if nearer { b } else { a }
 }

@@ -1,6 +1,6 @@
 //! Twin of `shaders/surface.wgsl`: the point where a ray meets a primitive.
 
-use glam::{Vec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 
 use super::ellipsoid::ellipsoid_level;
 use super::math::{dot, max, positive_zero};
@@ -15,9 +15,10 @@ pub struct Surface {
     pub shading_normal: Vec3,
     pub wo: Vec3,
     pub start: Vec3,
+    pub bulge: Vec3,
     pub side: f32,
-    pub above: u32,
-    pub below: u32,
+    pub above: UVec2,
+    pub below: UVec2,
     pub uv: Vec2,
     pub du: Vec3,
     pub dv: Vec3,
@@ -52,8 +53,9 @@ pub fn surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surf
         wo: -ray.direction,
         start: position + normal * (epsilon * size),
         side,
-        above: if round & inside { NOTHING } else { i },
-        below: if round & !inside { NOTHING } else { i },
+        bulge: Vec3::ZERO,
+        above: UVec2::new(0, if round & inside { NOTHING } else { i }),
+        below: UVec2::new(0, if round & !inside { NOTHING } else { i }),
         uv: Vec2::ZERO,
         du: Vec3::ZERO,
         dv: Vec3::ZERO,
@@ -71,10 +73,14 @@ pub fn with_coordinates(surface: Surface, q: &Primitive) -> Surface {
     }
 }
 
+pub fn with_positive_zeros(v: Vec3) -> Vec3 {
+    Vec3::new(positive_zero(v.x), positive_zero(v.y), positive_zero(v.z))
+}
+
 pub fn first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit {
     let local = point_to_local(q, ray.origin + ray.direction * t);
     let n = primitive_normal(q, local);
-    let normal = Vec3::new(positive_zero(n.x), positive_zero(n.y), positive_zero(n.z));
+    let normal = with_positive_zeros(n);
     let uv = primitive_uv(q, local);
     FirstHit {
         normal,
@@ -82,5 +88,9 @@ pub fn first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit {
         uv: Vec2::new(positive_zero(uv.x), positive_zero(uv.y)),
         shape: q.shape,
         material: q.material,
+        shading_normal: normal,
+        primitive: q.shape,
+        barycentric: Vec2::ZERO,
+        unused: UVec2::ZERO,
     }
 }

@@ -6,6 +6,7 @@ use super::differential::Arrival;
 use super::footprint::{Footprint, footprint_ellipse, texture_footprint};
 use super::geometry::footprint_of;
 use super::math::{floor, log2, max};
+use super::mesh::Spot;
 use super::normal_map::mapped_normal;
 use super::procedural::procedural_share;
 use super::ray::Hit;
@@ -178,6 +179,7 @@ pub struct Appearance {
 
 pub fn appearance(
     scene: &Packed,
+    spot: &Spot,
     hit: Hit,
     material: &Material,
     surface: Surface,
@@ -186,12 +188,12 @@ pub fn appearance(
 ) -> Appearance {
     let mut look = Appearance {
         material: *material,
-        normal: surface.normal,
+        normal: surface.shading_normal,
     };
     if lookups == 0 {
         return look;
     }
-    let footprint = footprint_of(scene, hit, surface, at);
+    let footprint = footprint_of(spot, hit, surface, at);
     for i in 0..lookups as usize {
         let lookup = material.lookups[i];
         if lookup != 0 {

@@ -1,12 +1,12 @@
-//! Which primitives a ray meets: the same results as `shaders/buffers.wgsl` and `shaders/traverse.wgsl`.
+//! Which primitives outside of the tree a ray meets: the same results as `shaders/buffers.wgsl` and `shaders/traverse.wgsl`.
 
 use std::ops::Range;
 
 use super::primitive::intersect;
-use super::ray::{Hit, Ray, closer};
+use super::ray::{Hit, Ray, by_itself, closer, no_hit};
 use super::shadow::{Block, Cone, cone_to_light, may_block, shadow_bits};
 use super::surface::Surface;
-use crate::pack::{DISK, ELLIPSOID, FAR, Light, NOTHING, PLANE, Packed, RECTANGLE, TRIANGLE};
+use crate::pack::{DISK, ELLIPSOID, Light, PLANE, Packed, RECTANGLE, TRIANGLE};
 
 /// Calls a function with each kind of primitives as a constant, so that it is compiled for each.
 macro_rules! for_each_kind {
@@ -27,11 +27,8 @@ macro_rules! for_each_kind {
     }};
 }
 
-pub fn closest_hit(scene: &Packed, ray: Ray, left: u32, wall: u32) -> Hit {
-    let mut hit = Hit {
-        t: FAR,
-        primitive: NOTHING,
-    };
+pub fn closest_primitive(scene: &Packed, ray: Ray, left: u32, wall: u32) -> Hit {
+    let mut hit = no_hit();
     for_each_kind!(scene.kinds(), |kind, range| for i in range {
         let t = intersect(kind, &scene.primitives[i], i as u32 == wall, ray, hit.t);
         hit = closer(hit, t, i as u32, left);
@@ -39,7 +36,7 @@ pub fn closest_hit(scene: &Packed, ray: Ray, left: u32, wall: u32) -> Hit {
     hit
 }
 
-pub fn hidden_samples(scene: &Packed, surface: &Surface, light: &Light, block: Block) -> u32 {
+pub fn hidden_by_primitives(scene: &Packed, surface: &Surface, light: &Light, block: Block) -> u32 {
     let cone = cone_to_light(light, surface.start);
     let mut bits = 0;
     for_each_kind!(scene.shadow_casters(), |kind, range| {
@@ -62,8 +59,8 @@ fn hidden_by(
     for i in range {
         let (q, sphere) = (&scene.primitives[i], &scene.bounds[i]);
         let i = i as u32;
-        if (i != surface.above) & may_block(sphere, cone) {
-            bits |= shadow_bits(kind, q, cone.apex, i == surface.below, light, block);
+        if (i != by_itself(surface.above)) & may_block(sphere, cone) {
+            bits |= shadow_bits(kind, q, cone.apex, i == by_itself(surface.below), light, block);
         }
     }
     bits

@@ -15,6 +15,7 @@ use super::session::{Session, Settings};
 use super::source::Sources;
 use crate::gpu::Choice;
 use crate::gpu::compose::{self, Shaders};
+use crate::scene::is_course;
 
 /// Saves of each kind.
 const ROUNDS: usize = 7;
@@ -43,6 +44,10 @@ pub struct Measured {
 /// What to tell the user; `None` if it was stopped. The copies are gone in every case.
 pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Result<Vec<Measured>, Option<String>> {
     let told = |error: std::io::Error| Some(error.to_string());
+    if is_course(&sources.scene) {
+        let place = sources.scene.display();
+        return Err(Some(format!("{place}: must be TOML to be measured; it is JSON")));
+    }
     let text =
         fs::read_to_string(&sources.scene).map_err(|error| Some(format!("{}: {error}", sources.scene.display())))?;
     let folder = sources

@@ -30,6 +30,8 @@ pub enum Report {
         /// Since the first picture.
         seconds: f64,
     },
+    /// Something to know of the scene.
+    Note(String),
     /// The picture is larger than what can be shown: the size asked for, and the size of what is shown.
     Smaller([u32; 2], [u32; 2]),
     /// The camera was written into the scene file, or could not be.

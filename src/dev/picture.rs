@@ -157,8 +157,10 @@ pub struct Frame {
 /// How shapes and materials are called in the scene file.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
-    /// How many shapes there are; lights follow them.
+    /// How many shapes there are; instances of meshes follow them.
     pub shapes: u32,
+    /// How many instances there are; lights follow them.
+    pub instances: u32,
     /// The materials' names.
     pub materials: Vec<String>,
 }
@@ -252,13 +254,18 @@ impl Frame {
         if hit.shape == NOTHING {
             return vec![("hit", "nothing".to_string())];
         }
-        let shape = match hit.shape.checked_sub(self.names.shapes) {
-            None => format!("shapes[{}]", hit.shape),
-            Some(light) => format!("lights[{light}]"),
+        let Names { shapes, instances, .. } = self.names;
+        let shape = match (hit.shape.checked_sub(shapes), hit.shape.checked_sub(shapes + instances)) {
+            (None, _) => format!("shapes[{}]", hit.shape),
+            (Some(instance), None) => format!("instances[{instance}]"),
+            (_, Some(light)) => format!("lights[{light}]"),
         };
         let mut known = match aov {
             Aov::Normal => vec![("normal", numbers(hit.normal.into()))],
+            Aov::ShadingNormal => vec![("shading normal", numbers(hit.shading_normal.into()))],
             Aov::Depth => vec![("depth", numbers([hit.depth]))],
+            Aov::Barycentric => vec![("barycentric", numbers(hit.barycentric.into()))],
+            Aov::Primitive if hit.primitive != hit.shape => vec![("triangle", hit.primitive.to_string())],
             Aov::Uv => vec![("uv", numbers(hit.uv.into()))],
             _ => Vec::new(),
         };

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use toml_edit::{Document, Item, TableLike, Value};
 
 use super::camera::{Entry, entries};
-use crate::scene::{CameraDescription, Description};
+use crate::scene::{CameraDescription, Description, is_course};
 
 /// What a file was before a save and is after it.
 #[derive(Debug)]
@@ -85,6 +85,11 @@ pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
 }
 
 fn with_camera(text: &str, origin: &str, camera: &CameraDescription) -> Result<String, String> {
+    if is_course(Path::new(origin)) {
+        return Err(format!(
+            "{origin}: must be TOML for a camera to be saved into it; it is JSON"
+        ));
+    }
     let described = Description::parse(text, origin).map_err(|error| format!("mend the file first: {error}"))?;
     if std::mem::discriminant(&described.camera) != std::mem::discriminant(camera) {
         return Err(format!("{origin}: the file has another type of camera by now"));

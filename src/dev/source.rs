@@ -8,7 +8,7 @@ use std::time::SystemTime;
 use super::diagnostic::Diagnostic;
 use crate::gpu::compose::{self, Shaders};
 use crate::pack::{Packed, Specialization, pack};
-use crate::scene::{CameraDescription, Description, Integrator, Overrides, Scene, TextureDescription};
+use crate::scene::{CameraDescription, Description, Integrator, Overrides, Scene};
 
 /// Where the files are.
 #[derive(Clone, Debug)]
@@ -136,13 +136,9 @@ impl Sources {
         Snapshot { scene, shaders, files }
     }
 
-    /// The files that a scene names: the one place to add to when scenes name more.
+    /// The files that a scene names.
     fn assets(&self, described: &Description) -> impl Iterator<Item = PathBuf> {
-        let folder = self.scene.parent().unwrap_or(Path::new(""));
-        described.textures.values().filter_map(move |texture| match texture {
-            TextureDescription::Image(image) => Some(folder.join(&image.file)),
-            _ => None,
-        })
+        described.files(self.scene.parent().unwrap_or(Path::new("")))
     }
 
     fn stamp(&self, path: &Path) -> Stamp {

@@ -6,10 +6,8 @@ use std::fmt::Write;
 use bytemuck::cast_slice;
 use glam::UVec4;
 
-use crate::pack::{BLOCK, Field as _, Light, Material, Packed, Record, Texture};
+use crate::pack::{BLOCK, Field as _, Instance, Item, Light, MOST_OUTSIDE, Material, Node, Packed, Record, Texture};
 
-/// Larger scenes are read from buffers: compiling grows with every primitive.
-pub const MOST_PRIMITIVES: usize = 64;
 /// Scenes of more materials, lights and textures are read from buffers: compiling grows with every one of them, faster than
 /// in proportion.
 pub const MOST_RECORDS: usize = 512;
@@ -17,7 +15,7 @@ pub const MOST_RECORDS: usize = 512;
 /// [`bake`], if the scene is small enough.
 pub fn bake_if_small(packed: &Packed) -> Option<String> {
     let records = packed.materials.len() + packed.lights.len() + packed.textures.len();
-    (packed.primitives.len() <= MOST_PRIMITIVES && records <= MOST_RECORDS).then(|| bake(packed))
+    (packed.primitives.len() <= MOST_OUTSIDE && records <= MOST_RECORDS).then(|| bake(packed))
 }
 
 /// The WGSL text of the functions of `buffers.wgsl`, and of those that load records, for one scene.
@@ -26,8 +24,8 @@ pub fn bake(packed: &Packed) -> String {
     let records: Vec<String> = packed.primitives.iter().map(Record::constant).collect();
     write_function(
         &mut out,
-        "closest_hit(ray: Ray, left: u32, wall: u32) -> Hit",
-        "var hit = Hit(FAR, NOTHING);",
+        "closest_primitive(ray: Ray, left: u32, wall: u32) -> Hit",
+        "var hit = no_hit();",
         "hit",
         |body| {
             for (i, (p, record)) in packed.primitives.iter().zip(&records).enumerate() {
@@ -41,7 +39,7 @@ pub fn bake(packed: &Packed) -> String {
     );
     write_function(
         &mut out,
-        "hidden_samples(surface: Surface, light: Light, block: Block) -> u32",
+        "hidden_by_primitives(surface: Surface, light: Light, block: Block) -> u32",
         "let cone = cone_to_light(light, surface.start);\n    var bits = 0u;",
         "bits",
         |body| {
@@ -101,9 +99,19 @@ pub fn bake(packed: &Packed) -> String {
 /// The WGSL text of the functions that load records from the rows of one buffer, in the order of [`rows`].
 pub fn tables() -> String {
     let mut out = String::new();
-    from_rows::<Material>(&mut out, "load_material", "0u");
-    from_rows::<Light>(&mut out, "load_light", "counts.tables.x");
-    from_rows::<Texture>(&mut out, "load_texture", "counts.tables.y");
+    from_rows::<Material>(&mut out, "load_material", "records", "0u");
+    from_rows::<Light>(&mut out, "load_light", "records", "counts.tables.x");
+    from_rows::<Texture>(&mut out, "load_texture", "records", "counts.tables.y");
+    out
+}
+
+/// The WGSL text of the functions that load records of trees and meshes.
+pub fn tree_tables() -> String {
+    let mut out = String::new();
+    from_rows::<Item>(&mut out, "load_item", "nodes", "counts.tree.x");
+    from_rows::<Instance>(&mut out, "load_instance", "nodes", "counts.tree.y");
+    let _ = writeln!(out, "fn load_node(at: u32) -> Node {{");
+    from_row::<Node>(&mut out, "nodes");
     out
 }
 
@@ -117,15 +125,69 @@ pub fn rows(packed: &Packed) -> Vec<UVec4> {
     bytemuck::pod_collect_to_vec(&bytes.concat())
 }
 
-/// A function that loads record i of a table that starts at a row.
-fn from_rows<R: Record>(out: &mut String, name: &str, start: &str) {
+/// The rows of a scene's trees, of their items and of instances.
+pub fn node_rows(packed: &Packed) -> Vec<UVec4> {
+    let mut out: Vec<UVec4> = cast_slice(&packed.nodes).to_vec();
+    out.extend(cast_slice::<_, UVec4>(&packed.items));
+    out.extend(cast_slice::<_, UVec4>(&packed.instances));
+    out.extend(in_rows(&packed.group_words));
+    for mesh in &packed.meshes {
+        out.extend(cast_slice::<_, UVec4>(&mesh.nodes));
+    }
+    out
+}
+
+/// The rows of a scene's meshes: of each the triangles, the vertices, their attributes, and the triangles' groups.
+pub fn mesh_rows(packed: &Packed) -> Vec<UVec4> {
+    let mut out = Vec::new();
+    for mesh in &packed.meshes {
+        out.extend(&mesh.triangles);
+        out.extend(cast_slice::<_, UVec4>(&mesh.vertices));
+        out.extend(cast_slice::<_, UVec4>(&mesh.attributes));
+        out.extend(in_rows(&mesh.groups));
+    }
+    out
+}
+
+/// How many rows [`node_rows`] has.
+pub fn node_rows_count(packed: &Packed) -> usize {
+    let rows_of = |nodes: &[Node]| size_of_val(nodes) / size_of::<UVec4>();
+    let of_meshes: usize = packed.meshes.iter().map(|mesh| rows_of(&mesh.nodes)).sum();
+    let records = size_of_val(packed.items.as_slice()) + size_of_val(packed.instances.as_slice());
+    rows_of(&packed.nodes) + records / size_of::<UVec4>() + packed.group_words.len().div_ceil(4) + of_meshes
+}
+
+/// How many rows [`mesh_rows`] has.
+pub fn mesh_rows_count(packed: &Packed) -> usize {
+    let rows = packed.meshes.iter().map(|mesh| {
+        let of_vertices = mesh.vertices.len() + mesh.attributes.len();
+        mesh.triangles.len() + of_vertices + mesh.groups.len().div_ceil(4)
+    });
+    rows.sum()
+}
+
+/// Words in rows of four.
+fn in_rows(words: &[u32]) -> impl Iterator<Item = UVec4> {
+    words.chunks(4).map(|words| {
+        let word = |i: usize| words.get(i).copied().unwrap_or(0);
+        UVec4::new(word(0), word(1), word(2), word(3))
+    })
+}
+
+/// A function that loads record i of a table that starts at a row of a buffer.
+fn from_rows<R: Record>(out: &mut String, name: &str, buffer: &str, start: &str) {
     let (record, size) = (R::NAME, size_of::<R>() / size_of::<UVec4>());
     let _ = writeln!(
         out,
         "fn {name}(i: u32) -> {record} {{\n    let at = {start} + i * {size}u;"
     );
-    for row in 0..size {
-        let _ = writeln!(out, "    let r{row} = records[at + {row}u];");
+    from_row::<R>(out, buffer);
+}
+
+/// The rest of a function that loads the record which starts at the row `at` of a buffer.
+fn from_row<R: Record>(out: &mut String, buffer: &str) {
+    for row in 0..size_of::<R>() / size_of::<UVec4>() {
+        let _ = writeln!(out, "    let r{row} = {buffer}[at + {row}u];");
     }
     let _ = writeln!(out, "    return {};\n}}", R::from_rows());
 }

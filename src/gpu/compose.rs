@@ -5,7 +5,7 @@ use std::{fs, io, path::Path};
 
 use glam::Vec4;
 
-use super::bake::tables;
+use super::bake::{tables, tree_tables};
 use crate::pack::{self, FirstHit, Specialization};
 use crate::scene::Integrator;
 
@@ -48,11 +48,21 @@ pub static SHARED: &[File] = files![
     "normal_map.wgsl",
     "filter.wgsl",
     "adaptive.wgsl",
+    "slab.wgsl",
+    "node.wgsl",
+    "mesh.wgsl",
 ];
 /// What may take the place of quotients and square roots. It comes first, as naga wants functions before their calls.
 static ROUNDING_FILE: &[File] = files!["rounding.wgsl"];
 /// What every kernel adds to [`SHARED`]: its buffers, and the way through the scene.
-static KERNEL: &[File] = files!["bindings.wgsl", "receipt.wgsl", "traverse.wgsl", "geometry.wgsl"];
+static KERNEL: &[File] = files![
+    "bindings.wgsl",
+    "receipt.wgsl",
+    "traverse.wgsl",
+    "meshes.wgsl",
+    "tree.wgsl",
+    "geometry.wgsl"
+];
 /// What takes samples of a pixel.
 static SAMPLES: &[File] = files!["texture.wgsl", "pixel.wgsl"];
 static PHONG: &[File] = files!["integrators/phong.wgsl"];
@@ -200,6 +210,7 @@ impl Shaders {
                 source.append("(the tables of records)", &tables());
             }
         }
+        source.append("(the tables of trees)", &tree_tables());
         match texels {
             Some(text) => source.append("(the texels' buffers)", text),
             None => self.append(&mut source, TEXELS),

@@ -22,7 +22,7 @@ const WRITE: BufferBindingType = BufferBindingType::Storage { read_only: false }
 pub const GROUPS: [&[BufferBindingType]; 3] = [
     &[UNIFORM, WRITE, WRITE],
     &[UNIFORM, UNIFORM, UNIFORM, UNIFORM, READ, READ],
-    &[READ, READ],
+    &[READ, READ, READ, READ],
 ];
 
 /// The group of the scene, which ends with its texels.

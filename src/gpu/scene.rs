@@ -4,7 +4,7 @@ use bytemuck::bytes_of;
 use glam::Vec4;
 use wgpu::BufferUsages;
 
-use super::bake::rows;
+use super::bake::{mesh_rows, node_rows, rows};
 use super::device::Device;
 use super::pipeline::bind_group;
 use super::texels::TexelParts;
@@ -43,9 +43,11 @@ impl SceneBuffers {
             let of_scene: Vec<_> = [&camera].into_iter().chain(&of_scene).chain(&texels).collect();
             let primitives = device.upload(storage, &packed.primitives);
             let bounds = device.upload(storage, &packed.bounds);
+            let nodes = device.upload(storage, &node_rows(packed));
+            let meshes = device.upload(storage, &mesh_rows(packed));
             let groups = [
                 bind_group(device, &layouts[1], &of_scene),
-                bind_group(device, &layouts[2], &[&primitives, &bounds]),
+                bind_group(device, &layouts[2], &[&primitives, &bounds, &nodes, &meshes]),
             ];
             SceneBuffers { camera, groups }
         })

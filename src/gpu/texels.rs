@@ -2,6 +2,9 @@
 
 use std::fmt::Write as _;
 
+use glam::UVec4;
+
+use super::bake::{mesh_rows_count, node_rows_count};
 use super::device::Info;
 use super::pipeline::{GROUPS, SCENE, STORAGE_BUFFERS};
 use crate::error::RenderError;
@@ -26,6 +29,8 @@ impl TexelParts {
         let sizes = [
             ("shapes", size_of_val(packed.primitives.as_slice())),
             ("shapes' bounds", size_of_val(packed.bounds.as_slice())),
+            ("trees", size_of::<UVec4>() * node_rows_count(packed)),
+            ("meshes", size_of::<UVec4>() * mesh_rows_count(packed)),
             ("materials, lights and textures", {
                 let (materials, lights) = (packed.materials.as_slice(), packed.lights.as_slice());
                 size_of_val(materials) + size_of_val(lights) + size_of_val(packed.textures.as_slice())

@@ -11,12 +11,18 @@ use crate::pack::{FirstHit, NOTHING};
 pub enum Aov {
     /// The outward normal.
     Normal,
+    /// The normal that it is shaded by, without normal maps, outwards.
+    ShadingNormal,
     /// The distance along the ray.
     Depth,
     /// The texture coordinates.
     Uv,
-    /// The number of the shape in the scene file; lights follow the shapes.
+    /// The number of the shape in the scene file; of a mesh's triangle its number in the mesh.
     Primitive,
+    /// The number of the shape in the scene file: `[[shapes]]`, then `[[instances]]`, then lights.
+    Instance,
+    /// The barycentric coordinates, of its second and third vertex, in a mesh's triangle.
+    Barycentric,
     /// The number of samples.
     SampleCount,
     /// The variance of the pixel's value, as [`Film::variance`](crate::film::Film::variance) estimates it.
@@ -61,11 +67,14 @@ impl Channel {
 
 impl Aov {
     /// All of them.
-    pub const ALL: [Aov; 6] = [
+    pub const ALL: [Aov; 9] = [
         Aov::Normal,
+        Aov::ShadingNormal,
         Aov::Depth,
         Aov::Uv,
         Aov::Primitive,
+        Aov::Instance,
+        Aov::Barycentric,
         Aov::SampleCount,
         Aov::Variance,
     ];
@@ -79,9 +88,12 @@ impl Aov {
     pub fn name(self) -> &'static str {
         match self {
             Aov::Normal => "normal",
+            Aov::ShadingNormal => "shading_normal",
             Aov::Depth => "depth",
             Aov::Uv => "uv",
             Aov::Primitive => "primitive",
+            Aov::Instance => "instance",
+            Aov::Barycentric => "barycentric",
             Aov::SampleCount => "sample_count",
             Aov::Variance => "variance",
         }
@@ -95,12 +107,22 @@ impl Aov {
                 Channel::Float("normal.Y", |hit| hit.normal.y),
                 Channel::Float("normal.Z", |hit| hit.normal.z),
             ],
+            Aov::ShadingNormal => vec![
+                Channel::Float("shading_normal.X", |hit| hit.shading_normal.x),
+                Channel::Float("shading_normal.Y", |hit| hit.shading_normal.y),
+                Channel::Float("shading_normal.Z", |hit| hit.shading_normal.z),
+            ],
             Aov::Depth => vec![Channel::Float("depth.Z", |hit| hit.depth)],
             Aov::Uv => vec![
                 Channel::Float("uv.U", |hit| hit.uv.x),
                 Channel::Float("uv.V", |hit| hit.uv.y),
             ],
-            Aov::Primitive => vec![Channel::Whole("primitive.ID", |hit| hit.shape)],
+            Aov::Primitive => vec![Channel::Whole("primitive.ID", |hit| hit.primitive)],
+            Aov::Instance => vec![Channel::Whole("instance.ID", |hit| hit.shape)],
+            Aov::Barycentric => vec![
+                Channel::Float("barycentric.U", |hit| hit.barycentric.x),
+                Channel::Float("barycentric.V", |hit| hit.barycentric.y),
+            ],
             Aov::SampleCount => vec![Channel::Count("sample_count.N")],
             Aov::Variance => vec![
                 Channel::Variance("variance.R", 0),
@@ -134,22 +156,25 @@ impl Aov {
         match self {
             Aov::Normal => hit.normal * 0.5 + 0.5,
             Aov::Depth => Vec3::splat(1.0 / (1.0 + (hit.depth / middle_depth).powi(4))),
+            Aov::ShadingNormal => hit.shading_normal * 0.5 + 0.5,
             Aov::Uv => (hit.uv - hit.uv.floor()).extend(0.0),
-            _ => shape_color(hit.shape),
+            Aov::Barycentric => hit.barycentric.extend(1.0 - hit.barycentric.x - hit.barycentric.y),
+            Aov::Primitive => number_color(hit.primitive),
+            _ => number_color(hit.shape),
         }
     }
 }
 
-/// A colour for each shape's number: hues a golden section of the circle apart, so that no few numbers in a row look alike, in
+/// A colour for each number: hues a golden section of the circle apart, so that no few numbers in a row look alike, in
 /// three lightnesses. None is as dark as nothing is.
-fn shape_color(shape: u32) -> Vec3 {
+fn number_color(number: u32) -> Vec3 {
     const GOLDEN_SECTION: u32 = 0x9e37_79b9; // of 2^32
-    let hue = shape.wrapping_mul(GOLDEN_SECTION) as f32 / u32::MAX as f32 * 6.0;
+    let hue = number.wrapping_mul(GOLDEN_SECTION) as f32 / u32::MAX as f32 * 6.0;
     let pure = Vec3::new(
         (hue - 3.0).abs() - 1.0,
         2.0 - (hue - 2.0).abs(),
         2.0 - (hue - 4.0).abs(),
     );
-    let lightness = [1.0, 0.6, 0.8][shape as usize % 3];
+    let lightness = [1.0, 0.6, 0.8][number as usize % 3];
     (pure.clamp(Vec3::ZERO, Vec3::ONE) * 0.75 + 0.25) * lightness
 }

@@ -23,7 +23,7 @@ pub fn can_cast_shadow(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
     blocking.collect()
 }
 
-fn casts_shadow(scene: &Scene, material: usize) -> bool {
+pub fn casts_shadow(scene: &Scene, material: usize) -> bool {
     let is_glass = matches!(scene.materials[material], Material::Glass { .. });
     scene.render.shadows == Shadows::Opaque || !is_glass
 }
@@ -172,6 +172,10 @@ fn each_place(scene: &Scene, i: usize, normal: DVec3, mut point: impl FnMut(DVec
             point(center - normal * half);
         }
         Some(Geometry::Triangles(triangles)) => triangles.iter().flatten().for_each(|v| point(*v)),
+        Some(Geometry::Mesh { mesh, to_world, .. }) => {
+            mesh.corners()
+                .for_each(|corner| point(to_world.transform_point3(corner)));
+        }
         Some(Geometry::Plane { point: p, .. }) => point(*p),
         None => match &scene.lights[i - scene.shapes.len()] {
             Light::Rectangle { rectangle, .. } => parallelogram(rectangle),

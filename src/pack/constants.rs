@@ -1,9 +1,11 @@
 //! Constants of both sides.
 
 #[cfg(doc)]
-use super::{Camera, Material, Primitive, Texture};
+use super::{Camera, Instance, Item, Material, Primitive, Texture};
 #[cfg(doc)]
 use crate::scene::Pattern;
+
+use glam::UVec2;
 
 use super::record::constants;
 
@@ -26,6 +28,19 @@ constants! {
     pub const DISK: u32 = 4;
     /// How many kinds of primitives there are.
     pub const KINDS: u32 = 5;
+    /// [`Item::kind`]: an instance of a mesh.
+    pub const INSTANCE: u32 = KINDS;
+    /// In [`Item::kind`]: casts a shadow.
+    pub const CASTS_SHADOW: u32 = 0x100;
+    /// In the word of a mesh's group: casts no shadow. The other bits are its material.
+    pub const NO_SHADOW: u32 = 0x8000_0000;
+    /// [`Instance::shadows`]: some groups cast none.
+    pub const SOME_SHADOWS: u32 = 1;
+    /// Levels of nodes that a tree has at most.
+    pub const LEVELS: u32 = 32;
+    /// How much larger a mesh's boxes count, relative to the coordinates: 32 units of rounding, more than all that is
+    /// computed of a ray and a triangle loses.
+    pub const PAD: f32 = 32.0 / 16_777_216.0;
 
     /// [`Material::kind`]: Phong's reflection model.
     pub const PHONG: u32 = 0;
@@ -101,6 +116,8 @@ constants! {
     pub const FAR: f32 = f32::MAX;
     /// The number of a primitive that is none.
     pub const NOTHING: u32 = u32::MAX;
+    /// The instance and primitive of a ray's start that is on none.
+    pub const NOWHERE: UVec2 = UVec2::new(0, NOTHING);
     /// Shadow rays are traced in blocks of so many, a bit of a word for each.
     pub const BLOCK: u32 = 32;
 

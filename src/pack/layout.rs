@@ -1,7 +1,7 @@
 //! The records that the host uploads, on both sides: rows of 16 bytes, a `vec3f` followed by a scalar.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{UVec2, UVec4, Vec2, Vec3};
+use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 
 use super::constants::*;
 use super::record::{Field, Record, records, words_of_row};
@@ -154,6 +154,94 @@ records! {
         pub lights: UVec2,
         /// The rows where the tables of lights, x, and of textures, y, start; that of materials starts at 0.
         pub tables: UVec2,
+        /// The rows, behind the nodes of the scene's tree, where its items, x, instances, y, and groups' words, z, start.
+        pub tree: UVec4,
+        /// How much larger items' boxes count, relative to the coordinates, x; and the largest coordinate of any, y.
+        pub room: Vec4,
+    }
+
+    /// A node of a tree of boxes: eight children at most, each a node, a leaf or none.
+    pub struct Node {
+        /// The corner that its children's boxes are counted from.
+        pub base: Vec3,
+        /// The biased exponents of the steps along x, y and z, a byte for each; then bit i is set where child i is a node.
+        pub scales: u32,
+        /// The first of the children that are nodes; they lie together.
+        pub first_child: u32,
+        /// The first of the items in its leaves; they lie together.
+        pub first_item: u32,
+        /// A byte for each child that is a leaf: how many items it has, in three bits, and where from the first.
+        pub leaves: UVec2,
+        /// The lower sides of the children's boxes along x in steps from the corner, a byte for each.
+        pub low_x: UVec2,
+        /// Along y.
+        pub low_y: UVec2,
+        /// Along z.
+        pub low_z: UVec2,
+        /// The upper sides along x.
+        pub high_x: UVec2,
+        /// Along y.
+        pub high_y: UVec2,
+        /// Along z.
+        pub high_z: UVec2,
+    }
+
+    /// What the scene's tree is over: a primitive by itself or an instance of a mesh.
+    pub struct Item {
+        /// The lower corner of its box.
+        pub low: Vec3,
+        /// [`INSTANCE`] or the primitive's kind, and [`CASTS_SHADOW`].
+        pub kind: u32,
+        /// The upper corner of its box.
+        pub high: Vec3,
+        /// Its number among the instances or the primitives.
+        pub index: u32,
+    }
+
+    /// A mesh in the world: a point p is (x, y, z) (p - anchor) in the mesh's space.
+    pub struct Instance {
+        /// First row of the map to the mesh's space.
+        pub x: Vec3,
+        /// The row of its mesh's first node.
+        pub nodes: u32,
+        /// Second row.
+        pub y: Vec3,
+        /// The row of its mesh's first triangle.
+        pub triangles: u32,
+        /// Third row.
+        pub z: Vec3,
+        /// The row of its mesh's first vertex.
+        pub vertices: u32,
+        /// Where the mesh's origin is.
+        pub anchor: Vec3,
+        /// The row of its triangles' groups, [`NOTHING`] if there is one group alone.
+        pub groups: u32,
+        /// First column of the map from the mesh's space.
+        pub u: Vec3,
+        /// Its first group's word.
+        pub materials: u32,
+        /// Second column.
+        pub v: Vec3,
+        /// The number of its shape in the scene file.
+        pub shape: u32,
+        /// Third column.
+        pub w: Vec3,
+        /// The row of its mesh's first vertex's normal and v, [`NOTHING`] if there are none.
+        pub attributes: u32,
+        /// The largest coordinate of its mesh.
+        pub size: f32,
+        /// By how much the map to the mesh's space and back enlarges what is rounded.
+        pub condition: f32,
+        /// 1, or -1 if the map mirrors.
+        pub side: f32,
+        /// 1 if its vertices have texture coordinates, else 0.
+        pub has_uvs: u32,
+        /// [`SOME_SHADOWS`] where some of its groups cast none, else 0.
+        pub shadows: u32,
+        /// The number of its mesh.
+        pub mesh: u32,
+        /// 0.
+        pub unused: UVec2,
     }
 
     /// What the ray through a pixel's centre meets first; depth 0 and shape [`NOTHING`] where that is nothing.
@@ -168,6 +256,14 @@ records! {
         pub shape: u32,
         /// Index of the material.
         pub material: u32,
+        /// The normal that it is shaded by, outwards, without normal maps; unit length.
+        pub shading_normal: Vec3,
+        /// The number of the triangle in its mesh; of any other shape `shape`.
+        pub primitive: u32,
+        /// Barycentric coordinates of a mesh's triangle, of its second and third vertex.
+        pub barycentric: Vec2,
+        /// 0.
+        pub unused: UVec2,
     }
 
     /// One dispatch's share of the work: a rectangle of pixels and a range of their samples.

@@ -6,21 +6,27 @@ mod bounds;
 mod constants;
 mod extent_tree;
 pub mod filter;
+mod geometry;
 mod layout;
+mod mesh;
 mod origin;
 mod pyramid;
 mod record;
 mod specialization;
+pub mod tree;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
 use glam::{DMat3, DVec3, UVec2, UVec4, Vec4};
 
 use self::appearance::Appearances;
 pub use self::constants::*;
+pub use self::geometry::MOST_OUTSIDE;
 pub use self::layout::*;
+pub use self::mesh::PackedMesh;
 pub use self::record::{Field, Record};
 pub use self::specialization::Specialization;
 use crate::scene::{
@@ -48,10 +54,21 @@ pub struct Packed {
     pub integrator: Integrator,
     /// What belongs to the scene as a whole.
     pub environment: Environment,
-    /// The primitives, sorted by kind and in each kind by whether they can cast a shadow; lights' rectangles among them.
+    /// The primitives, lights' rectangles among them: those outside of the tree, sorted by kind and in each kind by whether they
+    /// can cast a shadow, then those in it.
     pub primitives: Vec<Primitive>,
     /// A sphere around each primitive.
     pub bounds: Vec<Sphere>,
+    /// The tree over all instances of meshes, and over the bounded primitives where these are many.
+    pub nodes: Vec<Node>,
+    /// What it is over, in the order of its leaves.
+    pub items: Vec<Item>,
+    /// The meshes in the world.
+    pub instances: Vec<Instance>,
+    /// The meshes.
+    pub meshes: Vec<Arc<PackedMesh>>,
+    /// For each group of each instance its material, and [`NO_SHADOW`].
+    pub group_words: Vec<u32>,
     /// The materials of the scene, then one for each area light.
     pub materials: Vec<Material>,
     /// The lights, rectangles first; each knows the primitive that shines, whose material knows the light.
@@ -88,6 +105,11 @@ impl Packed {
             environment,
             primitives,
             bounds,
+            nodes,
+            items,
+            instances,
+            meshes,
+            group_words,
             materials,
             lights,
             counts,
@@ -98,12 +120,19 @@ impl Packed {
             adaptive,
             specialization,
         } = self;
+        let same_meshes = || {
+            let mut pairs = meshes.iter().zip(&other.meshes);
+            meshes.len() == other.meshes.len() && pairs.all(|(a, b)| Arc::ptr_eq(a, b) || a == b)
+        };
         (origin, environment, counts, specialization)
             == (&other.origin, &other.environment, &other.counts, &other.specialization)
             && (primitives, bounds, materials, lights)
                 == (&other.primitives, &other.bounds, &other.materials, &other.lights)
             && (textures, texels, filter_table) == (&other.textures, &other.texels, &other.filter_table)
             && (integrator, pixel_samples, adaptive) == (&other.integrator, &other.pixel_samples, &other.adaptive)
+            && (nodes, items, instances, group_words)
+                == (&other.nodes, &other.items, &other.instances, &other.group_words)
+            && same_meshes()
     }
 
     /// The kinds of primitives that there are, each with where its primitives are.
@@ -146,11 +175,24 @@ pub fn pack(scene: &Scene) -> Packed {
     let has_area = |light: &Light| matches!(scene.lights[light.number as usize], scene::Light::Rectangle { .. });
     lights.sort_by_key(|light| !has_area(light));
     let blocking = blocking::can_cast_shadow(scene, &primitives);
+    let bounded = primitives.iter().filter(|primitive| primitive.kind != PLANE).count();
+    let is_in_tree = |primitive: &Primitive| bounded > MOST_OUTSIDE && primitive.kind != PLANE;
     let mut order: Vec<(Primitive, bool)> = primitives.into_iter().zip(blocking).collect();
-    order.sort_by_key(|(primitive, blocking)| (primitive.kind, !blocking));
+    order.sort_by_key(|(primitive, blocking)| (is_in_tree(primitive), primitive.kind, !blocking));
+    let outside = order.partition_point(|(primitive, _)| !is_in_tree(primitive));
     let area_lights = lights.iter().filter(|light| has_area(light)).count();
     connect_lights(&mut lights[..area_lights], &mut materials, &order, scene.shapes.len());
-    let counts = counts(&order, area_lights, lights.len(), materials.len());
+    let in_tree: Vec<_> = (outside as u32..)
+        .zip(&order[outside..])
+        .map(|(i, (p, casts))| (i, p, *casts))
+        .collect();
+    let trees = geometry::trees(scene, &in_tree, |material| blocking::casts_shadow(scene, material));
+    let kinds_in_tree = trees.items.iter().fold(0, |bits, item| bits | 1 << (item.kind & 0xff));
+    let counts = Counts {
+        tree: trees.rows().into(),
+        room: trees.room,
+        ..counts(&order[..outside], area_lights, lights.len(), materials.len())
+    };
     let kinds = |end: fn(UVec4) -> u32| {
         let kinds = (0..).zip(counts.primitives);
         kinds.fold(0, |bits, (kind, range)| bits | u32::from(end(range) > range.x) << kind)
@@ -164,6 +206,7 @@ pub fn pack(scene: &Scene) -> Packed {
     let specialization = Specialization {
         primitives: kinds(|range| range.z),
         shadow_casters: kinds(|range| range.y),
+        in_tree: kinds_in_tree,
         lights: u32::from(area_lights > 0) | u32::from(lights.len() > area_lights) << 1,
         pixel_pattern: pattern(pixels),
         pixel_side: side(pixels),
@@ -202,6 +245,11 @@ pub fn pack(scene: &Scene) -> Packed {
         },
         bounds: primitives.iter().map(bounds::sphere).collect(),
         primitives,
+        nodes: trees.nodes,
+        items: trees.items,
+        instances: trees.instances,
+        meshes: trees.meshes,
+        group_words: trees.group_words,
         materials,
         lights,
         counts,
@@ -235,6 +283,7 @@ fn counts(order: &[(Primitive, bool)], area_lights: usize, lights: usize, materi
         primitives,
         lights: UVec2::new(area_lights as u32, lights as u32),
         tables: UVec2::new(of_materials, of_materials + rows(lights, size_of::<Light>())),
+        ..Counts::zeroed()
     }
 }
 
@@ -378,6 +427,7 @@ fn pack_shapes(scene: &Scene) -> Vec<Primitive> {
                     primitives.push(primitive(TRIANGLE, v0, columns, material, number));
                 }
             }
+            Geometry::Mesh { .. } => {}
             Geometry::Plane {
                 point,
                 tangent,

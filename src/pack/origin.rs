@@ -32,6 +32,7 @@ pub fn seen_from(scene: &Scene, origin: DVec3) -> Cow<'_, Scene> {
             Geometry::Rectangle(shape) | Geometry::Disk(shape) => shape.center -= origin,
             Geometry::Ellipsoid { center, .. } => *center -= origin,
             Geometry::Triangles(triangles) => triangles.iter_mut().flatten().for_each(|v| *v -= origin),
+            Geometry::Mesh { to_world, .. } => to_world.translation -= origin,
             Geometry::Plane { point, .. } => *point -= origin,
         }
     }

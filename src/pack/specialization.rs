@@ -26,6 +26,9 @@ specialization! {
     primitives = "PRIMITIVES",
     /// Bit i is set if any of them can cast a shadow.
     shadow_casters = "SHADOW_CASTERS",
+    /// Bit i is set if primitives of kind i are in the scene's tree, the bit of [`INSTANCE`](super::INSTANCE) if instances of
+    /// meshes are.
+    in_tree = "IN_TREE",
     /// Bit 0 is set if there are lights with an area, bit 1 if there are others.
     lights = "LIGHTS",
     /// How the samples of a pixel are laid out.

@@ -18,7 +18,7 @@ pub enum SceneError {
         /// Why not.
         error: io::Error,
     },
-    /// The file is no TOML.
+    /// The file is no TOML, or JSON of another form than a scene's.
     #[error("{origin}:{line}:{column}: {message}")]
     Syntax {
         /// Name of the file.

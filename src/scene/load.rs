@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
+use super::course;
 use super::error::{At, Problem, SceneError};
 use super::parse::{NOT_UTF8, invalid, syntax_error};
 use super::validate::{adaptive, adaptive_error, sample_count, side};
@@ -64,7 +65,7 @@ fn set_count(samples: &mut SamplesDescription, count: Option<u32>) -> Result<(),
 }
 
 impl Scene {
-    /// Reads and checks a scene file.
+    /// Reads and checks a scene file: JSON where its name ends in `.json`, else TOML.
     ///
     /// # Errors
     ///
@@ -95,8 +96,8 @@ impl Scene {
         }
     }
 
-    /// Reads and checks the text of a scene file; `origin` is the file's name in messages, and files that the scene
-    /// names are beside it.
+    /// Reads and checks the text of a scene file; `origin` is the file's name in messages, which says by `.json` that
+    /// it is JSON, and files that the scene names are beside it.
     ///
     /// # Errors
     ///
@@ -123,11 +124,22 @@ fn parse_beside(text: &str, origin: &str, folder: &Path, overrides: &Overrides) 
     let mut description = Description::parse(text, origin)?;
     overrides.apply(&mut description).map_err(SceneError::Override)?;
     let mut assets = Assets::beside(folder);
+    let is_course = course::is_course(Path::new(origin));
+    if is_course {
+        assets.root = course::asset_root(folder);
+    }
     if let Some(root) = &overrides.asset_root {
         assets.root.clone_from(root);
     }
-    let scene = description.validate_with(&assets);
-    scene.map_err(|problem| invalid(text, origin, problem))
+    match (description.validate_with(&assets), is_course) {
+        (Ok(mut scene), true) => {
+            scene.notes.insert(0, course::NOTE.to_owned());
+            Ok(scene)
+        }
+        (Ok(scene), false) => Ok(scene),
+        (Err(problem), true) => Err(course::invalid(text, origin, problem)),
+        (Err(problem), false) => Err(invalid(text, origin, problem)),
+    }
 }
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {

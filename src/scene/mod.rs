@@ -3,21 +3,28 @@
 //! The way from the file: text → [`Description`] (what it says, field for field) → [`Scene`] (by
 //! [`Description::validate`] alone). Nothing behind a `Scene` checks again.
 
+mod course;
 mod decode;
 mod description;
 mod error;
 mod gray_exr;
 pub(crate) mod image_file;
 mod load;
+mod mesh_file;
 mod parse;
 pub(crate) mod texture;
 mod validate;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
+use crate::mesh::Mesh;
+
+#[cfg(feature = "dev")]
+pub(crate) use course::is_course;
 pub use description::*;
 pub use error::{KeyPath, Problem, SceneError};
 pub use image_file::Assets;
@@ -45,10 +52,14 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// The lights, in file order.
     pub lights: Vec<Light>,
-    /// The shapes, in file order.
+    /// The shapes, in file order, and then the instances of meshes, in theirs.
     pub shapes: Vec<Shape>,
-    /// The files that the scene names, its textures' images.
+    /// How many of the shapes are instances, the last ones.
+    pub instances: usize,
+    /// The files that the scene names: its textures' images, and meshes.
     pub files: Vec<PathBuf>,
+    /// What a user should know of the scene and of its meshes, if anything: `rock.ply: 12 degenerate triangles dropped`.
+    pub notes: Vec<String>,
 }
 
 /// A camera: a position, an orthonormal basis and a projection.
@@ -275,6 +286,15 @@ pub enum Geometry {
     /// Triangles that share one shape number (a triangle, the faces of a tetrahedron), each with its vertices
     /// counter-clockwise as seen from outside: normal (v1 - v0) x (v2 - v1).
     Triangles(Vec<[DVec3; 3]>),
+    /// A mesh of triangles.
+    Mesh {
+        /// Its triangles.
+        mesh: Arc<Mesh>,
+        /// The map from the mesh file's coordinates to the scene's; invertible.
+        to_world: DAffine3,
+        /// For each group of the mesh an index into [`Scene::materials`].
+        materials: Vec<usize>,
+    },
     /// An infinite plane.
     Plane {
         /// A point of it, the origin of its texture coordinates.

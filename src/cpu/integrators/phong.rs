@@ -3,8 +3,9 @@
 use glam::{UVec2, Vec3};
 
 use crate::cpu::differential::Differential;
-use crate::cpu::geometry::{arrival_of, material_of, surface_of};
+use crate::cpu::geometry::{arrival_of, closest_hit, hidden_samples, material_of, spot_of, surface_of};
 use crate::cpu::light::segments_to_light;
+use crate::cpu::mesh::Spot;
 use crate::cpu::path::{Path, Scattered, glass_path, mirrored_path, usable_normal};
 use crate::cpu::phong::{Lobes, phong_block};
 use crate::cpu::ray::{Hit, Ray};
@@ -13,8 +14,7 @@ use crate::cpu::sampling::{decision_bits, sample_key};
 use crate::cpu::shadow::Block;
 use crate::cpu::surface::Surface;
 use crate::cpu::texture::appearance;
-use crate::cpu::traverse::{closest_hit, hidden_samples};
-use crate::pack::{BLOCK, EMITTER, FAR, GLASS, GRID, LEAVES, Light, MIRROR, Material, NOTHING, Packed, SPLITS};
+use crate::pack::{BLOCK, EMITTER, GLASS, GRID, LEAVES, Light, MIRROR, Material, NOTHING, NOWHERE, Packed, SPLITS};
 
 pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVec2, sample: u32) -> Vec3 {
     let bounces = scene.specialization.bounces;
@@ -24,43 +24,42 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
         throughput: Vec3::ONE,
         depth: 0,
         branch: 0,
-        left: NOTHING,
-        wall: NOTHING,
+        left: NOWHERE,
+        wall: NOWHERE,
     };
     if bounces == 0 {
-        return radiance_from(
-            scene,
-            closest_hit(scene, path.ray, NOTHING, NOTHING),
-            path,
-            pixel,
-            sample,
-        );
+        let hit = closest_hit(scene, path.ray, NOWHERE, NOWHERE);
+        if hit.primitive == NOTHING {
+            return scene.environment.background;
+        }
+        return radiance_from(scene, &spot_of(scene, hit), hit, path, pixel, sample);
     }
     let mut sum = Vec3::ZERO;
     let mut pending = [path; SPLITS as usize];
     let mut waiting = 0;
     for _ in 0..LEAVES {
-        let mut hit = Hit {
-            t: FAR,
-            primitive: NOTHING,
-        };
+        let mut seen = scene.environment.background;
         while path.depth <= bounces {
-            hit = closest_hit(scene, path.ray, path.left, path.wall);
-            if !is_specular(scene, hit) {
+            let hit = closest_hit(scene, path.ray, path.left, path.wall);
+            if hit.primitive == NOTHING {
+                break;
+            }
+            let spot = spot_of(scene, hit);
+            if !is_specular(material_of(scene, &spot)) {
+                seen = radiance_from(scene, &spot, hit, path, pixel, sample);
                 break;
             }
             if path.depth == bounces {
-                hit.primitive = NOTHING;
                 break;
             }
-            let scattered = scatter(scene, hit, path, pixel, sample);
+            let scattered = scatter(scene, &spot, hit, path, pixel, sample);
             path = scattered.onward;
             if scattered.splits {
                 pending[waiting] = scattered.other;
                 waiting += 1;
             }
         }
-        sum += path.throughput * radiance_from(scene, hit, path, pixel, sample);
+        sum += path.throughput * seen;
         if waiting == 0 {
             break;
         }
@@ -70,19 +69,15 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
     sum
 }
 
-pub fn is_specular(scene: &Packed, hit: Hit) -> bool {
-    if hit.primitive == NOTHING {
-        return false;
-    }
-    let kind = material_of(scene, hit).kind;
-    (kind == MIRROR) | (kind == GLASS)
+pub fn is_specular(material: &Material) -> bool {
+    (material.kind == MIRROR) | (material.kind == GLASS)
 }
 
-pub fn scatter(scene: &Packed, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Scattered {
-    let mut surface = surface_of(scene, hit, path.ray);
-    let at = arrival_of(scene, hit, surface, path.ray, path.differential);
+pub fn scatter(scene: &Packed, spot: &Spot, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Scattered {
+    let mut surface = surface_of(scene, spot, hit, path.ray);
+    let at = arrival_of(scene, spot, hit, surface, path.ray, path.differential);
     let lookups = scene.specialization.specular_lookups;
-    let look = appearance(scene, hit, material_of(scene, hit), surface, at, lookups);
+    let look = appearance(scene, spot, hit, material_of(scene, spot), surface, at, lookups);
     let material = &look.material;
     surface.shading_normal = usable_normal(surface, look.normal);
     if material.kind == MIRROR {
@@ -93,20 +88,20 @@ pub fn scatter(scene: &Packed, hit: Hit, path: Path, pixel: UVec2, sample: u32) 
     glass_path(path, surface, at, material, unit_float(bits.x))
 }
 
-pub fn radiance_from(scene: &Packed, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Vec3 {
+pub fn radiance_from(scene: &Packed, spot: &Spot, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Vec3 {
     let s = &scene.specialization;
-    if hit.primitive == NOTHING {
-        return scene.environment.background;
-    }
-    let plain = material_of(scene, hit);
+    let plain = material_of(scene, spot);
     if plain.kind == EMITTER {
         return plain.emission;
     }
-    let mut surface = surface_of(scene, hit, path.ray);
-    let at = arrival_of(scene, hit, surface, path.ray, path.differential);
-    let look = appearance(scene, hit, plain, surface, at, s.lookups);
+    let mut surface = surface_of(scene, spot, hit, path.ray);
+    let at = arrival_of(scene, spot, hit, surface, path.ray, path.differential);
+    let look = appearance(scene, spot, hit, plain, surface, at, s.lookups);
     let material = &look.material;
     surface.shading_normal = look.normal;
+    if !scene.instances.is_empty() {
+        surface.start += surface.bulge;
+    }
     let mut sum = scene.environment.ambient * material.ambient;
     let (area_lights, delta_lights) = scene.lights.split_at(scene.counts.lights.x as usize);
     for light in area_lights {

@@ -218,6 +218,10 @@ impl Painter {
                     let cut = self.cut.take();
                     self.refused.retain(|known| Some(known) != cut.as_ref());
                 }
+                let known = self.loaded.as_ref().map_or(&[][..], |old| &old.scene.notes);
+                for note in loaded.scene.notes.iter().filter(|note| !known.contains(note)) {
+                    (self.report)(Report::Note(note.clone()));
+                }
                 self.loaded = Some(loaded);
             }
             Err(problem) => self.problems.scene = Some(problem),

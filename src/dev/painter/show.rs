@@ -74,7 +74,8 @@ impl Painter {
             ..Header::default()
         };
         let names = self.loaded.as_ref().map(|loaded| Names {
-            shapes: loaded.scene.shapes.len() as u32,
+            shapes: (loaded.scene.shapes.len() - loaded.scene.instances) as u32,
+            instances: loaded.scene.instances as u32,
             materials: loaded.materials.clone(),
         });
         let bins = self.loaded.iter().flat_map(|loaded| &loaded.packed.filter_table);

@@ -6,12 +6,13 @@
 
 mod light;
 mod material;
+mod mesh;
 mod render;
 mod shape;
 pub(super) mod tagged;
 mod texture;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -23,6 +24,7 @@ use super::Assets;
 
 pub use self::light::*;
 pub use self::material::*;
+pub use self::mesh::*;
 pub use self::render::*;
 pub use self::shape::*;
 pub use self::texture::*;
@@ -44,6 +46,12 @@ pub struct Description {
     pub lights: Vec<LightDescription>,
     /// `[[shapes]]`
     pub shapes: Vec<ShapeDescription>,
+    /// `[meshes.NAME]`
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub meshes: BTreeMap<String, MeshFileDescription>,
+    /// `[[instances]]`
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub instances: Vec<InstanceDescription>,
 }
 
 impl Description {
@@ -57,6 +65,8 @@ impl Description {
             materials: BTreeMap::new(),
             lights: Vec::new(),
             shapes: Vec::new(),
+            meshes: BTreeMap::new(),
+            instances: Vec::new(),
         }
     }
 
@@ -90,6 +100,18 @@ impl Description {
         self
     }
 
+    /// The scene with a further mesh for instances to name, in place of any that has its name.
+    pub fn with_mesh(mut self, name: impl Into<String>, mesh: MeshFileDescription) -> Self {
+        self.meshes.insert(name.into(), mesh);
+        self
+    }
+
+    /// The scene with a further instance of a mesh.
+    pub fn with_instance(mut self, instance: InstanceDescription) -> Self {
+        self.instances.push(instance);
+        self
+    }
+
     /// The files that it names, without the images in memory.
     pub(super) fn files_beside(&self, assets: &Assets) -> impl Iterator<Item = PathBuf> {
         let in_memory = |path: &PathBuf| {
@@ -101,10 +123,17 @@ impl Description {
 
     /// The files that it names, which are relative to the scene file's folder.
     pub fn files(&self, folder: &Path) -> impl Iterator<Item = PathBuf> {
-        self.textures.values().filter_map(move |texture| match texture {
-            TextureDescription::Image(image) => Some(folder.join(&image.file)),
+        let images = self.textures.values().filter_map(|texture| match texture {
+            TextureDescription::Image(image) => Some(&image.file),
             _ => None,
-        })
+        });
+        let shapes = self.shapes.iter().filter_map(|shape| match shape {
+            ShapeDescription::Mesh(mesh) => Some(&mesh.file),
+            _ => None,
+        });
+        let meshes = self.meshes.values().map(|mesh| &mesh.file);
+        let files: BTreeSet<&String> = images.chain(shapes).chain(meshes).collect();
+        files.into_iter().map(move |file| folder.join(file))
     }
 }
 

@@ -4,6 +4,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
+use super::mesh::MeshDescription;
 use super::tagged::{ReadError, Tagged, tagged};
 
 tagged! {
@@ -23,6 +24,8 @@ tagged! {
         "tetrahedron" => Tetrahedron(TetrahedronDescription),
         /// An infinite plane.
         "plane" => Plane(PlaneDescription),
+        /// A mesh of triangles, from a file.
+        "mesh" => Mesh(MeshDescription),
     }
 }
 

@@ -5,6 +5,7 @@ mod syntax;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
+use std::path::Path;
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -12,20 +13,28 @@ use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
 use self::parts::{Broken, Kind, LARGEST, Parts};
+use super::course;
 use super::description::tagged::{ReadError, Tagged};
-use super::description::{Description, LightDescription, MaterialDescription, ShapeDescription, TextureDescription};
+use super::description::{
+    Description, InstanceDescription, LightDescription, MaterialDescription, MeshFileDescription, ShapeDescription,
+    TextureDescription,
+};
 use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
 use super::validate::{DEEPEST, MOST};
 
 pub(super) use syntax::{NOT_UTF8, syntax_error};
 
 impl Description {
-    /// Reads the text of a scene file; `origin` is the file's name in messages. Values are not checked yet.
+    /// Reads the text of a scene file; `origin` is the file's name in messages, which says by `.json` that it is JSON.
+    /// Values are not checked yet.
     ///
     /// # Errors
     ///
-    /// Text that is no TOML, unknown and missing keys, unknown types, and values of the wrong type.
+    /// Text that is no TOML or JSON, unknown and missing keys, unknown types, and values of the wrong type.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SceneError> {
+        if course::is_course(Path::new(origin)) {
+            return course::read(text, origin);
+        }
         let broken = |broken: Broken| syntax_error(text, origin, broken.at, &broken.message);
         let parts = Parts::of(text);
         if let Some(large) = parts.too_large() {
@@ -113,6 +122,10 @@ struct Sections {
     lights: Vec<Table>,
     #[serde(default)]
     shapes: Vec<Table>,
+    #[serde(default)]
+    meshes: BTreeMap<String, Table>,
+    #[serde(default)]
+    instances: Vec<Table>,
 }
 
 fn read_file(file: Table) -> Result<Description, Problem> {
@@ -121,10 +134,12 @@ fn read_file(file: Table) -> Result<Description, Problem> {
         image: read(sections.image).at("image")?,
         camera: read_tagged(sections.camera, Some("perspective")).at("camera")?,
         render: read(sections.render).at("render")?,
-        textures: read_map(sections.textures).at("textures")?,
-        materials: read_map(sections.materials).at("materials")?,
-        lights: read_list(sections.lights).at("lights")?,
-        shapes: read_list(sections.shapes).at("shapes")?,
+        textures: read_map(sections.textures, tagged).at("textures")?,
+        materials: read_map(sections.materials, tagged).at("materials")?,
+        lights: read_list(sections.lights, tagged).at("lights")?,
+        shapes: read_list(sections.shapes, tagged).at("shapes")?,
+        meshes: read_map(sections.meshes, read).at("meshes")?,
+        instances: read_list(sections.instances, read).at("instances")?,
     })
 }
 
@@ -140,6 +155,8 @@ fn read_parts(parts: &Parts) -> Result<Option<Read<Description>>, Broken> {
     let mut materials: Read<BTreeMap<String, MaterialDescription>> = Ok(BTreeMap::new());
     let mut lights: Read<Vec<LightDescription>> = Ok(Vec::new());
     let mut shapes: Read<Vec<ShapeDescription>> = Ok(Vec::new());
+    let mut meshes: Read<BTreeMap<String, MeshFileDescription>> = Ok(BTreeMap::new());
+    let mut instances: Read<Vec<InstanceDescription>> = Ok(Vec::new());
     for part in &parts.parts {
         match &rest {
             // What comes first in the text is told first.
@@ -156,10 +173,12 @@ fn read_parts(parts: &Parts) -> Result<Option<Read<Description>>, Broken> {
             return parts.twice(name, part).map_or(Ok(None), Err);
         }
         match (part.kind, name) {
-            (Kind::Textures, Some(name)) => add_named(&mut textures, name, table),
-            (Kind::Materials, Some(name)) => add_named(&mut materials, name, table),
-            (Kind::Lights, None) => add(&mut lights, table),
-            (Kind::Shapes, None) => add(&mut shapes, table),
+            (Kind::Textures, Some(name)) => add_named(&mut textures, name, table, tagged),
+            (Kind::Materials, Some(name)) => add_named(&mut materials, name, table, tagged),
+            (Kind::Lights, None) => add(&mut lights, table, tagged),
+            (Kind::Shapes, None) => add(&mut shapes, table, tagged),
+            (Kind::Meshes, Some(name)) => add_named(&mut meshes, name, table, read),
+            (Kind::Instances, None) => add(&mut instances, table, read),
             _ => return Ok(None),
         }
     }
@@ -179,44 +198,55 @@ fn read_parts(parts: &Parts) -> Result<Option<Read<Description>>, Broken> {
         if has(Kind::Shapes) {
             all.shapes = shapes.at("shapes")?;
         }
+        if has(Kind::Meshes) {
+            all.meshes = meshes.at("meshes")?;
+        }
+        if has(Kind::Instances) {
+            all.instances = instances.at("instances")?;
+        }
         Ok(all)
     };
     Ok(Some(others.and_then(together)))
 }
 
 /// After a problem no more is read.
-fn add_named<T: Tagged>(read: &mut Read<BTreeMap<String, T>>, name: String, table: Table) {
-    let Ok(map) = read else { return };
-    match read_tagged(table, None).at(name.as_str()) {
+fn add_named<T>(all: &mut Read<BTreeMap<String, T>>, name: String, table: Table, read: fn(Table) -> Read<T>) {
+    let Ok(map) = all else { return };
+    match read(table).at(name.as_str()) {
         Ok(value) => {
             map.insert(name, value);
         }
-        Err(problem) => *read = Err(problem),
+        Err(problem) => *all = Err(problem),
     }
 }
 
-fn add<T: Tagged>(read: &mut Read<Vec<T>>, table: Table) {
-    let Ok(list) = read else { return };
-    match read_tagged(table, None).at(list.len()) {
+fn add<T>(all: &mut Read<Vec<T>>, table: Table, read: fn(Table) -> Read<T>) {
+    let Ok(list) = all else { return };
+    match read(table).at(list.len()) {
         Ok(value) => list.push(value),
-        Err(problem) => *read = Err(problem),
+        Err(problem) => *all = Err(problem),
     }
 }
 
-fn read_map<T: Tagged>(tables: BTreeMap<String, Table>) -> Result<BTreeMap<String, T>, Problem> {
+fn read_map<T>(tables: BTreeMap<String, Table>, read: fn(Table) -> Read<T>) -> Read<BTreeMap<String, T>> {
     let read = |(name, table): (String, Table)| {
-        let value = read_tagged(table, None).at(name.as_str());
+        let value = read(table).at(name.as_str());
         value.map(|value| (name, value))
     };
     tables.into_iter().map(read).collect()
 }
 
-fn read_list<T: Tagged>(tables: Vec<Table>) -> Result<Vec<T>, Problem> {
+fn read_list<T>(tables: Vec<Table>, read: fn(Table) -> Read<T>) -> Read<Vec<T>> {
     let tables = tables.into_iter().enumerate();
-    tables.map(|(i, table)| read_tagged(table, None).at(i)).collect()
+    tables.map(|(i, table)| read(table).at(i)).collect()
 }
 
-fn read<T: DeserializeOwned>(table: Table) -> Result<T, Problem> {
+/// Reads a table that says of what type it is.
+fn tagged<T: Tagged>(table: Table) -> Read<T> {
+    read_tagged(table, None)
+}
+
+pub(super) fn read<T: DeserializeOwned>(table: Table) -> Result<T, Problem> {
     // The copy is for the message: reading consumes the values.
     serde_path_to_error::deserialize(table.clone()).map_err(|error| explain(error, table, false))
 }
@@ -263,21 +293,13 @@ fn show(value: &Value) -> String {
 
 /// Makes a problem of serde's error while reading `table`, which has lost its key `type` if it is `tagged`.
 fn explain(error: ReadError, table: Table, tagged: bool) -> Problem {
-    let mut path = Vec::new();
+    let mut path = segments(error.path());
     let mut value = Some(&Value::Table(table));
-    for segment in error.path() {
-        use serde_path_to_error::Segment as Step;
-        match segment {
-            Step::Map { key } => {
-                path.push(Segment::Key(key.clone()));
-                value = value.and_then(|value| value.get(key));
-            }
-            Step::Seq { index } => {
-                path.push(Segment::Index(*index));
-                value = value.and_then(|value| value.get(*index));
-            }
-            Step::Enum { .. } | Step::Unknown => {}
-        }
+    for segment in &path {
+        value = match segment {
+            Segment::Key(key) => value.and_then(|value| value.get(key)),
+            Segment::Index(index) => value.and_then(|value| value.get(*index)),
+        };
     }
     let message = error.inner().message();
     // serde tells the name and the rule in text only.
@@ -303,6 +325,7 @@ fn explain(error: ReadError, table: Table, tagged: bool) -> Problem {
             "a sequence of 3 f64 values" => "a list of 3 numbers",
             "an array of length 2" => "a list of 2 numbers",
             "an array of length 3" => "a list of 3 points",
+            "an array of length 4" if path.contains(&Segment::from("matrix")) => "a list of 4 numbers",
             "an array of length 4" => "a list of 4 points",
             "fewer elements in array" => "a shorter list",
             "a map" => "a table",
@@ -310,6 +333,8 @@ fn explain(error: ReadError, table: Table, tagged: bool) -> Problem {
             other => &other.replace('`', "\""),
         };
         format!("{} must be {rule}", show(value))
+    } else if let (true, Some(value)) = (message.starts_with("must be"), value) {
+        format!("{} {message}", show(value))
     } else {
         message.to_owned()
     };
@@ -317,6 +342,17 @@ fn explain(error: ReadError, table: Table, tagged: bool) -> Problem {
         key: KeyPath(path),
         message,
     }
+}
+
+/// The steps of serde's path.
+pub(super) fn segments(path: &serde_path_to_error::Path) -> Vec<Segment> {
+    use serde_path_to_error::Segment as Step;
+    let steps = path.iter().filter_map(|segment| match segment {
+        Step::Map { key } => Some(Segment::Key(key.clone())),
+        Step::Seq { index } => Some(Segment::Index(*index)),
+        Step::Enum { .. } | Step::Unknown => None,
+    });
+    steps.collect()
 }
 
 /// What a key's whole number must be. How small it may be exactly is checked later, beside other keys.

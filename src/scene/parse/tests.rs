@@ -38,7 +38,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[film]\n",
             1,
-            "film: unknown key; the keys here are \"image\", \"camera\", \"render\", \"textures\", \"materials\", \"lights\", \"shapes\"",
+            "film: unknown key; the keys here are \"image\", \"camera\", \"render\", \"textures\", \"materials\", \"lights\", \"shapes\", \"meshes\", \"instances\"",
         ),
         (
             "type = 'fisheye'",
@@ -115,7 +115,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[[shapes]]\n[[shapes]]",
             1,
-            "shapes[0].type: is missing; it is one of \"rectangle\", \"disk\", \"ellipsoid\", \"sphere\", \"triangle\", \"tetrahedron\", \"plane\"",
+            "shapes[0].type: is missing; it is one of \"rectangle\", \"disk\", \"ellipsoid\", \"sphere\", \"triangle\", \"tetrahedron\", \"plane\", \"mesh\"",
         ),
         (
             "[[lights]]\ntype = 'directional'\ndirection = [0, 0, 1]\ncolor = [1, 1, 1]\n[[lights]]\ntype = 'point'\nvertex = 3",
@@ -253,6 +253,8 @@ fn the_page_has_every_key() {
     check_types::<MaterialDescription>(START, "[materials.a]", "[materials.NAME]");
     check_types::<LightDescription>(START, "[[lights]]", "[[lights]]");
     check_types::<ShapeDescription>(START, "[[shapes]]", "[[shapes]]");
+    check_keys(&format!("{START}[meshes.a]"), "## `[meshes.NAME]`");
+    check_keys(&format!("{START}[[instances]]"), "## `[[instances]]`");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! The limits keep all that is computed from a scene, squares of lengths included, inside the range of `f32`.
 
 mod appearance;
+mod mesh;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,12 +11,14 @@ use std::path::Path;
 use glam::DVec3;
 
 use self::appearance::Textures;
+use self::mesh::Known;
 use super::error::{At, Problem};
 use super::parse::list;
 use super::{
     Adaptive, AdaptiveDescription, Assets, Camera, CameraDescription, Color, Description, EllipsoidDescription,
-    Geometry, Light, LightDescription, Material, Parallelogram, Pattern, PixelFilter, PixelFilterDescription,
-    Projection, Render, RenderDescription, Samples, SamplesDescription, Scene, Shape, ShapeDescription,
+    Geometry, InstanceDescription, Light, LightDescription, Parallelogram, Pattern, PixelFilter,
+    PixelFilterDescription, Projection, Render, RenderDescription, Samples, SamplesDescription, Scene, Shape,
+    ShapeDescription,
 };
 
 /// Largest absolute coordinate.
@@ -62,7 +65,20 @@ impl Description {
             .map(|(name, description)| known.material(description).at(name.as_str()))
             .collect::<Checked<Vec<_>>>()
             .at("materials")?;
-        let shapes = each(&self.shapes, |description| shape(description, &indices, &materials)).at("shapes")?;
+        let known = Known {
+            names: &indices,
+            materials: &materials,
+            assets,
+        };
+        let mut shapes = each(&self.shapes, |description| shape(description, &known)).at("shapes")?;
+        let meshes = (self.meshes.iter())
+            .map(|(name, description)| Ok((name.as_str(), mesh::named(description, assets).at(name.as_str())?)))
+            .collect::<Checked<BTreeMap<_, _>>>()
+            .at("meshes")?;
+        let instance = |description: &InstanceDescription| mesh::instance(description, &meshes, &known);
+        shapes.extend(each(&self.instances, instance).at("instances")?);
+        mesh::few_groups(&shapes).at("instances")?;
+        let notes = mesh::notes(&self.shapes, &shapes, &meshes);
         Ok(Scene {
             width: side(self.image.width).at("width").at("image")?,
             height: side(self.image.height).at("height").at("image")?,
@@ -72,7 +88,9 @@ impl Description {
             textures,
             materials,
             shapes,
+            instances: self.instances.len(),
             files: self.files_beside(assets).collect(),
+            notes,
         })
     }
 }
@@ -234,7 +252,7 @@ fn camera(description: &CameraDescription) -> Checked<Camera> {
     })
 }
 
-fn light(description: &LightDescription) -> Checked<Light> {
+pub(super) fn light(description: &LightDescription) -> Checked<Light> {
     Ok(match description {
         LightDescription::Rectangle(light) => Light::Rectangle {
             rectangle: rectangle(light.center, light.size, light.normal, light.tangent)?,
@@ -251,7 +269,8 @@ fn light(description: &LightDescription) -> Checked<Light> {
     })
 }
 
-fn shape(description: &ShapeDescription, indices: &BTreeMap<&str, usize>, materials: &[Material]) -> Checked<Shape> {
+fn shape(description: &ShapeDescription, known: &Known) -> Checked<Shape> {
+    let (indices, materials) = (known.names, known.materials);
     let (geometry, name) = match description {
         ShapeDescription::Rectangle(shape) => {
             let rectangle = rectangle(shape.center, shape.size, shape.normal, shape.tangent)?;
@@ -282,6 +301,7 @@ fn shape(description: &ShapeDescription, indices: &BTreeMap<&str, usize>, materi
         }
         ShapeDescription::Triangle(shape) => (triangle(shape.vertices).at("vertices")?, &shape.material),
         ShapeDescription::Tetrahedron(shape) => (tetrahedron(shape.vertices).at("vertices")?, &shape.material),
+        ShapeDescription::Mesh(shape) => return mesh::mesh(shape, known),
         ShapeDescription::Plane(shape) => {
             let point = point(shape.point).at("point")?;
             let (tangent, bitangent) = frame(shape.normal, shape.tangent)?;
@@ -391,7 +411,7 @@ fn frame(normal: DVec3, tangent: DVec3) -> Checked<(DVec3, DVec3)> {
     Ok((t, n.cross(t)))
 }
 
-fn point(p: DVec3) -> Checked<DVec3> {
+pub(super) fn point(p: DVec3) -> Checked<DVec3> {
     for x in p.to_array() {
         check(x.abs() <= FARTHEST, || {
             let (x, limit) = (number(x), number(FARTHEST));

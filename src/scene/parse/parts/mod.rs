@@ -1,5 +1,5 @@
 //! A scene file in parts, so that a parser holds one of them at a time: what it makes of a text takes some 30 times the
-//! text's memory. A part is a table of `[[shapes]]`, `[[lights]]`, `[materials.NAME]` or `[textures.NAME]`; what is
+//! text's memory. A part is a table of `[[shapes]]`, `[[lights]]`, `[materials.NAME]`, `[textures.NAME]`, `[meshes.NAME]` or `[[instances]]`; what is
 //! outside of these is one part.
 
 use std::ops::Range;
@@ -21,10 +21,19 @@ pub enum Kind {
     Materials,
     Lights,
     Shapes,
+    Meshes,
+    Instances,
 }
 
 impl Kind {
-    const ALL: [Kind; 4] = [Kind::Textures, Kind::Materials, Kind::Lights, Kind::Shapes];
+    const ALL: [Kind; 6] = [
+        Kind::Textures,
+        Kind::Materials,
+        Kind::Lights,
+        Kind::Shapes,
+        Kind::Meshes,
+        Kind::Instances,
+    ];
 
     pub fn name(self) -> &'static str {
         match self {
@@ -32,12 +41,14 @@ impl Kind {
             Kind::Materials => "materials",
             Kind::Lights => "lights",
             Kind::Shapes => "shapes",
+            Kind::Meshes => "meshes",
+            Kind::Instances => "instances",
         }
     }
 
     /// Whether its tables have names.
     fn is_map(self) -> bool {
-        matches!(self, Kind::Textures | Kind::Materials)
+        matches!(self, Kind::Textures | Kind::Materials | Kind::Meshes)
     }
 }
 
@@ -77,7 +88,7 @@ impl Broken {
     /// A text that would have to be read as a whole, and is too large for that.
     pub fn whole(text: &str) -> Broken {
         let size = text.len() as f64 / f64::from(1 << 20);
-        let rule = "every texture, material, light and shape must have a header of its own, such as [[shapes]]";
+        let rule = "every texture, material, light, shape, mesh and instance must have a header of its own, such as [[shapes]]";
         let message = format!(
             "in a file larger than {} MiB {rule}; it has {size:.1} MiB",
             LARGEST >> 20

@@ -123,7 +123,9 @@ fn parts_and_what_must_be_read_as_a_whole_have_a_largest_size() {
     );
     let rest = format!("{START}x = [{many}]\n{SPHERE}");
     assert!(told(&rest).starts_with("s:1:1: "));
-    assert!(told(&rest).contains("in a file larger than 4 MiB every texture, material, light and shape"));
+    assert!(
+        told(&rest).contains("in a file larger than 4 MiB every texture, material, light, shape, mesh and instance")
+    );
     let spheres = SPHERE.repeat(LARGEST / SPHERE.len() + 1);
     assert!(by_parts(&format!("{START}{spheres}{RED}")).unwrap().shapes.len() > 50_000);
     assert!(told(&format!("{START}{spheres}[materials]\n{RED}")).contains("must have a header of its own"));

@@ -1,0 +1,221 @@
+// Triangles of meshes: how rays meet them, and what their surface is like. They are intersected in the mesh's own space, by rays
+// whose directions are not made unit vectors there, so that distances are the world's.
+
+// A ray's direction, as the test of triangles wants it: the axis along which it is longest, and how far it goes along the two
+// next ones, and in all, for a step of 1 along that.
+struct Shear {
+    axis: u32,
+    slope: vec2f,
+    scale: f32,
+}
+
+fn shear_of(direction: vec3f) -> Shear {
+    let size = abs(direction);
+    let axis = select(select(2u, 1u, size.y >= size.z), 0u, (size.x >= size.y) & (size.x >= size.z));
+    let d = permuted(direction, axis);
+    return Shear(axis, vec2f(d.x / d.z, d.y / d.z), 1.0 / d.z);
+}
+
+// The coordinates in the order of the axes after `axis`, which comes last.
+fn permuted(v: vec3f, axis: u32) -> vec3f {
+    return select(select(v.xyz, v.zxy, axis == 1u), v.yzx, axis == 0u);
+}
+
+// A point, from the ray's origin, in the space where the ray is the z axis.
+fn sheared(v: vec3f, shear: Shear) -> vec3f {
+    let p = permuted(v, shear.axis);
+    return vec3f(p.x - shear.slope.x * p.z, p.y - shear.slope.y * p.z, shear.scale * p.z);
+}
+
+// Where a ray meets a triangle.
+struct Crossing {
+    met: bool,
+    t: f32,
+    barycentric: vec2f,    // of the second and third vertex
+}
+
+// Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013; what is exactly on an edge is inside. The ray
+// must pass the triangle's own box too, and meets the triangle there: so a tree of boxes leaves no hit out.
+fn triangle_crossing(v0: vec3f, v1: vec3f, v2: vec3f, origin: vec3f, shear: Shear, s: Slabs) -> Crossing {
+    let a = sheared(v0 - origin, shear);
+    let b = sheared(v1 - origin, shear);
+    let c = sheared(v2 - origin, shear);
+    let u = c.x * b.y - c.y * b.x;
+    let v = a.x * c.y - a.y * c.x;
+    let w = b.x * a.y - b.y * a.x;
+    let sum = u + v + w;
+    let inside = ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0));
+    let t = (u * a.z + v * b.z + w * c.z) / sum;
+    let passage = box_passage(lowest(v0, v1, v2), highest(v0, v1, v2), s);
+    let met = inside & (abs(sum) > 0.0) & is_passed(passage, FAR);
+    return Crossing(met, min(passage.y, max(passage.x, t)), vec2f(v / sum, w / sum));
+}
+
+fn lowest(a: vec3f, b: vec3f, c: vec3f) -> vec3f {
+    return vec3f(min(min(a.x, b.x), c.x), min(min(a.y, b.y), c.y), min(min(a.z, b.z), c.z));
+}
+
+fn highest(a: vec3f, b: vec3f, c: vec3f) -> vec3f {
+    return vec3f(max(max(a.x, b.x), c.x), max(max(a.y, b.y), c.y), max(max(a.z, b.z), c.z));
+}
+
+// A point of the world in the space of an instance's mesh.
+fn point_to_mesh(i: Instance, p: vec3f) -> vec3f {
+    return vector_to_mesh(i, p - i.anchor);
+}
+
+fn vector_to_mesh(i: Instance, v: vec3f) -> vec3f {
+    return vec3f(dot(i.x, v), dot(i.y, v), dot(i.z, v));
+}
+
+fn vector_from_mesh(i: Instance, v: vec3f) -> vec3f {
+    return i.u * v.x + i.v * v.y + i.w * v.z;
+}
+
+// A normal of the mesh in the world, unit length; 0 for none.
+fn normal_from_mesh(i: Instance, n: vec3f) -> vec3f {
+    let v = i.x * n.x + i.y * n.y + i.z * n.z;
+    let scaled = v / max(largest(v), 1.1754943508222875e-38);
+    return scaled / sqrt(max(dot(scaled, scaled), 0.5));
+}
+
+// How far from a mesh's boxes a ray still counts as passing them: the rounding of all that is computed of it in this space.
+fn mesh_pad(i: Instance, origin: vec3f) -> f32 {
+    return PAD * (largest(origin) + i.size);
+}
+
+// What was hit: a primitive by itself, which is all then, or a triangle of a mesh in the world.
+struct Spot {
+    primitive: Primitive,  // a mesh's triangle as one by itself
+    edge_1: vec3f,         // from the first vertex to the second
+    edge_2: vec3f,
+    uv_0: vec2f,           // texture coordinates of the vertices
+    uv_1: vec2f,
+    uv_2: vec2f,
+    normal_0: vec3f,       // unit normals of the vertices, outwards; 0 where the mesh has none
+    normal_1: vec3f,
+    normal_2: vec3f,
+    anchor: vec3f,         // where the mesh's origin is
+    condition: f32,        // by how much its map enlarges what is rounded
+}
+
+// A primitive by itself.
+fn spot_by_itself(q: Primitive) -> Spot {
+    let zero = vec3f(0.0);
+    return Spot(q, zero, zero, zero.xy, zero.xy, zero.xy, zero, zero, zero, zero, 0.0);
+}
+
+// The triangle as a primitive: local x and y are the barycentric coordinates of its second and third vertex. Edges are the
+// world's, `v0` is the mesh's.
+fn face_primitive(i: Instance, v0: vec3f, edge_1: vec3f, edge_2: vec3f, material: u32) -> Primitive {
+    let least = 1.1754943508222875e-38;
+    let across = cross(edge_1 / max(largest(edge_1), least), edge_2 / max(largest(edge_2), least));
+    // Of a triangle so thin that nothing of it is left in 32 bits, z stands for the normal.
+    let normal = select(vec3f(0.0, 0.0, 1.0), normalize(across), dot(across, across) > 1e-30) * i.side;
+    let area = dot(cross(edge_1, edge_2), normal);
+    let determinant = select(least, area, abs(area) > least);
+    let anchor = i.anchor + vector_from_mesh(i, v0);
+    return Primitive(anchor, material, cross(edge_2, normal) / determinant, i.shape, cross(normal, edge_1) / determinant,
+                     TRIANGLE, normal, 1.0 / determinant, vec3f(0.0), 0.0);
+}
+
+// The point of a triangle at barycentric coordinates b, as a ray in direction d meets it.
+fn face_surface(face: Spot, place: vec2u, b: vec2f, d: vec3f, epsilon: f32) -> Surface {
+    let q = face.primitive;
+    let from_anchor = face.edge_1 * b.x + face.edge_2 * b.y;
+    let position = q.anchor + from_anchor;
+    let side = select(1.0, -1.0, dot(q.z, d) > 0.0);
+    let normal = q.z * side;
+    let edge = max(max(largest(face.edge_1), largest(face.edge_2)), largest(face.edge_2 - face.edge_1));
+    let size = max(max(largest(position), largest(position - face.anchor)), 0.25 * edge) * max(1.0, 0.125 * face.condition);
+    // A little back towards the viewer too: what is met on an edge is then inside of what else has that edge.
+    let start = position + (normal - d) * (epsilon * size);
+    let tangents = face_tangents(face);
+    let shading_normal = face_normal(face, b) * side;
+    return Surface(position, normal, shading_normal, -d, start, face_bulge(face, b, side), side, place, place, face_uv(face, b),
+                   tangents.u, tangents.v);
+}
+
+fn face_uv(face: Spot, b: vec2f) -> vec2f {
+    return face.uv_0 + (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y;
+}
+
+// The unit normal between the vertices' own, on the outer side of the triangle; the triangle's where they have none.
+fn face_normal(face: Spot, b: vec2f) -> vec3f {
+    let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
+    let length2 = dot(n, n);
+    let unit = n / sqrt(max(length2, 1e-12));
+    let outward = unit * select(1.0, -1.0, dot(unit, face.primitive.z) < 0.0);
+    return select(face.primitive.z, outward, length2 > 1e-12);
+}
+
+// From the triangle to the smooth surface that the vertices' normals tell of, where that is above it: shadow rays start there,
+// so that a coarse mesh does not shadow itself where light grazes it. Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems
+// II, 2021, chapter 4.
+fn face_bulge(face: Spot, b: vec2f, side: f32) -> vec3f {
+    let p = face.edge_1 * b.x + face.edge_2 * b.y;
+    let up = face.primitive.z * side;
+    let lift_0 = lift(face.normal_0 * side, p, up);
+    let lift_1 = lift(face.normal_1 * side, p - face.edge_1, up);
+    let lift_2 = lift(face.normal_2 * side, p - face.edge_2, up);
+    return lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y;
+}
+
+// From a point at `way` from a vertex up to the plane through the vertex with normal n; 0 where it is above that. A normal more
+// than 37 degrees off the triangle's, `up`, tells of no surface nearby, as at a cube's corner: what stands there would lose its shadow.
+fn lift(n: vec3f, way: vec3f, up: vec3f) -> vec3f {
+    return n * select(0.0, max(-dot(n, way), 0.0), dot(n, up) > 0.8);
+}
+
+// The derivatives of a point by u and by v. Where the vertices' texture coordinates give none, some in the triangle's plane.
+fn face_tangents(face: Spot) -> Tangents {
+    let a = face.uv_1 - face.uv_0;
+    let b = face.uv_2 - face.uv_0;
+    let area = a.x * b.y - a.y * b.x;
+    let whole = abs(area) > 1e-30;
+    let scale = 1.0 / select(1.0, area, whole);
+    let u = (face.edge_1 * b.y - face.edge_2 * a.y) * scale;
+    let v = (face.edge_2 * a.x - face.edge_1 * b.x) * scale;
+    return Tangents(select(face.edge_1, u, whole), select(cross(face.primitive.z, face.edge_1), v, whole));
+}
+
+// Of `face_uv`, where the position has the derivative d.
+fn face_uv_derivative(face: Spot, d: vec3f) -> vec2f {
+    let b = vector_to_local(face.primitive, d);
+    return (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y;
+}
+
+// Of `face_normal`, where the position has the derivative d.
+fn face_normal_derivative(face: Spot, b: vec2f, d: vec3f) -> vec3f {
+    let db = vector_to_local(face.primitive, d);
+    let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
+    let dn = (face.normal_1 - face.normal_0) * db.x + (face.normal_2 - face.normal_0) * db.y;
+    let length2 = dot(n, n);
+    let scale = 1.0 / sqrt(max(length2, 1e-12));
+    let unit = n * scale;
+    let along = (dn - unit * dot(unit, dn)) * scale;
+    let outward = along * select(1.0, -1.0, dot(unit, face.primitive.z) < 0.0);
+    return select(vec3f(0.0), outward, length2 > 1e-12);
+}
+
+// A ray's differential at the point of a triangle at barycentric coordinates b.
+fn face_arrival(face: Spot, b: vec2f, differential: Differential, ray: Ray, t: f32, surface: Surface) -> Arrival {
+    let x = transferred(differential.x, ray, t, surface.normal);
+    let y = transferred(differential.y, ray, t, surface.normal);
+    let normal_x = face_normal_derivative(face, b, x.position) * surface.side;
+    let normal_y = face_normal_derivative(face, b, y.position) * surface.side;
+    return Arrival(x, y, normal_x, normal_y);
+}
+
+fn face_footprint(face: Spot, surface: Surface, dx: vec3f, dy: vec3f) -> Footprint {
+    return Footprint(surface.uv, face_uv_derivative(face, dx), face_uv_derivative(face, dy));
+}
+
+fn face_first_hit(face: Spot, hit: Hit) -> FirstHit {
+    let b = hit.barycentric;
+    let normal = with_positive_zeros(face.primitive.z);
+    let shading_normal = with_positive_zeros(face_normal(face, b));
+    let uv = face_uv(face, b);
+    return FirstHit(normal, hit.t, vec2f(positive_zero(uv.x), positive_zero(uv.y)), face.primitive.shape,
+                    face.primitive.material, shading_normal, hit.primitive, b, vec2u(0u));
+}

@@ -1,0 +1,103 @@
+// A node of a tree of boxes: eight children whose boxes are counted in steps from the node's corner, after Ylitie, Karras and
+// Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017, section 3.
+
+// The steps of four children.
+fn steps(word: u32) -> vec4f {
+    return vec4f(f32(word & 0xffu), f32((word >> 8u) & 0xffu), f32((word >> 16u) & 0xffu), f32(word >> 24u));
+}
+
+// The length of a step along an axis, by the number of the axis.
+fn step_length(node: Node, axis: u32) -> f32 {
+    return bitcast<f32>(((node.scales >> (8u * axis)) & 0xffu) << 23u);
+}
+
+fn larger(a: vec4f, b: vec4f) -> vec4f {
+    return select(b, a, a > b);
+}
+
+fn smaller(a: vec4f, b: vec4f) -> vec4f {
+    return select(b, a, a < b);
+}
+
+// Bit i is set where the interval of child i is not empty and lies between 0 and `limit`.
+fn passed_bits(near: vec4f, far: vec4f, limit: f32) -> u32 {
+    let passed = (near <= far) & (far >= vec4f(0.0)) & (near <= vec4f(limit));
+    return select(0u, 1u, passed.x) | select(0u, 2u, passed.y) | select(0u, 4u, passed.z) | select(0u, 8u, passed.w);
+}
+
+// Bit i is set where the ray passes the box of child i, as `box_passage` says.
+fn children_passed(node: Node, s: Slabs, limit: f32) -> u32 {
+    let first = four_passed(node, vec3u(node.low_x.x, node.low_y.x, node.low_z.x),
+                            vec3u(node.high_x.x, node.high_y.x, node.high_z.x), s, limit);
+    let second = four_passed(node, vec3u(node.low_x.y, node.low_y.y, node.low_z.y),
+                             vec3u(node.high_x.y, node.high_y.y, node.high_z.y), s, limit);
+    return first | (second << 4u);
+}
+
+fn four_passed(node: Node, low: vec3u, high: vec3u, s: Slabs, limit: f32) -> u32 {
+    let x = step_length(node, 0u);
+    let y = step_length(node, 1u);
+    let z = step_length(node, 2u);
+    let low_x = (node.base.x + steps(low.x) * x - s.low_origin.x) * s.inverse.x;
+    let high_x = (node.base.x + steps(high.x) * x - s.high_origin.x) * s.inverse.x;
+    let low_y = (node.base.y + steps(low.y) * y - s.low_origin.y) * s.inverse.y;
+    let high_y = (node.base.y + steps(high.y) * y - s.high_origin.y) * s.inverse.y;
+    let low_z = (node.base.z + steps(low.z) * z - s.low_origin.z) * s.inverse.z;
+    let high_z = (node.base.z + steps(high.z) * z - s.high_origin.z) * s.inverse.z;
+    let near = larger(larger(smaller(low_x, high_x), smaller(low_y, high_y)), smaller(low_z, high_z));
+    let far = smaller(smaller(larger(low_x, high_x), larger(low_y, high_y)), larger(low_z, high_z));
+    return passed_bits(near, far, limit);
+}
+
+// Bit i is set where any ray of the fan may pass the box of child i, as `fan_passage` says.
+fn children_in_fan(node: Node, f: Fan, limit: f32) -> u32 {
+    let first = four_in_fan(node, vec3u(node.low_x.x, node.low_y.x, node.low_z.x),
+                            vec3u(node.high_x.x, node.high_y.x, node.high_z.x), f, limit);
+    let second = four_in_fan(node, vec3u(node.low_x.y, node.low_y.y, node.low_z.y),
+                             vec3u(node.high_x.y, node.high_y.y, node.high_z.y), f, limit);
+    return first | (second << 4u);
+}
+
+fn four_in_fan(node: Node, low: vec3u, high: vec3u, f: Fan, limit: f32) -> u32 {
+    let x = step_length(node, 0u);
+    let y = step_length(node, 1u);
+    let z = step_length(node, 2u);
+    let low_x = node.base.x + steps(low.x) * x - f.low_origin.x;
+    let high_x = node.base.x + steps(high.x) * x - f.high_origin.x;
+    let low_y = node.base.y + steps(low.y) * y - f.low_origin.y;
+    let high_y = node.base.y + steps(high.y) * y - f.high_origin.y;
+    let low_z = node.base.z + steps(low.z) * z - f.low_origin.z;
+    let high_z = node.base.z + steps(high.z) * z - f.high_origin.z;
+    let near_x = larger(low_x * f.near_low.x, high_x * f.near_high.x);
+    let near_y = larger(low_y * f.near_low.y, high_y * f.near_high.y);
+    let near_z = larger(low_z * f.near_low.z, high_z * f.near_high.z);
+    let far_x = far_side(low_x, high_x, f.far_low.x, f.far_high.x);
+    let far_y = far_side(low_y, high_y, f.far_low.y, f.far_high.y);
+    let far_z = far_side(low_z, high_z, f.far_low.z, f.far_high.z);
+    return passed_bits(larger(larger(near_x, near_y), near_z), smaller(smaller(far_x, far_y), far_z), limit);
+}
+
+// The latest that any ray of a fan leaves a box along an axis.
+fn far_side(low: vec4f, high: vec4f, far_low: f32, far_high: f32) -> vec4f {
+    let none = (far_low == 0.0) & (far_high == 0.0);
+    return select(low * far_low + high * far_high, vec4f(FAR), none);
+}
+
+// The eight bits of slots in the order in which a ray of this octant visits them: bit i is slot i ^ octant's. Bit k of an octant
+// is set where the ray goes down along axis k; slot i's box lies on the upper side of axis k where bit k of i is set.
+fn in_order(bits: u32, octant: u32) -> u32 {
+    let by_x = select(bits, ((bits & 0x55u) << 1u) | ((bits >> 1u) & 0x55u), (octant & 1u) != 0u);
+    let by_y = select(by_x, ((by_x & 0x33u) << 2u) | ((by_x >> 2u) & 0x33u), (octant & 2u) != 0u);
+    return select(by_y, ((by_y & 0x0fu) << 4u) | ((by_y >> 4u) & 0x0fu), (octant & 4u) != 0u);
+}
+
+fn octant_of(direction: vec3f) -> u32 {
+    return select(0u, 1u, direction.x < 0.0) | select(0u, 2u, direction.y < 0.0) | select(0u, 4u, direction.z < 0.0);
+}
+
+// A leaf's items: x is the first of them, y how many there are. An empty slot is a leaf of none.
+fn leaf_items(node: Node, slot: u32) -> vec2u {
+    let word = select(node.leaves.x, node.leaves.y, slot >= 4u);
+    let leaf = (word >> (8u * (slot & 3u))) & 0xffu;
+    return vec2u(node.first_item + (leaf & 31u), leaf >> 5u);
+}

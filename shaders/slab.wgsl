@@ -1,0 +1,69 @@
+// Rays and boxes along the axes. A ray passes a box in the interval that its three slabs have in common: Kay and Kajiya, "Ray
+// Tracing Complex Scenes", SIGGRAPH 1986. A box counts as `pad` larger on all sides.
+//
+// Every step is monotone, in 32-bit floats too: of two boxes, one inside of the other, the larger one is entered no later and
+// left no earlier. So a tree of boxes leaves out nothing whose own box a ray passes (docs/decisions/trees.md).
+
+// What all boxes need of a ray.
+struct Slabs {
+    low_origin: vec3f,     // the origin as the lower sides of boxes see it
+    high_origin: vec3f,
+    inverse: vec3f,        // of the direction
+}
+
+fn slabs(origin: vec3f, direction: vec3f, pad: f32) -> Slabs {
+    let inverse = vec3f(inverse_of(direction.x), inverse_of(direction.y), inverse_of(direction.z));
+    return Slabs(origin + pad, origin - pad, inverse);
+}
+
+// 1 / x, finite for every x: a direction along a side of a box is nearly so.
+fn inverse_of(x: f32) -> f32 {
+    let least = select(7.888609e-31, -7.888609e-31, x < 0.0);
+    return 1.0 / select(least, x, abs(x) >= 7.888609e-31);
+}
+
+// Where the ray enters the box, x, and leaves it, y; it does not pass it if x > y.
+fn box_passage(low: vec3f, high: vec3f, s: Slabs) -> vec2f {
+    let a = (low - s.low_origin) * s.inverse;
+    let b = (high - s.high_origin) * s.inverse;
+    let near = max(max(min(a.x, b.x), min(a.y, b.y)), min(a.z, b.z));
+    let far = min(min(max(a.x, b.x), max(a.y, b.y)), max(a.z, b.z));
+    return vec2f(near, far);
+}
+
+// Whether a ray passes a box ahead of its start and no farther than `limit`.
+fn is_passed(passage: vec2f, limit: f32) -> bool {
+    return (passage.x <= passage.y) & (passage.y >= 0.0) & (passage.x <= limit);
+}
+
+// All rays from one point whose directions lie in a box. Of what any of them passes, they pass all.
+struct Fan {
+    low_origin: vec3f,
+    high_origin: vec3f,
+    near_low: vec3f,       // the earliest that any ray reaches a lower side, by its distance
+    near_high: vec3f,      // and an upper one
+    far_low: vec3f,        // the latest that any leaves by a lower side; 0 where that is no bound
+    far_high: vec3f,
+}
+
+fn fan(origin: vec3f, least: vec3f, most: vec3f, pad: f32) -> Fan {
+    let up = least >= vec3f(0.0);
+    let down = most < vec3f(0.0);
+    let of_least = vec3f(inverse_of(least.x), inverse_of(least.y), inverse_of(least.z));
+    let of_most = vec3f(inverse_of(most.x), inverse_of(most.y), inverse_of(most.z));
+    let zero = vec3f(0.0);
+    return Fan(origin + pad, origin - pad, select(of_most, zero, down), select(of_least, zero, up),
+               select(zero, of_most, down), select(zero, of_least, up));
+}
+
+// When any ray of the fan may enter the box, x, and leave it, y.
+fn fan_passage(low: vec3f, high: vec3f, f: Fan) -> vec2f {
+    let a = low - f.low_origin;
+    let b = high - f.high_origin;
+    let by_low = a * f.near_low;
+    let by_high = b * f.near_high;
+    let near = max(max(max(by_low.x, by_high.x), max(by_low.y, by_high.y)), max(by_low.z, by_high.z));
+    let none = (f.far_low == vec3f(0.0)) & (f.far_high == vec3f(0.0));
+    let far = select(a * f.far_low + b * f.far_high, vec3f(FAR), none);
+    return vec2f(near, min(min(far.x, far.y), far.z));
+}

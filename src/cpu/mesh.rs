@@ -1,0 +1,293 @@
+//! Twin of `shaders/mesh.wgsl`: triangles of meshes.
+
+use glam::{UVec2, Vec2, Vec3};
+
+use super::differential::{Arrival, Differential, transferred};
+use super::footprint::Footprint;
+use super::math::{cross, dot, max, min, normalize, positive_zero};
+use super::primitive::Tangents;
+use super::ray::{Hit, Ray, vector_to_local};
+use super::slab::{Slabs, box_passage, is_passed};
+use super::surface::{Surface, largest, with_positive_zeros};
+use crate::pack::{FAR, FirstHit, Instance, PAD, Primitive, TRIANGLE};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shear {
+    pub axis: u32,
+    pub slope: Vec2,
+    pub scale: f32,
+}
+
+pub fn shear_of(direction: Vec3) -> Shear {
+    let size = direction.abs();
+    let axis = match (size.x >= size.y) & (size.x >= size.z) {
+        true => 0,
+        false if size.y >= size.z => 1,
+        false => 2,
+    };
+    let d = permuted(direction, axis);
+    Shear {
+        axis,
+        slope: Vec2::new(d.x / d.z, d.y / d.z),
+        scale: 1.0 / d.z,
+    }
+}
+
+pub fn permuted(v: Vec3, axis: u32) -> Vec3 {
+    match axis {
+        0 => Vec3::new(v.y, v.z, v.x),
+        1 => Vec3::new(v.z, v.x, v.y),
+        _ => v,
+    }
+}
+
+pub fn sheared(v: Vec3, shear: Shear) -> Vec3 {
+    let p = permuted(v, shear.axis);
+    Vec3::new(p.x - shear.slope.x * p.z, p.y - shear.slope.y * p.z, shear.scale * p.z)
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    pub met: bool,
+    pub t: f32,
+    pub barycentric: Vec2,
+}
+
+pub fn triangle_crossing(v0: Vec3, v1: Vec3, v2: Vec3, origin: Vec3, shear: Shear, s: Slabs) -> Crossing {
+    let a = sheared(v0 - origin, shear);
+    let b = sheared(v1 - origin, shear);
+    let c = sheared(v2 - origin, shear);
+    let u = c.x * b.y - c.y * b.x;
+    let v = a.x * c.y - a.y * c.x;
+    let w = b.x * a.y - b.y * a.x;
+    let sum = u + v + w;
+    let inside = ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0));
+    let t = (u * a.z + v * b.z + w * c.z) / sum;
+    let passage = box_passage(lowest(v0, v1, v2), highest(v0, v1, v2), s);
+    let met = inside & (sum.abs() > 0.0) & is_passed(passage, FAR);
+    Crossing {
+        met,
+        t: min(passage.y, max(passage.x, t)),
+        barycentric: Vec2::new(v / sum, w / sum),
+    }
+}
+
+pub fn lowest(a: Vec3, b: Vec3, c: Vec3) -> Vec3 {
+    Vec3::new(
+        min(min(a.x, b.x), c.x),
+        min(min(a.y, b.y), c.y),
+        min(min(a.z, b.z), c.z),
+    )
+}
+
+pub fn highest(a: Vec3, b: Vec3, c: Vec3) -> Vec3 {
+    Vec3::new(
+        max(max(a.x, b.x), c.x),
+        max(max(a.y, b.y), c.y),
+        max(max(a.z, b.z), c.z),
+    )
+}
+
+pub fn point_to_mesh(i: &Instance, p: Vec3) -> Vec3 {
+    vector_to_mesh(i, p - i.anchor)
+}
+
+pub fn vector_to_mesh(i: &Instance, v: Vec3) -> Vec3 {
+    Vec3::new(dot(i.x, v), dot(i.y, v), dot(i.z, v))
+}
+
+pub fn vector_from_mesh(i: &Instance, v: Vec3) -> Vec3 {
+    i.u * v.x + i.v * v.y + i.w * v.z
+}
+
+pub fn normal_from_mesh(i: &Instance, n: Vec3) -> Vec3 {
+    let v = i.x * n.x + i.y * n.y + i.z * n.z;
+    let scaled = v / max(largest(v), f32::MIN_POSITIVE);
+    scaled / max(dot(scaled, scaled), 0.5).sqrt()
+}
+
+pub fn mesh_pad(i: &Instance, origin: Vec3) -> f32 {
+    PAD * (largest(origin) + i.size)
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spot {
+    pub primitive: Primitive,
+    pub edge_1: Vec3,
+    pub edge_2: Vec3,
+    pub uv_0: Vec2,
+    pub uv_1: Vec2,
+    pub uv_2: Vec2,
+    pub normal_0: Vec3,
+    pub normal_1: Vec3,
+    pub normal_2: Vec3,
+    pub anchor: Vec3,
+    pub condition: f32,
+}
+
+pub fn spot_by_itself(q: &Primitive) -> Spot {
+    Spot {
+        primitive: *q,
+        edge_1: Vec3::ZERO,
+        edge_2: Vec3::ZERO,
+        uv_0: Vec2::ZERO,
+        uv_1: Vec2::ZERO,
+        uv_2: Vec2::ZERO,
+        normal_0: Vec3::ZERO,
+        normal_1: Vec3::ZERO,
+        normal_2: Vec3::ZERO,
+        anchor: Vec3::ZERO,
+        condition: 0.0,
+    }
+}
+
+pub fn face_primitive(i: &Instance, v0: Vec3, edge_1: Vec3, edge_2: Vec3, material: u32) -> Primitive {
+    let least = f32::MIN_POSITIVE;
+    let across = cross(
+        edge_1 / max(largest(edge_1), least),
+        edge_2 / max(largest(edge_2), least),
+    );
+    let is_whole = dot(across, across) > 1e-30;
+    let normal = if is_whole { normalize(across) } else { Vec3::Z } * i.side;
+    let area = dot(cross(edge_1, edge_2), normal);
+    let determinant = if area.abs() > least { area } else { least };
+    let anchor = i.anchor + vector_from_mesh(i, v0);
+    Primitive {
+        anchor,
+        material,
+        x: cross(edge_2, normal) / determinant,
+        shape: i.shape,
+        y: cross(normal, edge_1) / determinant,
+        kind: TRIANGLE,
+        z: normal,
+        determinant: 1.0 / determinant,
+        middle: Vec3::ZERO,
+        level: 0.0,
+    }
+}
+
+pub fn face_surface(face: &Spot, place: UVec2, b: Vec2, d: Vec3, epsilon: f32) -> Surface {
+    let q = &face.primitive;
+    let from_anchor = face.edge_1 * b.x + face.edge_2 * b.y;
+    let position = q.anchor + from_anchor;
+    let side = if dot(q.z, d) > 0.0 { -1.0 } else { 1.0 };
+    let normal = q.z * side;
+    let edge = max(
+        max(largest(face.edge_1), largest(face.edge_2)),
+        largest(face.edge_2 - face.edge_1),
+    );
+    let size =
+        max(max(largest(position), largest(position - face.anchor)), 0.25 * edge) * max(1.0, 0.125 * face.condition);
+    let start = position + (normal - d) * (epsilon * size);
+    let tangents = face_tangents(face);
+    let shading_normal = face_normal(face, b) * side;
+    Surface {
+        position,
+        normal,
+        shading_normal,
+        wo: -d,
+        start,
+        bulge: face_bulge(face, b, side),
+        side,
+        above: place,
+        below: place,
+        uv: face_uv(face, b),
+        du: tangents.u,
+        dv: tangents.v,
+    }
+}
+
+pub fn face_uv(face: &Spot, b: Vec2) -> Vec2 {
+    face.uv_0 + (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y
+}
+
+pub fn face_normal(face: &Spot, b: Vec2) -> Vec3 {
+    let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
+    let length2 = dot(n, n);
+    let unit = n / max(length2, 1e-12).sqrt();
+    let outward = unit * if dot(unit, face.primitive.z) < 0.0 { -1.0 } else { 1.0 };
+    if length2 > 1e-12 { outward } else { face.primitive.z }
+}
+
+pub fn face_bulge(face: &Spot, b: Vec2, side: f32) -> Vec3 {
+    let p = face.edge_1 * b.x + face.edge_2 * b.y;
+    let up = face.primitive.z * side;
+    let lift_0 = lift(face.normal_0 * side, p, up);
+    let lift_1 = lift(face.normal_1 * side, p - face.edge_1, up);
+    let lift_2 = lift(face.normal_2 * side, p - face.edge_2, up);
+    lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y
+}
+
+pub fn lift(n: Vec3, way: Vec3, up: Vec3) -> Vec3 {
+    n * if dot(n, up) > 0.8 { max(-dot(n, way), 0.0) } else { 0.0 }
+}
+
+pub fn face_tangents(face: &Spot) -> Tangents {
+    let a = face.uv_1 - face.uv_0;
+    let b = face.uv_2 - face.uv_0;
+    let area = a.x * b.y - a.y * b.x;
+    let whole = area.abs() > 1e-30;
+    let scale = 1.0 / if whole { area } else { 1.0 };
+    let u = (face.edge_1 * b.y - face.edge_2 * a.y) * scale;
+    let v = (face.edge_2 * a.x - face.edge_1 * b.x) * scale;
+    Tangents {
+        u: if whole { u } else { face.edge_1 },
+        v: if whole { v } else { cross(face.primitive.z, face.edge_1) },
+    }
+}
+
+pub fn face_uv_derivative(face: &Spot, d: Vec3) -> Vec2 {
+    let b = vector_to_local(&face.primitive, d);
+    (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y
+}
+
+pub fn face_normal_derivative(face: &Spot, b: Vec2, d: Vec3) -> Vec3 {
+    let db = vector_to_local(&face.primitive, d);
+    let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
+    let dn = (face.normal_1 - face.normal_0) * db.x + (face.normal_2 - face.normal_0) * db.y;
+    let length2 = dot(n, n);
+    let scale = 1.0 / max(length2, 1e-12).sqrt();
+    let unit = n * scale;
+    let along = (dn - unit * dot(unit, dn)) * scale;
+    let outward = along * if dot(unit, face.primitive.z) < 0.0 { -1.0 } else { 1.0 };
+    if length2 > 1e-12 { outward } else { Vec3::ZERO }
+}
+
+pub fn face_arrival(face: &Spot, b: Vec2, differential: Differential, ray: Ray, t: f32, surface: Surface) -> Arrival {
+    let x = transferred(differential.x, ray, t, surface.normal);
+    let y = transferred(differential.y, ray, t, surface.normal);
+    let normal_x = face_normal_derivative(face, b, x.position) * surface.side;
+    let normal_y = face_normal_derivative(face, b, y.position) * surface.side;
+    Arrival {
+        x,
+        y,
+        normal_x,
+        normal_y,
+    }
+}
+
+pub fn face_footprint(face: &Spot, surface: Surface, dx: Vec3, dy: Vec3) -> Footprint {
+    Footprint {
+        uv: surface.uv,
+        dx: face_uv_derivative(face, dx),
+        dy: face_uv_derivative(face, dy),
+    }
+}
+
+pub fn face_first_hit(face: &Spot, hit: Hit) -> FirstHit {
+    let b = hit.barycentric;
+    let normal = with_positive_zeros(face.primitive.z);
+    let shading_normal = with_positive_zeros(face_normal(face, b));
+    let uv = face_uv(face, b);
+    FirstHit {
+        normal,
+        depth: hit.t,
+        uv: Vec2::new(positive_zero(uv.x), positive_zero(uv.y)),
+        shape: face.primitive.shape,
+        material: face.primitive.material,
+        shading_normal,
+        primitive: hit.primitive,
+        barycentric: b,
+        unused: UVec2::ZERO,
+    }
+}

@@ -1,0 +1,130 @@
+//! Twin of `shaders/node.wgsl`: a node of a tree of boxes, with eight children.
+
+use glam::{UVec2, UVec3, Vec3, Vec4};
+
+use super::slab::{Fan, Slabs};
+use crate::pack::{FAR, Node};
+
+pub fn steps(word: u32) -> Vec4 {
+    Vec4::from(word.to_le_bytes().map(f32::from))
+}
+
+pub fn step_length(node: &Node, axis: u32) -> f32 {
+    f32::from_bits(((node.scales >> (8 * axis)) & 0xff) << 23)
+}
+
+pub fn larger(a: Vec4, b: Vec4) -> Vec4 {
+    Vec4::select(a.cmpgt(b), a, b)
+}
+
+pub fn smaller(a: Vec4, b: Vec4) -> Vec4 {
+    Vec4::select(a.cmplt(b), a, b)
+}
+
+pub fn passed_bits(near: Vec4, far: Vec4, limit: f32) -> u32 {
+    (near.cmple(far) & far.cmpge(Vec4::ZERO) & near.cmple(Vec4::splat(limit))).bitmask()
+}
+
+pub fn children_passed(node: &Node, s: Slabs, limit: f32) -> u32 {
+    let first = four_passed(
+        node,
+        UVec3::new(node.low_x.x, node.low_y.x, node.low_z.x),
+        UVec3::new(node.high_x.x, node.high_y.x, node.high_z.x),
+        s,
+        limit,
+    );
+    let second = four_passed(
+        node,
+        UVec3::new(node.low_x.y, node.low_y.y, node.low_z.y),
+        UVec3::new(node.high_x.y, node.high_y.y, node.high_z.y),
+        s,
+        limit,
+    );
+    first | (second << 4)
+}
+
+pub fn four_passed(node: &Node, low: UVec3, high: UVec3, s: Slabs, limit: f32) -> u32 {
+    let x = step_length(node, 0);
+    let y = step_length(node, 1);
+    let z = step_length(node, 2);
+    let low_x = (node.base.x + steps(low.x) * x - s.low_origin.x) * s.inverse.x;
+    let high_x = (node.base.x + steps(high.x) * x - s.high_origin.x) * s.inverse.x;
+    let low_y = (node.base.y + steps(low.y) * y - s.low_origin.y) * s.inverse.y;
+    let high_y = (node.base.y + steps(high.y) * y - s.high_origin.y) * s.inverse.y;
+    let low_z = (node.base.z + steps(low.z) * z - s.low_origin.z) * s.inverse.z;
+    let high_z = (node.base.z + steps(high.z) * z - s.high_origin.z) * s.inverse.z;
+    let near = larger(
+        larger(smaller(low_x, high_x), smaller(low_y, high_y)),
+        smaller(low_z, high_z),
+    );
+    let far = smaller(
+        smaller(larger(low_x, high_x), larger(low_y, high_y)),
+        larger(low_z, high_z),
+    );
+    passed_bits(near, far, limit)
+}
+
+pub fn children_in_fan(node: &Node, f: Fan, limit: f32) -> u32 {
+    let first = four_in_fan(
+        node,
+        UVec3::new(node.low_x.x, node.low_y.x, node.low_z.x),
+        UVec3::new(node.high_x.x, node.high_y.x, node.high_z.x),
+        f,
+        limit,
+    );
+    let second = four_in_fan(
+        node,
+        UVec3::new(node.low_x.y, node.low_y.y, node.low_z.y),
+        UVec3::new(node.high_x.y, node.high_y.y, node.high_z.y),
+        f,
+        limit,
+    );
+    first | (second << 4)
+}
+
+pub fn four_in_fan(node: &Node, low: UVec3, high: UVec3, f: Fan, limit: f32) -> u32 {
+    let x = step_length(node, 0);
+    let y = step_length(node, 1);
+    let z = step_length(node, 2);
+    let low_x = node.base.x + steps(low.x) * x - f.low_origin.x;
+    let high_x = node.base.x + steps(high.x) * x - f.high_origin.x;
+    let low_y = node.base.y + steps(low.y) * y - f.low_origin.y;
+    let high_y = node.base.y + steps(high.y) * y - f.high_origin.y;
+    let low_z = node.base.z + steps(low.z) * z - f.low_origin.z;
+    let high_z = node.base.z + steps(high.z) * z - f.high_origin.z;
+    let near_x = larger(low_x * f.near_low.x, high_x * f.near_high.x);
+    let near_y = larger(low_y * f.near_low.y, high_y * f.near_high.y);
+    let near_z = larger(low_z * f.near_low.z, high_z * f.near_high.z);
+    let far_x = far_side(low_x, high_x, f.far_low.x, f.far_high.x);
+    let far_y = far_side(low_y, high_y, f.far_low.y, f.far_high.y);
+    let far_z = far_side(low_z, high_z, f.far_low.z, f.far_high.z);
+    passed_bits(
+        larger(larger(near_x, near_y), near_z),
+        smaller(smaller(far_x, far_y), far_z),
+        limit,
+    )
+}
+
+pub fn far_side(low: Vec4, high: Vec4, far_low: f32, far_high: f32) -> Vec4 {
+    if far_low == 0.0 && far_high == 0.0 {
+        return Vec4::splat(FAR);
+    }
+    low * far_low + high * far_high
+}
+
+pub fn in_order(bits: u32, octant: u32) -> u32 {
+    let swapped = |bits: u32, mask: u32, by: u32| ((bits & mask) << by) | ((bits >> by) & mask);
+    let by_x = if octant & 1 != 0 { swapped(bits, 0x55, 1) } else { bits };
+    let by_y = if octant & 2 != 0 { swapped(by_x, 0x33, 2) } else { by_x };
+    if octant & 4 != 0 { swapped(by_y, 0x0f, 4) } else { by_y }
+}
+
+pub fn octant_of(direction: Vec3) -> u32 {
+    direction.cmplt(Vec3::ZERO).bitmask()
+}
+
+pub fn leaf_items(node: &Node, slot: u32) -> UVec2 {
+    let word = if slot >= 4 { node.leaves.y } else { node.leaves.x };
+    let leaf = (word >> (8 * (slot & 3))) & 0xff;
+    UVec2::new(node.first_item + (leaf & 31), leaf >> 5)
+}

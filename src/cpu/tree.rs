@@ -1,0 +1,253 @@
+//! The trees: what `shaders/tree.wgsl` finds, by walks of their own (`walk`).
+
+use std::sync::LazyLock;
+
+use bytemuck::cast_slice;
+use fearless_simd::Level;
+use glam::{UVec2, Vec2, Vec3, Vec4Swizzles as _};
+
+use super::geometry::triangle_casts;
+use super::light::{Segments, segment, segments_to_light};
+use super::math::max;
+use super::mesh::{Crossing, mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
+use super::primitive::intersect;
+use super::ray::{Hit, Ray, by_itself, nearer_hit, no_hit};
+use super::shadow::{Block, block_sample, shadow_bits};
+use super::slab::{Slabs, box_passage, is_passed, slabs};
+use super::surface::{Surface, largest};
+use super::walk::{self, Line, Nearest};
+use crate::pack::tree::Node;
+use crate::pack::{
+    BLOCK, CASTS_SHADOW, DISK, ELLIPSOID, FAR, INSTANCE, Instance, Item, Light, NOTHING, Packed, PackedMesh, RECTANGLE,
+    SOME_SHADOWS, TRIANGLE,
+};
+
+/// The instructions that this processor has for several numbers at once.
+static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);
+
+fn item_pad(scene: &Packed, origin: Vec3) -> f32 {
+    scene.counts.room.x * (largest(origin) + scene.counts.room.y)
+}
+
+/// The nearest hit of the scene's tree, if it is nearer than `before`.
+pub fn closest_in_tree(scene: &Packed, before: Hit, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
+    let mut hit = before;
+    let pad = item_pad(scene, ray.origin);
+    let s = slabs(ray.origin, ray.direction, pad);
+    let line = Line::new(ray.origin, ray.direction, pad);
+    let nodes: &[Node] = cast_slice(&scene.nodes);
+    walk::leaves(*LEVEL, nodes, &line, hit.t, |items, _| {
+        for item in &scene.items[items] {
+            hit = closest_of_item(scene, hit, item, ray, s, left, wall);
+        }
+        hit.t
+    });
+    hit
+}
+
+fn closest_of_item(scene: &Packed, before: Hit, item: &Item, ray: Ray, s: Slabs, left: UVec2, wall: UVec2) -> Hit {
+    let passage = box_passage(item.low, item.high, s);
+    if !is_passed(passage, before.t) {
+        return before;
+    }
+    let i = item.index;
+    let is_wall = i == by_itself(wall);
+    let t = match item.kind & 0xff {
+        INSTANCE => return closest_of_mesh(scene, before, i, ray, max(passage.x, 0.0), left),
+        RECTANGLE => intersect(RECTANGLE, &scene.primitives[i as usize], is_wall, ray, FAR),
+        TRIANGLE => intersect(TRIANGLE, &scene.primitives[i as usize], is_wall, ray, FAR),
+        ELLIPSOID => intersect(ELLIPSOID, &scene.primitives[i as usize], is_wall, ray, FAR),
+        _ => intersect(DISK, &scene.primitives[i as usize], is_wall, ray, FAR),
+    };
+    let found = Hit {
+        t: if i == by_itself(left) { FAR } else { max(t, passage.x) },
+        primitive: i,
+        ..no_hit()
+    };
+    nearer_hit(before, found)
+}
+
+fn closest_of_mesh(scene: &Packed, before: Hit, number: u32, ray: Ray, start: f32, left: UVec2) -> Hit {
+    let i = &scene.instances[number as usize];
+    let packed = &*scene.meshes[i.mesh as usize];
+    let direction = vector_to_mesh(i, ray.direction);
+    let origin = point_to_mesh(i, ray.origin) + direction * start;
+    let pad = mesh_pad(i, origin);
+    // At the same distance as what was found before, this instance's triangle counts only if the instance comes first.
+    let best = Nearest {
+        t: before.t,
+        number: if number + 1 < before.instance { NOTHING } else { 0 },
+        slot: NOTHING,
+    };
+    let skip = if left.x == number + 1 { left.y } else { NOTHING };
+    let line = Line::new(origin, direction, pad);
+    let found = walk::closest(*LEVEL, &walked(packed), &line, start, skip, best);
+    if found.slot == NOTHING {
+        return before;
+    }
+    let [v0, v1, v2] = corners(packed, found.slot as usize);
+    let s = slabs(origin, direction, pad);
+    let Crossing { barycentric, .. } = triangle_crossing(v0, v1, v2, origin, shear_of(direction), s);
+    Hit {
+        t: found.t,
+        instance: number + 1,
+        primitive: found.number,
+        slot: found.slot,
+        barycentric,
+    }
+}
+
+/// A mesh as walks want it.
+fn walked(mesh: &PackedMesh) -> walk::Mesh<'_> {
+    walk::Mesh {
+        nodes: cast_slice(&mesh.nodes),
+        vertices: cast_slice(&mesh.vertices),
+        triangles: cast_slice(&mesh.triangles),
+    }
+}
+
+/// The corners of a mesh's triangle.
+fn corners(mesh: &PackedMesh, slot: usize) -> [Vec3; 3] {
+    let triangle = mesh.triangles[slot];
+    [triangle.x, triangle.y, triangle.z].map(|vertex| mesh.vertices[vertex as usize].xyz())
+}
+
+/// The shadow rays from a surface to a block of a light's samples.
+struct Rays<'a> {
+    surface: &'a Surface,
+    to: Segments,
+    reach: f32,
+    /// The samples on the unit square.
+    samples: [Vec2; BLOCK as usize],
+    light: &'a Light,
+    block: Block,
+}
+
+impl Rays<'_> {
+    /// The vectors to those samples that are wanted, by vectors to the light in the world or in a mesh's space.
+    fn directions(&self, to: Segments, wanted: u32) -> [Vec3; BLOCK as usize] {
+        let mut directions = [Vec3::ZERO; BLOCK as usize];
+        for i in bits_of(wanted) {
+            directions[i as usize] = segment(to, self.samples[i as usize]);
+        }
+        directions
+    }
+}
+
+/// The numbers of the bits that are set.
+fn bits_of(mut bits: u32) -> impl Iterator<Item = u32> {
+    std::iter::from_fn(move || {
+        let i = bits.trailing_zeros();
+        bits &= bits.checked_sub(1)?;
+        Some(i)
+    })
+}
+
+/// Bit i is set where an item of the tree hides sample i of the block from a surface, or the bit was set before.
+pub fn hidden_by_tree(scene: &Packed, before: u32, surface: &Surface, light: &Light, block: Block) -> u32 {
+    let all = u32::MAX >> (32 - block.count);
+    let wanted = all & !before;
+    let mut rays = Rays {
+        surface,
+        to: segments_to_light(light, surface.start),
+        reach: light.reach,
+        samples: [Vec2::ZERO; BLOCK as usize],
+        light,
+        block,
+    };
+    for i in bits_of(wanted) {
+        rays.samples[i as usize] = block_sample(block, i);
+    }
+    let directions = rays.directions(rays.to, wanted);
+    let pad = item_pad(scene, surface.start);
+    let segments = walk::Segments {
+        o: surface.start,
+        pad,
+        directions: &directions[..block.count as usize],
+        reach: light.reach,
+        skip: NOTHING,
+    };
+    let nodes: &[Node] = cast_slice(&scene.nodes);
+    let hidden = walk::hidden_leaves(*LEVEL, nodes, &segments, wanted, |items, passing| {
+        let casting = scene.items[items].iter().filter(|item| item.kind & CASTS_SHADOW != 0);
+        casting.fold(0, |hidden, item| {
+            let passing = passing & !hidden;
+            let passing = bits_of(passing).filter(|i| {
+                let s = slabs(surface.start, directions[*i as usize], pad);
+                is_passed(box_passage(item.low, item.high, s), light.reach)
+            });
+            let passing = passing.fold(0, |bits, i| bits | 1 << i);
+            hidden | hidden_by_item(scene, item, passing, &rays)
+        })
+    });
+    (before & all) | hidden
+}
+
+/// Of the samples in `wanted`, those that an item hides.
+fn hidden_by_item(scene: &Packed, item: &Item, wanted: u32, rays: &Rays) -> u32 {
+    let i = item.index;
+    let kind = item.kind & 0xff;
+    if wanted == 0 || (kind != INSTANCE && i == by_itself(rays.surface.above)) {
+        return 0;
+    }
+    let is_wall = i == by_itself(rays.surface.below);
+    let q = scene.primitives.get(i as usize);
+    let bits = |kind: u32| {
+        let start = rays.surface.start;
+        q.map_or(0, |q| shadow_bits(kind, q, start, is_wall, rays.light, rays.block))
+    };
+    wanted
+        & match kind {
+            INSTANCE => hidden_by_mesh(scene, i, wanted, rays),
+            RECTANGLE => bits(RECTANGLE),
+            TRIANGLE => bits(TRIANGLE),
+            ELLIPSOID => bits(ELLIPSOID),
+            _ => bits(DISK),
+        }
+}
+
+fn hidden_by_mesh(scene: &Packed, number: u32, wanted: u32, rays: &Rays) -> u32 {
+    let i = &scene.instances[number as usize];
+    let mesh = &*scene.meshes[i.mesh as usize];
+    let origin = point_to_mesh(i, rays.surface.start);
+    let to = Segments {
+        towards: vector_to_mesh(i, rays.to.towards),
+        u: vector_to_mesh(i, rays.to.u),
+        v: vector_to_mesh(i, rays.to.v),
+    };
+    let pad = mesh_pad(i, origin);
+    let own = rays.surface.above;
+    let segments = walk::Segments {
+        o: origin,
+        pad,
+        directions: &rays.directions(to, wanted)[..rays.block.count as usize],
+        reach: rays.reach,
+        skip: if own.x == number + 1 { own.y } else { NOTHING },
+    };
+    if i.shadows == SOME_SHADOWS {
+        return hidden_by_groups(scene, i, mesh, &segments, wanted);
+    }
+    walk::hidden(*LEVEL, &walked(mesh), &segments, wanted)
+}
+
+/// [`walk::hidden`] where some groups of a mesh cast no shadow.
+fn hidden_by_groups(scene: &Packed, i: &Instance, mesh: &PackedMesh, segments: &walk::Segments, wanted: u32) -> u32 {
+    walk::hidden_leaves(*LEVEL, cast_slice(&mesh.nodes), segments, wanted, |slots, passing| {
+        let mut hidden = 0;
+        for slot in slots {
+            if mesh.triangles[slot].w == segments.skip || !triangle_casts(scene, i, slot as u32) {
+                continue;
+            }
+            let [v0, v1, v2] = corners(mesh, slot);
+            for sample in bits_of(passing & !hidden) {
+                let d = segments.directions[sample as usize];
+                let s = slabs(segments.o, d, segments.pad);
+                let found = triangle_crossing(v0, v1, v2, segments.o, shear_of(d), s);
+                if found.met & (found.t > 0.0) & (found.t < segments.reach) {
+                    hidden |= 1 << sample;
+                }
+            }
+        }
+        hidden
+    })
+}

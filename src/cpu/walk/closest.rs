@@ -1,0 +1,117 @@
+//! The nearest triangle that a ray meets.
+
+use std::ops::Range;
+
+use arrayvec::ArrayVec;
+use fearless_simd::f32x8;
+use fearless_simd::prelude::*;
+
+use super::four::Four;
+use super::line::greater;
+use super::{Line, Mesh, Nearest, limit_from};
+use crate::pack::tree::{MOST_LEVELS, Node};
+
+/// Nodes that wait to be looked at, at most: each level adds 8 and takes one.
+pub const STACK: usize = MOST_LEVELS as usize * 7 + 1;
+
+/// A side of the boxes of a node's children along an axis, as [`Node::low`] and [`Node::high`] give it.
+#[inline(always)]
+pub fn side<S: Simd>(simd: S, node: &Node, side: &[[u8; 8]; 3], axis: usize, scale: f32) -> f32x8<S> {
+    let mut steps = [0.0; 8];
+    for (x, step) in steps.iter_mut().zip(&side[axis]) {
+        *x = f32::from(*step);
+    }
+    f32x8::simd_from(simd, steps) * scale + node.base[axis]
+}
+
+/// See [`super::closest`].
+#[inline(always)]
+pub fn closest<S: Simd>(simd: S, mesh: &Mesh, line: &Line, start: f32, skip: u32, mut best: Nearest) -> Nearest {
+    leaves(
+        simd,
+        mesh.nodes,
+        line,
+        limit_from(start, best.t),
+        #[inline(always)]
+        |items, _| {
+            let slots = items.clone().step_by(4);
+            for (first, triangles) in slots.zip(mesh.triangles[items].chunks(4)) {
+                let (mut met, t) = Four::new(simd, mesh, triangles).met_by(simd, line);
+                while met != 0 {
+                    let i = met.trailing_zeros() as usize;
+                    met &= met - 1;
+                    let (t, number) = (start + greater(t[i], 0.0), triangles[i][3]);
+                    let nearer = t < best.t || (t == best.t && number < best.number);
+                    if nearer && t > 0.0 && number != skip {
+                        let slot = (first + i) as u32;
+                        best = Nearest { t, number, slot };
+                    }
+                }
+            }
+            limit_from(start, best.t)
+        },
+    );
+    best
+}
+
+/// See [`super::leaves`].
+#[inline(always)]
+pub fn leaves<S: Simd>(
+    simd: S,
+    nodes: &[Node],
+    line: &Line,
+    mut limit: f32,
+    mut visit: impl FnMut(Range<usize>, f32) -> f32,
+) {
+    // For x, y and z: whether the ray goes down, the origins for the near and the far side, and the reciprocal.
+    let mut down = [0; 3];
+    let mut from = [[0.0; 3]; 2];
+    let mut inverse = [0.0; 3];
+    for i in 0..3 {
+        let k = line.axes[i];
+        let is_down = line.inverse[i] < 0.0;
+        down[k] = usize::from(is_down);
+        from[down[k]][k] = line.o_low[i];
+        from[1 - down[k]][k] = line.o_high[i];
+        inverse[k] = line.inverse[i];
+    }
+    // The nearest is on top.
+    let mut stack: ArrayVec<(f32, u32), STACK> = ArrayVec::new();
+    stack.push((f32::NEG_INFINITY, 0));
+    while let Some((entry, number)) = stack.pop() {
+        if entry > limit {
+            continue;
+        }
+        let node = &nodes[number as usize];
+        let scale = node.scale().to_array();
+        let planes = [&node.low, &node.high];
+        let mut near = f32x8::splat(simd, f32::NEG_INFINITY);
+        let mut far = f32x8::splat(simd, limit);
+        for k in 0..3 {
+            near = near.max((side(simd, node, planes[down[k]], k, scale[k]) - from[0][k]) * inverse[k]);
+            far = far.min((side(simd, node, planes[1 - down[k]], k, scale[k]) - from[1][k]) * inverse[k]);
+        }
+        let passed = (near.simd_le(far) & far.simd_ge(f32x8::splat(simd, 0.0))).to_bitmask() as u32;
+        let mut leaves = passed & !u32::from(node.inner);
+        while leaves != 0 {
+            let c = leaves.trailing_zeros() as usize;
+            leaves &= leaves - 1;
+            limit = visit(node.items(c), limit);
+        }
+        let first = stack.len();
+        let mut inner = passed & u32::from(node.inner);
+        while inner != 0 {
+            let c = inner.trailing_zeros();
+            inner &= inner - 1;
+            let before = u32::from(node.inner) & ((1 << c) - 1);
+            let child = (near[c as usize], node.first_child + before.count_ones());
+            let mut i = stack.len();
+            stack.push(child);
+            while i > first && stack[i - 1].0 < child.0 {
+                stack[i] = stack[i - 1];
+                i -= 1;
+            }
+            stack[i] = child;
+        }
+    }
+}

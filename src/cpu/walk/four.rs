@@ -1,0 +1,82 @@
+//! A ray against up to four triangles at once.
+
+use fearless_simd::f32x4;
+use fearless_simd::prelude::*;
+
+use super::{Line, Mesh};
+
+/// Up to four triangles of a leaf; if there are fewer, the last stands in the other places.
+pub struct Four<S: Simd> {
+    /// The corners' x, y and z.
+    corners: [[f32x4<S>; 3]; 3],
+    /// A bit for each triangle that there is.
+    full: u32,
+}
+
+impl<S: Simd> Four<S> {
+    /// The triangles with these corners, at least one.
+    #[inline(always)]
+    pub fn new(simd: S, mesh: &Mesh, triangles: &[[u32; 4]]) -> Four<S> {
+        let last = triangles.len().min(4) - 1;
+        let places = [0, 1.min(last), 2.min(last), last];
+        let mut corners = [[f32x4::splat(simd, 0.0); 3]; 3];
+        for (i, corner) in corners.iter_mut().enumerate() {
+            let mut rows = [f32x4::splat(simd, 0.0); 4];
+            for (row, place) in rows.iter_mut().zip(places) {
+                *row = f32x4::simd_from(simd, mesh.vertices[triangles[place][i] as usize]);
+            }
+            let [a, b, c, d] = rows;
+            let (low, high) = (a.zip_low(c), b.zip_low(d));
+            *corner = [
+                low.zip_low(high),
+                low.zip_high(high),
+                a.zip_high(c).zip_low(b.zip_high(d)),
+            ];
+        }
+        Four {
+            corners,
+            full: (2 << last) - 1,
+        }
+    }
+
+    /// Which of the triangles the ray meets, and where, behind its origin too by as much as boxes are enlarged: [`Line::triangle`]
+    /// for each.
+    #[inline(always)]
+    pub fn met_by(&self, simd: S, line: &Line) -> (u32, f32x4<S>) {
+        let zero = f32x4::splat(simd, 0.0);
+        let mut seen = [[zero; 3]; 3];
+        for (seen, corner) in seen.iter_mut().zip(&self.corners) {
+            let [x, y, z] = [
+                corner[line.axes[0]] - line.o[0],
+                corner[line.axes[1]] - line.o[1],
+                corner[line.axes[2]] - line.o[2],
+            ];
+            *seen = [x - z * line.shear[0], y - z * line.shear[1], z];
+        }
+        let [a, b, c] = seen;
+        let u = c[0] * b[1] - c[1] * b[0];
+        let v = a[0] * c[1] - a[1] * c[0];
+        let w = b[0] * a[1] - b[1] * a[0];
+        let inside = (u.simd_ge(zero) & v.simd_ge(zero) & w.simd_ge(zero))
+            | (u.simd_le(zero) & v.simd_le(zero) & w.simd_le(zero));
+        if inside.to_bitmask() as u32 & self.full == 0 {
+            return (0, zero);
+        }
+        let determinant = u + v + w;
+        let t = (u * (a[2] * line.shear[2]) + v * (b[2] * line.shear[2]) + w * (c[2] * line.shear[2])) / determinant;
+        let (mut near, mut far) = (f32x4::splat(simd, f32::NEG_INFINITY), f32x4::splat(simd, f32::INFINITY));
+        for k in 0..3 {
+            let axis = line.axes[k];
+            let [a, b, c] = [self.corners[0][axis], self.corners[1][axis], self.corners[2][axis]];
+            let first = (a.min(b).min(c) - line.o_low[k]) * line.inverse[k];
+            let second = (a.max(b).max(c) - line.o_high[k]) * line.inverse[k];
+            near = near.max(first.min(second));
+            far = far.min(first.max(second));
+        }
+        // Selected in this way, NaN stays NaN.
+        let t = near.simd_gt(t).select(near, t);
+        let t = far.simd_lt(t).select(far, t);
+        let met = inside & determinant.simd_ne(zero) & near.simd_le(far) & far.simd_ge(zero);
+        (met.to_bitmask() as u32 & self.full, t)
+    }
+}

@@ -1,0 +1,140 @@
+//! A ray, prepared for tests against boxes and triangles.
+
+use glam::Vec3;
+
+/// Components of a direction nearer to 0 are taken to be this, so that their reciprocals are finite: 2^-100.
+pub const LEAST: f32 = f32::from_bits((127 - 100) << 23);
+
+/// A ray, with all that its tests against boxes and triangles have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Line {
+    /// Which axis is which in what follows: the third is that of the direction's largest component.
+    pub axes: [usize; 3],
+    /// The origin.
+    pub o: [f32; 3],
+    /// The origin that the low sides of boxes are seen from.
+    pub o_low: [f32; 3],
+    /// The origin that the high sides of boxes are seen from.
+    pub o_high: [f32; 3],
+    /// The reciprocals of the direction's components.
+    pub inverse: [f32; 3],
+    /// What makes the direction the third axis.
+    pub shear: [f32; 3],
+}
+
+/// A direction's component as the boxes' tests take it.
+#[inline(always)]
+pub fn away_from_zero(x: f32) -> f32 {
+    match () {
+        _ if x.abs() >= LEAST => x,
+        _ if x < 0.0 => -LEAST,
+        _ => LEAST,
+    }
+}
+
+/// The axes for a direction.
+#[inline(always)]
+pub fn axes(d: Vec3) -> [usize; 3] {
+    let [x, y, z] = d.abs().to_array();
+    let third = match () {
+        _ if x >= y && x >= z => 0,
+        _ if y >= z => 1,
+        _ => 2,
+    };
+    [(third + 1) % 3, (third + 2) % 3, third]
+}
+
+impl Line {
+    /// A ray from `o` along `d`, of any length. Boxes are tested as if they were larger by `pad` on all sides.
+    #[inline(always)]
+    pub fn new(o: Vec3, d: Vec3, pad: f32) -> Line {
+        let axes = axes(d);
+        let d = in_order(d.as_ref(), axes);
+        let o = in_order(o.as_ref(), axes);
+        Line {
+            axes,
+            o,
+            o_low: [o[0] + pad, o[1] + pad, o[2] + pad],
+            o_high: [o[0] - pad, o[1] - pad, o[2] - pad],
+            inverse: [
+                1.0 / away_from_zero(d[0]),
+                1.0 / away_from_zero(d[1]),
+                1.0 / away_from_zero(d[2]),
+            ],
+            shear: [d[0] / d[2], d[1] / d[2], 1.0 / d[2]],
+        }
+    }
+
+    /// From where to where the ray is in a box; the axes in the order of `self.axes`.
+    #[inline(always)]
+    pub fn slab(&self, low: [f32; 3], high: [f32; 3]) -> [f32; 2] {
+        let mut within = [f32::NEG_INFINITY, f32::INFINITY];
+        for k in 0..3 {
+            let a = (low[k] - self.o_low[k]) * self.inverse[k];
+            let b = (high[k] - self.o_high[k]) * self.inverse[k];
+            within = [greater(within[0], less(a, b)), less(within[1], greater(a, b))];
+        }
+        within
+    }
+
+    /// A corner of a triangle as seen from the origin, with the direction as the third axis.
+    #[inline(always)]
+    fn sheared(&self, v: [f32; 3]) -> [f32; 3] {
+        let [x, y, z] = [v[0] - self.o[0], v[1] - self.o[1], v[2] - self.o[2]];
+        [x - self.shear[0] * z, y - self.shear[1] * z, self.shear[2] * z]
+    }
+
+    /// Where the ray meets a triangle: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. It
+    /// does so only where it meets the box around the triangle too.
+    #[inline(always)]
+    pub fn triangle(&self, vertices: [&[f32; 4]; 3]) -> Option<f32> {
+        let corners = [
+            in_order(vertices[0], self.axes),
+            in_order(vertices[1], self.axes),
+            in_order(vertices[2], self.axes),
+        ];
+        let [a, b, c] = [
+            self.sheared(corners[0]),
+            self.sheared(corners[1]),
+            self.sheared(corners[2]),
+        ];
+        let u = c[0] * b[1] - c[1] * b[0];
+        let v = a[0] * c[1] - a[1] * c[0];
+        let w = b[0] * a[1] - b[1] * a[0];
+        let inside = ((u >= 0.0) & (v >= 0.0) & (w >= 0.0)) | ((u <= 0.0) & (v <= 0.0) & (w <= 0.0));
+        let determinant = u + v + w;
+        if !inside || determinant == 0.0 {
+            return None;
+        }
+        let t = (u * a[2] + v * b[2] + w * c[2]) / determinant;
+        let [mut low, mut high] = [corners[0]; 2];
+        for corner in &corners[1..] {
+            for k in 0..3 {
+                low[k] = less(low[k], corner[k]);
+                high[k] = greater(high[k], corner[k]);
+            }
+        }
+        let [near, far] = self.slab(low, high);
+        // In this order NaN stays NaN.
+        let t = less(far, greater(near, t));
+        (near <= far && t > 0.0).then_some(t)
+    }
+}
+
+/// A vector's components in the order of these axes.
+#[inline(always)]
+pub fn in_order<const N: usize>(v: &[f32; N], axes: [usize; 3]) -> [f32; 3] {
+    [v[axes[0]], v[axes[1]], v[axes[2]]]
+}
+
+/// The lesser of two numbers; the second where one is NaN.
+#[inline(always)]
+pub fn less(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers; the second where one is NaN.
+#[inline(always)]
+pub fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}

@@ -1,0 +1,472 @@
+use std::ops::Range;
+
+use glam::{DVec3, Vec3};
+
+use super::{Level, Line, Mesh, Nearest, Segments, closest, hidden, hidden_leaves, leaves};
+use crate::pack::tree::{Aabb, Tree, build};
+
+const NONE: Nearest = Nearest {
+    t: f32::INFINITY,
+    number: u32::MAX,
+    slot: 0,
+};
+
+struct Random(u64);
+
+impl Random {
+    fn bits(&mut self) -> u32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 32) as u32
+    }
+
+    /// From -1 to 1.
+    fn number(&mut self) -> f32 {
+        self.bits() as f32 / (1u64 << 31) as f32 - 1.0
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.number(), self.number(), self.number())
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        self.bits() as usize % n
+    }
+}
+
+/// Triangles with a tree over them.
+struct Scene {
+    tree: Tree,
+    vertices: Vec<[f32; 4]>,
+    triangles: Vec<[u32; 4]>,
+}
+
+impl Scene {
+    fn new(corners: &[Vec3], triangles: &[[u32; 3]], most_in_leaf: u32) -> Scene {
+        let boxes: Vec<Aabb> = triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|i| corners[i as usize]);
+                Aabb {
+                    low: a.min(b).min(c),
+                    high: a.max(b).max(c),
+                }
+            })
+            .collect();
+        let tree = build(&boxes, most_in_leaf);
+        let numbered = |i: &u32| {
+            let [a, b, c] = triangles[*i as usize];
+            [a, b, c, *i]
+        };
+        Scene {
+            triangles: tree.order.iter().map(numbered).collect(),
+            vertices: corners.iter().map(|v| v.extend(0.0).to_array()).collect(),
+            tree,
+        }
+    }
+
+    fn mesh(&self) -> Mesh<'_> {
+        Mesh {
+            nodes: &self.tree.nodes,
+            vertices: &self.vertices,
+            triangles: &self.triangles,
+        }
+    }
+
+    fn t(&self, triangle: &[u32; 4], line: &Line) -> Option<f32> {
+        let vertices = [0, 1, 2].map(|i| &self.vertices[triangle[i] as usize]);
+        line.triangle(vertices)
+    }
+
+    /// [`closest`] without a tree, from the line's origin on.
+    fn closest(&self, line: &Line, skip: u32, best: Nearest) -> Nearest {
+        let triangles = (0..).zip(&self.triangles).filter(|(_, t)| t[3] != skip);
+        triangles.fold(best, |best, (slot, triangle)| match self.t(triangle, line) {
+            Some(t) if (t, triangle[3]) < (best.t, best.number) => Nearest {
+                t,
+                number: triangle[3],
+                slot,
+            },
+            _ => best,
+        })
+    }
+
+    /// [`hidden`] without a tree.
+    fn hidden(&self, segments: &Segments, asked: u32) -> u32 {
+        let mut bits = 0;
+        for (i, d) in segments.directions.iter().enumerate() {
+            let line = Line::new(segments.o, *d, segments.pad);
+            let hides = |triangle: &[u32; 4]| {
+                triangle[3] != segments.skip && self.t(triangle, &line).is_some_and(|t| t < segments.reach)
+            };
+            bits |= u32::from(self.triangles.iter().any(hides)) << i;
+        }
+        bits & asked
+    }
+}
+
+/// All levels of instructions that this machine has.
+fn levels() -> Vec<Level> {
+    let best = Level::new();
+    #[allow(unused_mut, reason = "not all machines have several")]
+    let mut levels = vec![best];
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    {
+        levels.extend(best.as_avx2().map(Level::Avx2));
+        levels.extend(best.as_sse4_2().map(Level::Sse4_2));
+        levels.extend(best.as_sse2().map(Level::Sse2));
+    }
+    levels
+}
+
+/// What was compared, so that a test can say that it was something.
+#[derive(Debug, Default)]
+struct Seen {
+    hits: u32,
+    misses: u32,
+    hidden: u32,
+    free: u32,
+}
+
+/// Compares rays and groups of segments with all triangles one by one; `line` gives an origin and a direction.
+fn compare(
+    scene: &Scene,
+    random: &mut Random,
+    count: usize,
+    mut line: impl FnMut(&mut Random) -> (Vec3, Vec3),
+) -> Seen {
+    let mut seen = Seen::default();
+    let levels = levels();
+    for i in 0..count {
+        let pad = [0.0, 1e-6, 1e-3][i % 3];
+        let skip = if i % 4 == 0 {
+            random.below(scene.triangles.len()) as u32
+        } else {
+            u32::MAX
+        };
+        let (o, d) = line(random);
+        let best = Nearest {
+            t: if i % 7 == 0 {
+                random.number().abs()
+            } else {
+                f32::INFINITY
+            },
+            number: random.bits(),
+            slot: 0,
+        };
+        let prepared = Line::new(o, d, pad);
+        let right = scene.closest(&prepared, skip, best);
+        for level in &levels {
+            let found = closest(*level, &scene.mesh(), &prepared, 0.0, skip, best);
+            assert_eq!(found, right, "{level:?} {o} {d}");
+            assert_eq!(found.t.to_bits(), right.t.to_bits());
+        }
+        if right == best {
+            seen.misses += 1
+        } else {
+            seen.hits += 1
+        }
+
+        // Segments to points near one another, or anywhere.
+        let spread = [0.0, 0.01, 0.3, 10.0][i / 2 % 4];
+        let directions: Vec<Vec3> = (0..random.below(33))
+            .map(|_| {
+                if spread < 1.0 {
+                    d + random.vector() * (spread * d.length())
+                } else {
+                    line(random).1
+                }
+            })
+            .collect();
+        let segments = Segments {
+            o,
+            pad,
+            directions: &directions,
+            reach: if i % 2 == 0 { 1.0 } else { 1e30 },
+            skip,
+        };
+        let there = (0..directions.len()).fold(0, |bits, i| bits | 1 << i);
+        let asked = there & if i % 3 == 1 { random.bits() } else { !0 };
+        let right = scene.hidden(&segments, asked);
+        for level in &levels {
+            let bits = hidden(*level, &scene.mesh(), &segments, asked);
+            assert_eq!(bits, right, "{level:?} {segments:?}");
+        }
+        seen.hidden += right.count_ones();
+        seen.free += (asked & !right).count_ones();
+    }
+    seen
+}
+
+/// Triangles of this size around points from -1 to 1.
+fn soup(random: &mut Random, count: usize, size: f32) -> Scene {
+    let mut corners = Vec::new();
+    for _ in 0..count {
+        let middle = random.vector();
+        corners.extend((0..3).map(|_| middle + random.vector() * size));
+    }
+    let triangles: Vec<[u32; 3]> = (0..count as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    Scene::new(&corners, &triangles, 1 + random.bits() % 4)
+}
+
+#[test]
+fn soups() {
+    let random = &mut Random(1);
+    for (count, size) in [(1, 1.0), (2, 1.0), (9, 0.8), (300, 0.1), (2000, 0.05), (500, 0.5)] {
+        let scene = soup(random, count, size);
+        let rays = 400_000 / (count + 100);
+        let seen = compare(&scene, random, rays, |random| (random.vector() * 1.5, random.vector()));
+        assert!(
+            seen.hits > 5 && seen.misses > 5 && seen.hidden > 50 && seen.free > 50,
+            "{seen:?}"
+        );
+    }
+}
+
+#[test]
+fn nothing_at_all() {
+    let scene = Scene::new(&[], &[], 4);
+    let line = Line::new(Vec3::ZERO, Vec3::X, 0.0);
+    assert_eq!(closest(Level::new(), &scene.mesh(), &line, 0.0, u32::MAX, NONE), NONE);
+    let segments = Segments {
+        o: Vec3::ZERO,
+        pad: 0.0,
+        directions: &[Vec3::X, Vec3::Y],
+        reach: 1.0,
+        skip: u32::MAX,
+    };
+    assert_eq!(hidden(Level::new(), &scene.mesh(), &segments, 3), 0);
+    let scene = soup(&mut Random(2), 10, 1.0);
+    assert_eq!(hidden(Level::new(), &scene.mesh(), &segments, 0), 0);
+}
+
+/// A grid of squares in the plane z = 0, or rather a step that rises by `slope` a square, each of two triangles.
+fn grid(side: u32, slope: f32) -> Scene {
+    let at =
+        |x: u32, y: u32| Vec3::new(x as f32, y as f32, slope * x as f32) / side as f32 * 2.0 - Vec3::new(1.0, 1.0, 0.0);
+    let corners: Vec<Vec3> = (0..=side).flat_map(|y| (0..=side).map(move |x| at(x, y))).collect();
+    let mut triangles = Vec::new();
+    for y in 0..side {
+        for x in 0..side {
+            let i = y * (side + 1) + x;
+            triangles.push([i, i + 1, i + side + 2]);
+            triangles.push([i, i + side + 2, i + side + 1]);
+        }
+    }
+    Scene::new(&corners, &triangles, 4)
+}
+
+#[test]
+fn edges_and_corners_of_a_grid() {
+    let random = &mut Random(3);
+    for slope in [0.0, 0.25, -1.0] {
+        let scene = grid(16, slope);
+        // From above, from the plane itself, and along it, at corners and edges; along the axes, too.
+        let place = |random: &mut Random| {
+            Vec3::new(random.below(33) as f32, random.below(33) as f32, 0.0) / 16.0 - Vec3::new(1.0, 1.0, 0.0)
+        };
+        let seen = compare(&scene, random, 300, |random| {
+            let above = [0.0, 1.0, 0.125, -0.5][random.below(4)];
+            let (from, to) = (place(random) + Vec3::Z * above, place(random));
+            let axis = Vec3::AXES[random.below(3)];
+            match random.below(4) {
+                0 => (from, axis),
+                1 => (from, -axis),
+                2 => (from, Vec3::new(-0.0, axis.y, -1.0)),
+                _ => (from, to - from),
+            }
+        });
+        assert!(
+            seen.hits > 20 && seen.misses > 20 && seen.hidden > 20 && seen.free > 20,
+            "{seen:?}"
+        );
+    }
+}
+
+#[test]
+fn no_ray_slips_between_triangles() {
+    let random = &mut Random(4);
+    let scene = grid(16, 0.3);
+    for _ in 0..2000 {
+        // At points of edges, from anywhere above.
+        let along = (random.number() + 1.0) * 0.5;
+        let edge = random.below(scene.triangles.len());
+        let [a, b] = [0, 1].map(|i| Vec3::from_slice(&scene.vertices[scene.triangles[edge][i] as usize][..3]));
+        let to = a + (b - a) * along;
+        if to.x.abs().max(to.y.abs()) > 0.999 {
+            continue;
+        }
+        let from = random.vector() + Vec3::Z * 2.0;
+        let line = Line::new(from, to - from, 0.0);
+        let hit = closest(Level::new(), &scene.mesh(), &line, 0.0, u32::MAX, NONE);
+        assert!((hit.t - 1.0).abs() < 1e-4, "{from} {to} {hit:?}");
+    }
+}
+
+#[test]
+fn degenerate_triangles() {
+    let random = &mut Random(5);
+    let mut corners: Vec<Vec3> = (0..60).map(|_| random.vector()).collect();
+    corners.push(Vec3::ZERO);
+    let count = corners.len();
+    // Points, needles, and the same triangle many times.
+    let mut triangles = Vec::new();
+    for _ in 0..100 {
+        let [a, b, c] = [0; 3].map(|_| random.below(count) as u32);
+        triangles.extend([[a, a, a], [a, b, b], [a, b, a], [a, b, c], [a, b, c], [c, b, a]]);
+    }
+    let scene = Scene::new(&corners, &triangles, 4);
+    let any = corners.clone();
+    let seen = compare(&scene, random, 400, |random| {
+        let from = any[random.below(count)];
+        (from, any[random.below(count)] - from * [1.0, 0.0][random.below(2)])
+    });
+    assert!(
+        seen.hits > 20 && seen.misses > 20 && seen.hidden > 20 && seen.free > 20,
+        "{seen:?}"
+    );
+}
+
+#[test]
+fn huge_and_tiny() {
+    let random = &mut Random(6);
+    for scale in [1e-30, 1e-18, 1e-6, 1e9, 1e15, 1e30] {
+        let mut scene = soup(random, 200, 0.3);
+        for vertex in &mut scene.vertices {
+            *vertex = vertex.map(|x| x * scale);
+        }
+        let corners: Vec<Vec3> = scene.vertices.iter().map(|v| Vec3::from_slice(&v[..3])).collect();
+        let triangles: Vec<[u32; 3]> = scene.triangles.iter().map(|t| [t[0], t[1], t[2]]).collect();
+        let scene = Scene::new(&corners, &triangles, 4);
+        for length in [1.0, 1e-20, 1e20] {
+            compare(&scene, random, 60, |random| {
+                (random.vector() * scale, random.vector() * length)
+            });
+        }
+    }
+    // All sizes at once, and far from the origin.
+    let mut corners = Vec::new();
+    for i in 0..300 {
+        let far = if i % 2 == 0 { Vec3::splat(1000.0) } else { Vec3::ZERO };
+        let middle = random.vector() + far;
+        let size = 10f32.powi(i % 12 - 6);
+        corners.extend((0..3).map(|_| middle + random.vector() * size));
+    }
+    let triangles: Vec<[u32; 3]> = (0..300).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let scene = Scene::new(&corners, &triangles, 4);
+    let seen = compare(&scene, random, 400, |random| {
+        let from = random.vector() * 2.0 + [Vec3::ZERO, Vec3::splat(1000.0)][random.below(2)];
+        (from, random.vector())
+    });
+    assert!(seen.hits > 20 && seen.hidden > 20 && seen.free > 20, "{seen:?}");
+}
+
+#[test]
+fn directions_with_zeros() {
+    let random = &mut Random(7);
+    let scene = soup(random, 300, 0.3);
+    let component = |random: &mut Random| {
+        let x = random.number();
+        [0.0, -0.0, 1e-38, -1e-42, x, x, 1.0, -1.0][random.below(8)]
+    };
+    let seen = compare(&scene, random, 400, |random| {
+        (
+            random.vector(),
+            Vec3::new(component(random), component(random), component(random)),
+        )
+    });
+    assert!(
+        seen.hits > 20 && seen.misses > 20 && seen.hidden > 20 && seen.free > 20,
+        "{seen:?}"
+    );
+}
+
+#[test]
+fn leaves_are_visited_until_the_limit() {
+    let random = &mut Random(8);
+    let scene = soup(random, 500, 0.1);
+    for level in levels() {
+        for _ in 0..100 {
+            let (o, d) = (random.vector(), random.vector());
+            let line = Line::new(o, d, 0.0);
+            let right = scene.closest(&line, u32::MAX, NONE);
+            let mut best = NONE;
+            leaves(level, &scene.tree.nodes, &line, best.t, |items: Range<usize>, limit| {
+                assert_eq!(limit, best.t);
+                for (slot, triangle) in (items.start as u32..).zip(&scene.triangles[items]) {
+                    let number = triangle[3];
+                    if let Some(t) = scene.t(triangle, &line)
+                        && (t, number) < (best.t, best.number)
+                    {
+                        best = Nearest { t, number, slot };
+                    }
+                }
+                best.t
+            });
+            assert_eq!(best, right);
+
+            let directions: Vec<Vec3> = (0..32).map(|_| d + random.vector() * 0.5).collect();
+            let segments = Segments {
+                o,
+                pad: 0.0,
+                directions: &directions,
+                reach: 1.0,
+                skip: u32::MAX,
+            };
+            let asked = random.bits();
+            let mut visits = 0;
+            let bits = hidden_leaves(level, &scene.tree.nodes, &segments, asked, |items, some| {
+                assert_eq!(some & !asked, 0);
+                visits += 1;
+                let mut hidden = 0;
+                for (i, d) in directions.iter().enumerate().filter(|(i, _)| some >> i & 1 == 1) {
+                    let line = Line::new(o, *d, 0.0);
+                    let hides = |triangle| scene.t(triangle, &line).is_some_and(|t| t < 1.0);
+                    hidden |= u32::from(scene.triangles[items.clone()].iter().any(hides)) << i;
+                }
+                hidden
+            });
+            assert_eq!(bits, scene.hidden(&segments, asked));
+            assert!(visits < 200, "{visits} visits");
+        }
+    }
+}
+
+/// Möller and Trumbore's test in f64, where the triangle is met well inside.
+fn by_another_way(o: DVec3, d: DVec3, [a, b, c]: [DVec3; 3]) -> Option<(f64, f64)> {
+    let (e1, e2) = (b - a, c - a);
+    let p = d.cross(e2);
+    let determinant = e1.dot(p);
+    let s = o - a;
+    let u = s.dot(p) / determinant;
+    let q = s.cross(e1);
+    let v = d.dot(q) / determinant;
+    Some((e2.dot(q) / determinant, u.min(v).min(1.0 - u - v))).filter(|_| determinant != 0.0)
+}
+
+#[test]
+fn the_triangle_that_is_there() {
+    let random = &mut Random(9);
+    let (mut hits, mut misses) = (0, 0);
+    for _ in 0..10_000 {
+        let corners = [0; 3].map(|_| random.vector());
+        let (o, d) = (random.vector() * 2.0, random.vector());
+        let vertices = corners.map(|v| v.extend(0.0).to_array());
+        let found = Line::new(o, d, 0.0).triangle([&vertices[0], &vertices[1], &vertices[2]]);
+        match by_another_way(o.as_dvec3(), d.as_dvec3(), corners.map(|v| v.as_dvec3())) {
+            Some((t, inside)) if inside > 1e-3 && t > 1e-3 => {
+                let found = f64::from(found.unwrap());
+                assert!((found - t).abs() < 1e-3 * t, "{found} {t}");
+                hits += 1;
+            }
+            Some((t, inside)) if inside < -1e-3 || t < -1e-3 => {
+                assert_eq!(found, None);
+                misses += 1;
+            }
+            _ => {}
+        }
+    }
+    assert!(hits > 100 && misses > 100);
+}

@@ -1,0 +1,266 @@
+//! Triangle meshes: what a mesh file holds, in memory, and how it is read.
+//!
+//! [`Mesh::load`] reads Wavefront OBJ, PLY and STL files.
+
+mod cache;
+mod draft;
+mod error;
+mod finish;
+mod mtl;
+mod neighbours;
+mod obj;
+mod ply;
+mod stl;
+mod words;
+
+use std::fs;
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::{DVec3, Vec2, Vec3};
+use serde::{Deserialize, Serialize};
+
+use self::cache::Cache;
+pub use self::error::MeshError;
+use self::error::{Fault, Place, shown};
+use crate::pack::PackedMesh;
+use crate::pack::tree::Aabb;
+
+/// The largest file, in bytes.
+const LARGEST_FILE: u64 = 8 << 30;
+/// The largest file of materials, in bytes.
+const LARGEST_LIBRARY: u64 = 16 << 20;
+/// The most triangles, and the most vertices: three times as many are numbered by 32 bits.
+const MOST: usize = 1 << 30;
+/// The largest coordinate of a position.
+const LARGEST_COORDINATE: f64 = 1e9;
+
+/// A mesh of triangles that share vertices. Positions count from [`Mesh::center`], so that one far from the origin keeps its
+/// digits.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Mesh {
+    /// Where positions are counted from, in the file's coordinates.
+    pub center: DVec3,
+    /// The vertices.
+    pub positions: Vec<Vec3>,
+    /// A unit normal for each vertex, outwards; empty if there are none.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates of each vertex; empty if there are none.
+    pub uvs: Vec<Vec2>,
+    /// Each triangle's vertices, counter-clockwise as seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// The parts that may have a material of their own, at least one.
+    pub groups: Vec<Group>,
+    /// Each triangle's group; empty if there is one group alone.
+    pub group_of: Vec<u32>,
+    /// The materials that come with the file, for groups to name. What a mesh looks like is the scene's to say; nothing else
+    /// takes them from here.
+    pub library: Vec<MtlMaterial>,
+    /// What is odd about the file, and how it was dealt with, for a user to read: `12 degenerate triangles dropped`.
+    pub notes: Vec<String>,
+    /// The mesh as it is rendered, once that was asked for.
+    packed: Cache<PackedMesh>,
+    /// The box around its vertices, once that was asked for.
+    bounds: Cache<Aabb>,
+}
+
+/// A part of a mesh.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub struct Group {
+    /// Its name in the file; empty if it has none.
+    pub name: String,
+    /// The name of its material in the file.
+    pub material: Option<String>,
+}
+
+/// A material of an MTL file, as the file has it: what is not there is None.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct MtlMaterial {
+    /// Its name: `newmtl`.
+    pub name: String,
+    /// The diffuse reflectance: `Kd`.
+    pub diffuse: Option<[f64; 3]>,
+    /// The specular reflectance: `Ks`.
+    pub specular: Option<[f64; 3]>,
+    /// The exponent of the highlight: `Ns`.
+    pub shininess: Option<f64>,
+    /// What it emits: `Ke`.
+    pub emission: Option<[f64; 3]>,
+    /// How opaque it is, from 0 to 1: `d`, or 1 - `Tr`.
+    pub opacity: Option<f64>,
+    /// The index of refraction: `Ni`.
+    pub index_of_refraction: Option<f64>,
+    /// The number of the illumination model: `illum`.
+    pub illumination: Option<u8>,
+    /// The file of the diffuse reflectance, without options: `map_Kd`.
+    pub diffuse_map: Option<String>,
+}
+
+/// Which normals a mesh has: what its surface looks like under light, not where it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Normals {
+    /// Made from the triangles around each position, weighted by their angles there.
+    Smooth,
+    /// Each triangle's own: [`Mesh::normals`] is empty.
+    Flat,
+    /// The file's. A file without any is an error.
+    File,
+}
+
+impl Mesh {
+    /// Reads a mesh from a file whose name ends in `.obj`, `.ply` or `.stl`.
+    ///
+    /// Without a word on normals they are the file's if it has any for its vertices (OBJ, PLY), else flat ones.
+    ///
+    /// - Polygons become triangles: fans from their first vertex. Triangles without an area are dropped.
+    /// - OBJ files have a vertex for each different combination of position, texture coordinates and normal at a corner,
+    ///   and a group for each different combination of `g` or `o`, the later one, with `usemtl`. The files that `mtllib`
+    ///   names are read if they are in the folder of the mesh or in one below. Smoothing groups (`s`), colours of vertices,
+    ///   fourth coordinates, and what is no triangle are not looked at.
+    /// - PLY files have the vertices that their triangles share.
+    /// - STL files have a vertex for each different position, and a group for each `solid`. Normals of facets are looked at
+    ///   for [`Normals::File`] alone, and then tell vertices apart.
+    ///
+    /// What is odd but no error is in [`Mesh::notes`], and is told as a warning by `tracing`, with the file.
+    pub fn load(path: &Path, normals: Option<Normals>) -> Result<Mesh, MeshError> {
+        let _span = tracing::debug_span!("mesh", path = %path.display()).entered();
+        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let format = match ending.to_str() {
+            Some("obj") => Format::Obj,
+            Some("ply") => Format::Ply,
+            Some("stl") => Format::Stl,
+            _ => {
+                let rule = "the name of a mesh must end in .obj, .ply or .stl";
+                return Err(Place::File.fault(rule).of(path));
+            }
+        };
+        let read_error = |error| MeshError::Read {
+            path: path.to_owned(),
+            error,
+        };
+        let bytes = match read_file(path, LARGEST_FILE).map_err(read_error)? {
+            Some(bytes) => bytes,
+            None => {
+                let rule = format!("must not be larger than {} GiB", LARGEST_FILE >> 30);
+                return Err(Place::File.fault(rule).of(path));
+            }
+        };
+        let (mut mesh, libraries) = read(&bytes, format, normals).map_err(|fault| fault.of(path))?;
+        drop(bytes);
+        for names in libraries {
+            mesh.load_libraries(path, &names);
+        }
+        for note in &mesh.notes {
+            tracing::warn!("{}: {note}", path.display());
+        }
+        Ok(mesh)
+    }
+
+    /// Reads the files of materials of one line: one whose name may have blanks, or several.
+    fn load_libraries(&mut self, mesh: &Path, names: &str) {
+        let folder = match mesh.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        if folder.join(names).exists() {
+            self.load_library(folder, names);
+        } else {
+            let names = names.split(' ').take(obj::MOST_LIBRARIES);
+            names.for_each(|name| self.load_library(folder, name));
+        }
+    }
+
+    /// Reads a file of materials. There is a note if that cannot be done.
+    fn load_library(&mut self, folder: &Path, name: &str) {
+        match library(folder, name) {
+            Ok(bytes) => {
+                let (materials, problems) = mtl::read(&bytes);
+                self.library.extend(materials);
+                if let Some(problem) = problems.first() {
+                    let others = match problems.len() - 1 {
+                        0 => String::new(),
+                        count => format!("; {count} more lines cannot be read"),
+                    };
+                    self.notes.push(format!("{name}:{problem}{others}"));
+                }
+            }
+            Err(why) => {
+                let name = shown(name.as_bytes());
+                self.notes
+                    .push(format!("the file of materials {name} is not read: {why}"));
+            }
+        }
+    }
+}
+
+impl Mesh {
+    /// The mesh as it is rendered, with its tree. It is built when that is first asked for.
+    pub(crate) fn packed(&self) -> Arc<PackedMesh> {
+        self.packed.get_or_init(|| PackedMesh::of(self))
+    }
+
+    /// The corners of its box, in the file's coordinates.
+    pub(crate) fn corners(&self) -> impl Iterator<Item = DVec3> {
+        let bounds = self.bounds.get_or_init(|| Aabb::around(&self.positions));
+        let [low, high] = [bounds.low, bounds.high].map(|corner| corner.as_dvec3() + self.center);
+        (0..8).map(move |i| {
+            let side = |axis: usize| if i >> axis & 1 == 0 { low[axis] } else { high[axis] };
+            DVec3::new(side(0), side(1), side(2))
+        })
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Format {
+    Obj,
+    Ply,
+    Stl,
+}
+
+/// Reads a mesh, and the names of its files of materials, from the bytes of a file.
+fn read(bytes: &[u8], format: Format, normals: Option<Normals>) -> Result<(Mesh, Vec<String>), Fault> {
+    let are_wanted = matches!(normals, None | Some(Normals::File));
+    let (draft, libraries) = match format {
+        Format::Obj => {
+            let obj = obj::read(bytes, are_wanted)?;
+            (obj.draft, obj.libraries)
+        }
+        Format::Ply => (ply::read(bytes, are_wanted)?, Vec::new()),
+        Format::Stl => (stl::read(bytes, normals == Some(Normals::File))?, Vec::new()),
+    };
+    Ok((finish::finish(draft, normals)?, libraries))
+}
+
+/// The bytes of a file; None if it is too large.
+fn read_file(path: &Path, largest: u64) -> io::Result<Option<Vec<u8>>> {
+    // A pipe could keep its reader waiting for ever.
+    let data = fs::metadata(path)?;
+    if !data.is_file() {
+        return Err(io::Error::other("it must be a file"));
+    }
+    if data.len() > largest {
+        return Ok(None);
+    }
+    let mut bytes = Vec::with_capacity(data.len() as usize);
+    fs::File::open(path)?.take(largest + 1).read_to_end(&mut bytes)?;
+    Ok(Some(bytes).filter(|bytes| bytes.len() as u64 <= largest))
+}
+
+/// The bytes of a file of materials; or why there are none.
+fn library(folder: &Path, name: &str) -> Result<Vec<u8>, String> {
+    let told = |error: io::Error| error.to_string();
+    let path: PathBuf = folder.join(name).canonicalize().map_err(told)?;
+    if !path.starts_with(folder.canonicalize().map_err(told)?) {
+        return Err("it must be in the folder of the mesh".to_string());
+    }
+    match read_file(&path, LARGEST_LIBRARY).map_err(told)? {
+        Some(bytes) => Ok(bytes),
+        None => Err(format!("it must not be larger than {} MiB", LARGEST_LIBRARY >> 20)),
+    }
+}

@@ -1,0 +1,128 @@
+//! The materials that an OBJ file names: MTL files. What a mesh looks like is the scene's to say, so a line that cannot be
+//! read is told and left out.
+
+use super::MtlMaterial;
+use super::words::{Words, number};
+
+/// Reads the materials of a file. Messages begin with the line.
+pub(super) fn read(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
+    let mut words = Words::new(bytes);
+    let mut materials: Vec<MtlMaterial> = Vec::new();
+    let mut problems = Vec::new();
+    while let Some(keyword) = words.anywhere() {
+        if keyword == b"newmtl" {
+            materials.push(MtlMaterial {
+                name: words.name(),
+                ..MtlMaterial::default()
+            });
+        } else if let Some(material) = materials.last_mut()
+            && let Err(fault) = set(material, keyword, &mut words)
+        {
+            problems.push(fault);
+        }
+        words.next_line();
+    }
+    (materials, problems)
+}
+
+/// Sets a field of a material by a line. The error is the line and the rule.
+fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<(), String> {
+    let told = |fault: super::error::Fault| match fault.place {
+        super::error::Place::Line(line) => format!("{line}: {}", fault.message),
+        _ => fault.message,
+    };
+    let finite = |words: &mut Words| -> Result<f64, String> {
+        let x = words.number("the value").map_err(told)?;
+        match x.is_finite() {
+            true => Ok(x),
+            false => Err(told(words.fault(format!("{x} must be finite")))),
+        }
+    };
+    // One number stands for three.
+    let color = |words: &mut Words| -> Result<[f64; 3], String> {
+        let red = finite(words)?;
+        match words.on_line() {
+            None => Ok([red; 3]),
+            Some(word) => match number(word).filter(|green| green.is_finite()) {
+                Some(green) => Ok([red, green, finite(words)?]),
+                None => Err(told(words.fault("a colour must be three numbers"))),
+            },
+        }
+    };
+    match keyword {
+        b"Kd" => material.diffuse = Some(color(words)?),
+        b"Ks" => material.specular = Some(color(words)?),
+        b"Ke" => material.emission = Some(color(words)?),
+        b"Ns" => material.shininess = Some(finite(words)?),
+        b"Ni" => material.index_of_refraction = Some(finite(words)?),
+        b"d" => material.opacity = Some(finite(words)?),
+        b"Tr" => material.opacity = Some(1.0 - finite(words)?),
+        b"illum" => material.illumination = Some(finite(words)?.clamp(0.0, 255.0) as u8),
+        b"map_Kd" => material.diffuse_map = Some(map_file(&words.name())).filter(|file| !file.is_empty()),
+        _ => {}
+    }
+    Ok(())
+}
+
+/// The file of a map, behind its options.
+fn map_file(line: &str) -> String {
+    let mut words = line.split(' ').peekable();
+    while let Some(option) = words.next_if(|word| word.starts_with('-')) {
+        let numbers = match option {
+            "-o" | "-s" | "-t" => 3,
+            "-mm" => 2,
+            _ => 1,
+        };
+        for i in 0..numbers {
+            // Of three numbers the first must be there.
+            if i == 0 || words.peek().is_some_and(|word| word.parse::<f64>().is_ok()) {
+                words.next();
+            }
+        }
+    }
+    words.collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn materials_have_their_values() {
+        let text = "# two\nKd 9 9 9\nnewmtl dark red\nKd 0.5 0.1 0.2\nKs 0.25\nNs 10\nKe 1 2 3\nd 0.5\nNi 1.5\nillum 2\n\
+                    map_Kd -s 2 2 -clamp on my wood.png\nmap_Bump b.png\n\nnewmtl glass\r\nTr 0.75\r\n";
+        let (materials, problems) = read(text.as_bytes());
+        assert_eq!(problems, Vec::<String>::new());
+        let red = MtlMaterial {
+            name: "dark red".to_string(),
+            diffuse: Some([0.5, 0.1, 0.2]),
+            specular: Some([0.25; 3]),
+            shininess: Some(10.0),
+            emission: Some([1.0, 2.0, 3.0]),
+            opacity: Some(0.5),
+            index_of_refraction: Some(1.5),
+            illumination: Some(2),
+            diffuse_map: Some("my wood.png".to_string()),
+        };
+        let glass = MtlMaterial {
+            name: "glass".to_string(),
+            opacity: Some(0.25),
+            ..MtlMaterial::default()
+        };
+        assert_eq!(materials, [red, glass]);
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_told() {
+        let (materials, problems) = read(b"newmtl a\nKd spectral a.rfl\nNs inf\nKd 1 b\nd 0.5");
+        assert_eq!(
+            problems,
+            [
+                "2: the value: \"spectral\" must be a number",
+                "3: inf must be finite",
+                "4: a colour must be three numbers"
+            ]
+        );
+        assert_eq!((materials[0].diffuse, materials[0].opacity), (None, Some(0.5)));
+    }
+}

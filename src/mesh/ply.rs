@@ -1,0 +1,503 @@
+//! PLY files: Greg Turk, "The PLY Polygon File Format", 1994; ASCII, and binary of either byte order.
+//!
+//! Not by `ply-rs-bw` 4, which makes a map of every row: a million triangles take it more than 1 s, and a whole load takes
+//! 0.15 s here.
+
+use glam::{DVec3, Vec2};
+
+use super::draft::{Draft, Fan, coordinate, texture_coordinate, unit};
+use super::error::{Fault, Place, shown, shown_number};
+use super::words::{self, Words};
+use super::{Group, MOST};
+
+/// Reads a file. Normals are kept if they are wanted.
+pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
+    let mut words = Words::new(bytes);
+    let header = header(&mut words)?;
+    match header.format {
+        Format::Ascii => body(&header, Ascii { words }, normals_wanted),
+        Format::Binary { is_big } => {
+            let at = words.offset();
+            body(&header, Binary { bytes, at, is_big }, normals_wanted)
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Ascii,
+    Binary { is_big: bool },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    fn named(name: &[u8]) -> Option<Scalar> {
+        Some(match name {
+            b"char" | b"int8" => Scalar::I8,
+            b"uchar" | b"uint8" => Scalar::U8,
+            b"short" | b"int16" => Scalar::I16,
+            b"ushort" | b"uint16" => Scalar::U16,
+            b"int" | b"int32" => Scalar::I32,
+            b"uint" | b"uint32" => Scalar::U32,
+            b"float" | b"float32" => Scalar::F32,
+            b"double" | b"float64" => Scalar::F64,
+            _ => return None,
+        })
+    }
+
+    /// Its bytes in a binary file.
+    fn size(self) -> usize {
+        match self {
+            Scalar::I8 | Scalar::U8 => 1,
+            Scalar::I16 | Scalar::U16 => 2,
+            Scalar::I32 | Scalar::U32 | Scalar::F32 => 4,
+            Scalar::F64 => 8,
+        }
+    }
+
+    fn is_whole(self) -> bool {
+        !matches!(self, Scalar::F32 | Scalar::F64)
+    }
+}
+
+struct Property {
+    name: String,
+    /// The type of a list's length, if it is a list.
+    count: Option<Scalar>,
+    scalar: Scalar,
+}
+
+struct Element {
+    name: String,
+    count: usize,
+    properties: Vec<Property>,
+    /// Where the header tells of it.
+    place: Place,
+}
+
+struct Header {
+    format: Format,
+    elements: Vec<Element>,
+}
+
+fn header(words: &mut Words) -> Result<Header, Fault> {
+    if words.on_line() != Some(&b"ply"[..]) {
+        return Err(words.fault("the file must begin with \"ply\""));
+    }
+    let mut format = None;
+    let mut elements: Vec<Element> = Vec::new();
+    loop {
+        if !words.skip_line() {
+            return Err(words.fault("the file ends inside of its header; \"end_header\" is missing"));
+        }
+        match words.on_line() {
+            None | Some(b"comment" | b"obj_info") => {}
+            Some(b"format") => {
+                let name = words.on_line().unwrap_or_default();
+                format = Some(match name {
+                    b"ascii" => Format::Ascii,
+                    b"binary_little_endian" => Format::Binary { is_big: false },
+                    b"binary_big_endian" => Format::Binary { is_big: true },
+                    _ => {
+                        let rule = "must be ascii, binary_little_endian or binary_big_endian";
+                        return Err(words.fault(format!("format: {} {rule}", shown(name))));
+                    }
+                });
+                let version = words.on_line().unwrap_or_default();
+                if version != &b"1.0"[..] {
+                    return Err(words.fault(format!("format: version {} must be 1.0", shown(version))));
+                }
+            }
+            Some(b"element") => {
+                let name = String::from_utf8_lossy(words.on_line().unwrap_or_default()).into_owned();
+                let count = words.on_line().unwrap_or_default();
+                let count = std::str::from_utf8(count)
+                    .ok()
+                    .and_then(|count| count.parse().ok())
+                    .ok_or_else(|| {
+                        let rule = "must be a whole number that memory has room for";
+                        words.fault(format!("element {name:?}: {} {rule}", shown(count)))
+                    })?;
+                elements.push(Element {
+                    name,
+                    count,
+                    properties: Vec::new(),
+                    place: words.place(),
+                });
+            }
+            Some(b"property") => {
+                let property = property(words)?;
+                match elements.last_mut() {
+                    Some(element) => element.properties.push(property),
+                    None => return Err(words.fault("a property must follow its element")),
+                }
+            }
+            Some(b"end_header") => break,
+            Some(word) => {
+                let rule = "must be \"format\", \"comment\", \"obj_info\", \"element\", \"property\" or \"end_header\"";
+                return Err(words.fault(format!("{} {rule}", shown(word))));
+            }
+        }
+    }
+    words.skip_line();
+    match format {
+        Some(format) => Ok(Header { format, elements }),
+        None => Err(words.fault("the header must have a line \"format\"")),
+    }
+}
+
+fn property(words: &mut Words) -> Result<Property, Fault> {
+    let scalar = |words: &Words, name: &[u8]| {
+        Scalar::named(name).ok_or_else(|| {
+            let rule = "must be a type: char, uchar, short, ushort, int, uint, float or double";
+            words.fault(format!("property: {} {rule}", shown(name)))
+        })
+    };
+    let mut kind = words.on_line().unwrap_or_default();
+    let mut count = None;
+    if kind == &b"list"[..] {
+        let word = words.on_line().unwrap_or_default();
+        let number = scalar(words, word)?;
+        if !number.is_whole() {
+            return Err(words.fault(format!("property: {} must be a type of whole numbers", shown(word))));
+        }
+        count = Some(number);
+        kind = words.on_line().unwrap_or_default();
+    }
+    let scalar = scalar(words, kind)?;
+    match words.on_line() {
+        Some(name) => Ok(Property {
+            name: String::from_utf8_lossy(name).into_owned(),
+            count,
+            scalar,
+        }),
+        None => Err(words.fault("property: its name is missing")),
+    }
+}
+
+/// The values behind the header.
+trait Values {
+    fn next(&mut self, scalar: Scalar) -> Result<f64, Fault>;
+    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), Fault>;
+    /// The fewest bytes that so many values take.
+    fn fewest_bytes(&self, scalar: Scalar) -> usize;
+    fn left(&self) -> usize;
+    /// Where the next value is.
+    fn place(&mut self) -> Place;
+}
+
+struct Ascii<'a> {
+    words: Words<'a>,
+}
+
+impl Values for Ascii<'_> {
+    #[inline]
+    fn next(&mut self, _: Scalar) -> Result<f64, Fault> {
+        match self.words.anywhere() {
+            Some(word) => {
+                words::number(word).ok_or_else(|| self.words.fault(format!("{} must be a number", shown(word))))
+            }
+            None => Err(self.words.fault("the file ends too early: values are missing")),
+        }
+    }
+
+    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), Fault> {
+        (0..count).try_for_each(|_| self.next(scalar).map(|_| ()))
+    }
+
+    /// A digit and a blank; the last one has no blank.
+    fn fewest_bytes(&self, _: Scalar) -> usize {
+        2
+    }
+
+    fn left(&self) -> usize {
+        self.words.left() + 1
+    }
+
+    fn place(&mut self) -> Place {
+        self.words.find_word_anywhere();
+        self.words.place()
+    }
+}
+
+struct Binary<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    is_big: bool,
+}
+
+impl Binary<'_> {
+    #[inline]
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], Fault> {
+        let Some(bytes) = self.bytes[self.at..].first_chunk::<N>() else {
+            return Err(self.ended());
+        };
+        self.at += N;
+        let mut bytes = *bytes;
+        if self.is_big {
+            bytes.reverse();
+        }
+        Ok(bytes)
+    }
+
+    #[cold]
+    fn ended(&self) -> Fault {
+        Place::Byte(self.at).fault("the file ends too early: values are missing")
+    }
+}
+
+impl Values for Binary<'_> {
+    #[inline]
+    fn next(&mut self, scalar: Scalar) -> Result<f64, Fault> {
+        Ok(match scalar {
+            Scalar::I8 => i8::from_le_bytes(self.take()?).into(),
+            Scalar::U8 => u8::from_le_bytes(self.take()?).into(),
+            Scalar::I16 => i16::from_le_bytes(self.take()?).into(),
+            Scalar::U16 => u16::from_le_bytes(self.take()?).into(),
+            Scalar::I32 => i32::from_le_bytes(self.take()?).into(),
+            Scalar::U32 => u32::from_le_bytes(self.take()?).into(),
+            Scalar::F32 => f32::from_le_bytes(self.take()?).into(),
+            Scalar::F64 => f64::from_le_bytes(self.take()?),
+        })
+    }
+
+    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), Fault> {
+        match count.checked_mul(scalar.size()) {
+            Some(size) if size <= self.left() => {
+                self.at += size;
+                Ok(())
+            }
+            _ => Err(self.ended()),
+        }
+    }
+
+    fn fewest_bytes(&self, scalar: Scalar) -> usize {
+        scalar.size()
+    }
+
+    fn left(&self) -> usize {
+        self.bytes.len() - self.at
+    }
+
+    fn place(&mut self) -> Place {
+        Place::Byte(self.at)
+    }
+}
+
+fn body(header: &Header, mut values: impl Values, normals_wanted: bool) -> Result<Draft, Fault> {
+    let element = |name: &str| header.elements.iter().find(|element| element.name == name);
+    let vertices = element("vertex").ok_or_else(|| Place::File.fault("the header must have an element \"vertex\""))?;
+    if element("face").is_none_or(|faces| faces.count == 0) {
+        return Err(Place::File.fault(match element("tristrips") {
+            Some(_) => "has tristrips, which are not read: it must have an element \"face\"",
+            None => "has no triangles: it must have an element \"face\"",
+        }));
+    }
+    if vertices.count > MOST {
+        let rule = format!("{} vertices; there must be at most {MOST}", vertices.count);
+        return Err(vertices.place.fault(rule));
+    }
+    let mut draft = Draft::default();
+    draft.groups.push(Group::default());
+    draft.begin(0);
+    // A name that stands there twice is skipped the second time.
+    let (mut seen_vertices, mut seen_faces) = (false, false);
+    for element in &header.elements {
+        check_size(element, &values)?;
+        match element.name.as_str() {
+            "vertex" if !std::mem::replace(&mut seen_vertices, true) => {
+                read_vertices(element, &mut values, normals_wanted, &mut draft)?
+            }
+            "face" if !std::mem::replace(&mut seen_faces, true) => {
+                read_faces(element, &mut values, vertices.count, &mut draft)?
+            }
+            _ => {
+                // An element without properties has no bytes.
+                let rows = if element.properties.is_empty() {
+                    0
+                } else {
+                    element.count
+                };
+                for _ in 0..rows {
+                    element
+                        .properties
+                        .iter()
+                        .try_for_each(|property| skip(property, &mut values))?;
+                }
+            }
+        }
+    }
+    Ok(draft)
+}
+
+/// Refuses counts that the rest of the file has no bytes for.
+fn check_size(element: &Element, values: &impl Values) -> Result<(), Fault> {
+    let fewest = |property: &Property| values.fewest_bytes(property.count.unwrap_or(property.scalar));
+    let row = element.properties.iter().map(fewest).sum::<usize>();
+    let all = row as u128 * element.count as u128;
+    match all <= values.left() as u128 {
+        true => Ok(()),
+        false => Err(element.place.fault(format!(
+            "element {:?}: {} of them take {all} bytes or more; the file has {} left",
+            element.name,
+            element.count,
+            values.left()
+        ))),
+    }
+}
+
+fn skip(property: &Property, values: &mut impl Values) -> Result<(), Fault> {
+    let count = match property.count {
+        Some(count) => list_length(count, property, values)?,
+        None => 1,
+    };
+    values.skip(property.scalar, count)
+}
+
+#[inline]
+fn list_length(count: Scalar, property: &Property, values: &mut impl Values) -> Result<usize, Fault> {
+    let place = values.place();
+    let length = values.next(count)?;
+    // No file has more than 2^52 values.
+    match length >= 0.0 && length.fract() == 0.0 && length < (1u64 << 52) as f64 {
+        true => Ok(length as usize),
+        false => Err(place.fault(format!(
+            "{}: the length {} must be a whole number, 0 or greater",
+            property.name,
+            shown_number(length)
+        ))),
+    }
+}
+
+/// The names of the columns of a vertex: position, normal, texture coordinates.
+const COLUMNS: [&[&str]; 8] = [
+    &["x"],
+    &["y"],
+    &["z"],
+    &["nx"],
+    &["ny"],
+    &["nz"],
+    &["u", "s", "texture_u"],
+    &["v", "t", "texture_v"],
+];
+
+fn read_vertices(
+    element: &Element,
+    values: &mut impl Values,
+    normals_wanted: bool,
+    draft: &mut Draft,
+) -> Result<(), Fault> {
+    // For each property the column that it is, and for each column whether it is there.
+    let mut has = [false; 8];
+    let columns: Vec<Option<usize>> = element
+        .properties
+        .iter()
+        .map(|property| {
+            let names = |names: &&[&str]| names.contains(&property.name.as_str());
+            let column = COLUMNS.iter().position(names)?;
+            let is_free = property.count.is_none() && !has[column];
+            has[column] |= is_free;
+            is_free.then_some(column)
+        })
+        .collect();
+    if let Some(missing) = (0..3).find(|column| !has[*column]) {
+        let name = COLUMNS[missing][0];
+        return Err(element
+            .place
+            .fault(format!("element \"vertex\": it must have a property {name:?}")));
+    }
+    let has_normals = normals_wanted && has[3] && has[4] && has[5];
+    let has_uvs = has[6] && has[7];
+    draft.positions.reserve_exact(element.count);
+    if has_normals {
+        draft.normals.reserve_exact(element.count);
+    }
+    if has_uvs {
+        draft.uvs.reserve_exact(element.count);
+    }
+    for i in 0..element.count {
+        let place = values.place();
+        let mut row = [0.0; 8];
+        for (property, column) in element.properties.iter().zip(&columns) {
+            match column {
+                Some(column) => row[*column] = values.next(property.scalar)?,
+                None => skip(property, values)?,
+            }
+        }
+        let fault = |name: &str, rule: String| place.fault(format!("vertex {i}: {name}: {rule}"));
+        let [x, y, z, nx, ny, nz, u, v] = row;
+        let position = |name: &str, x: f64| coordinate(x).map_err(|rule| fault(name, rule));
+        draft
+            .positions
+            .push(DVec3::new(position("x", x)?, position("y", y)?, position("z", z)?));
+        if has_normals {
+            draft.normals.push(unit(DVec3::new(nx, ny, nz)));
+        }
+        if has_uvs {
+            let uv = |name: &str, x: f64| texture_coordinate(x).map_err(|rule| fault(name, rule));
+            draft.uvs.push(Vec2::new(uv("u", u)?, uv("v", v)?));
+        }
+    }
+    Ok(())
+}
+
+fn read_faces(element: &Element, values: &mut impl Values, vertices: usize, draft: &mut Draft) -> Result<(), Fault> {
+    let is_list = |property: &Property| property.count.is_some() && property.scalar.is_whole();
+    let named = |property: &Property| ["vertex_indices", "vertex_index"].contains(&property.name.as_str());
+    let indices = element
+        .properties
+        .iter()
+        .position(|property| is_list(property) && named(property))
+        .or_else(|| element.properties.iter().position(is_list));
+    let Some(indices) = indices else {
+        let rule = "it must have a list of whole numbers, \"vertex_indices\"";
+        return Err(element.place.fault(format!("element \"face\": {rule}")));
+    };
+    if element.properties.iter().any(|property| property.name == "texcoord") {
+        let note = "texture coordinates of faces (\"texcoord\") are not looked at, only those of vertices";
+        draft.notes.push(note.to_string());
+    }
+    draft.triangles.reserve_exact(element.count.min(MOST));
+    for i in 0..element.count {
+        for (k, property) in element.properties.iter().enumerate() {
+            let count = match property.count {
+                Some(count) if k == indices => count,
+                _ => {
+                    skip(property, values)?;
+                    continue;
+                }
+            };
+            let place = values.place();
+            let length = list_length(count, property, values)?;
+            if length < 3 {
+                let rule = format!("face {i}: it must have 3 vertices or more; it has {length}");
+                return Err(place.fault(rule));
+            }
+            let mut fan = Fan::default();
+            for _ in 0..length {
+                let place = values.place();
+                let vertex = values.next(property.scalar)?;
+                if !(vertex >= 0.0 && vertex < vertices as f64 && vertex.fract() == 0.0) {
+                    let vertex = shown_number(vertex);
+                    let rule = format!("face {i}: vertex {vertex} is not there; there are {vertices}, counted from 0");
+                    return Err(place.fault(rule));
+                }
+                if let Some(triangle) = fan.next(vertex as u32) {
+                    draft.push(triangle, place)?;
+                }
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,206 @@
+//! The words of a text file, with the lines that they stand in.
+
+use super::error::{Fault, Place, shown};
+
+/// A text as words between blanks. `#` in front of a word makes the rest of the line a comment; a backslash at the end of a
+/// line joins it with the next one.
+pub(super) struct Words<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    line: usize,
+}
+
+impl<'a> Words<'a> {
+    pub fn new(bytes: &'a [u8]) -> Words<'a> {
+        let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 }; // the mark of UTF-8
+        Words { bytes, at, line: 1 }
+    }
+
+    /// The next word of the line, if there is another one.
+    #[inline]
+    pub fn on_line(&mut self) -> Option<&'a [u8]> {
+        self.find_word().then(|| self.take_word())
+    }
+
+    /// Goes to the next word of the line; false at its end.
+    #[inline]
+    fn find_word(&mut self) -> bool {
+        loop {
+            match self.bytes.get(self.at) {
+                None | Some(b'\n' | b'#') => return false,
+                Some(byte) if *byte <= b' ' => self.at += 1,
+                Some(b'\\') => match self.joined(self.at) {
+                    Some(next) => (self.at, self.line) = (next, self.line + 1),
+                    None => return true,
+                },
+                Some(_) => return true,
+            }
+        }
+    }
+
+    fn take_word(&mut self) -> &'a [u8] {
+        let start = self.at;
+        while let Some(byte) = self.bytes.get(self.at) {
+            if *byte <= b' ' || (*byte == b'\\' && self.joined(self.at).is_some()) {
+                break;
+            }
+            self.at += 1;
+        }
+        &self.bytes[start..self.at]
+    }
+
+    /// Where the next line begins, if the backslash here is the last of its line.
+    fn joined(&self, backslash: usize) -> Option<usize> {
+        match self.bytes[backslash + 1..] {
+            [b'\n', ..] => Some(backslash + 2),
+            [b'\r', b'\n', ..] => Some(backslash + 3),
+            _ => None,
+        }
+    }
+
+    /// The next word of the file, if there is another one.
+    #[inline]
+    pub fn anywhere(&mut self) -> Option<&'a [u8]> {
+        self.find_word_anywhere().then(|| self.take_word())
+    }
+
+    /// Goes to the next word of the file; false at its end.
+    #[inline]
+    pub fn find_word_anywhere(&mut self) -> bool {
+        while !self.find_word() {
+            if !self.skip_line() {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// The rest of the line as a name: its words with one blank between them. Names may have `#`.
+    pub fn name(&mut self) -> String {
+        let mut name = String::new();
+        loop {
+            let word = match self.on_line() {
+                Some(word) => word,
+                None if self.bytes.get(self.at) == Some(&b'#') => self.take_word(),
+                None => return name,
+            };
+            if !name.is_empty() {
+                name.push(' ');
+            }
+            name.push_str(&String::from_utf8_lossy(word));
+        }
+    }
+
+    /// Goes to the next line; false at the end of the file.
+    #[inline]
+    pub fn next_line(&mut self) -> bool {
+        while self.on_line().is_some() {}
+        self.skip_line()
+    }
+
+    /// Goes to the next line, whatever this one ends with.
+    pub fn skip_line(&mut self) -> bool {
+        let rest = &self.bytes[self.at..];
+        match rest.iter().position(|byte| *byte == b'\n') {
+            Some(end) => {
+                self.at += end + 1;
+                self.line += 1;
+                self.at < self.bytes.len()
+            }
+            None => {
+                self.at = self.bytes.len();
+                false
+            }
+        }
+    }
+
+    /// The next number of the line.
+    #[inline]
+    pub fn number(&mut self, what: &str) -> Result<f64, Fault> {
+        match self.on_line() {
+            Some(word) => number(word).ok_or_else(|| self.fault(format!("{what}: {} must be a number", shown(word)))),
+            None => Err(self.fault(format!("{what} is missing"))),
+        }
+    }
+
+    /// How many bytes have been read.
+    pub fn offset(&self) -> usize {
+        self.at
+    }
+
+    /// How many bytes are left.
+    pub fn left(&self) -> usize {
+        self.bytes.len() - self.at
+    }
+
+    pub fn place(&self) -> Place {
+        Place::Line(self.line)
+    }
+
+    pub fn fault(&self, message: impl Into<String>) -> Fault {
+        self.place().fault(message)
+    }
+}
+
+/// The number that a word is.
+#[inline]
+pub(super) fn number(word: &[u8]) -> Option<f64> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(text: &str) -> Vec<(usize, Vec<String>)> {
+        let mut words = Words::new(text.as_bytes());
+        let mut lines = Vec::new();
+        loop {
+            let mut line = Vec::new();
+            while let Some(word) = words.on_line() {
+                line.push(String::from_utf8_lossy(word).into_owned());
+            }
+            let Place::Line(number) = words.place() else {
+                unreachable!("a text has lines")
+            };
+            if !line.is_empty() {
+                lines.push((number, line));
+            }
+            if !words.next_line() {
+                return lines;
+            }
+        }
+    }
+
+    fn line(number: usize, words: &str) -> (usize, Vec<String>) {
+        (number, words.split(' ').map(str::to_string).collect())
+    }
+
+    #[test]
+    fn lines_have_words() {
+        assert_eq!(lines("a  b\t\r\n\n c"), [line(1, "a b"), line(3, "c")]);
+        assert_eq!(lines("\u{feff}a\n"), [line(1, "a")]);
+        assert_eq!(lines("\n\n"), []);
+    }
+
+    #[test]
+    fn a_backslash_joins_lines() {
+        assert_eq!(lines("a \\\nb\\\r\nc\nd"), [line(3, "a b c"), line(4, "d")]);
+        assert_eq!(lines("a\\b \\ \nc\\"), [line(1, "a\\b \\"), line(2, "c\\")]);
+    }
+
+    #[test]
+    fn comments_end_a_line() {
+        assert_eq!(lines("# a \\\nb # c\nd#e\n#\n"), [line(2, "b"), line(3, "d#e")]);
+    }
+
+    #[test]
+    fn names_have_blanks() {
+        let mut words = Words::new(b"usemtl  dark   red #2 \r\nusemtl #3");
+        assert_eq!(words.on_line(), Some(&b"usemtl"[..]));
+        assert_eq!(words.name(), "dark red #2");
+        assert_eq!(words.anywhere(), Some(&b"usemtl"[..]));
+        assert_eq!(words.name(), "#3");
+        assert_eq!(words.anywhere(), None);
+    }
+}

@@ -1,0 +1,80 @@
+//! Meshes as both backends read them: triangles in the order of a tree's leaves, vertices in rows.
+
+use bytemuck::cast_vec;
+use glam::{UVec4, Vec3, Vec4};
+use rayon::prelude::*;
+
+use super::Node;
+use super::tree::{Aabb, build};
+use crate::mesh::Mesh;
+
+/// Triangles in a leaf, at most.
+const MOST_IN_LEAF: u32 = 4;
+
+/// A mesh as both backends read it, in its own space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PackedMesh {
+    /// The tree over its triangles.
+    pub nodes: Vec<Node>,
+    /// The triangles in the order of the tree's leaves: the numbers of three vertices, and the triangle's own.
+    pub triangles: Vec<UVec4>,
+    /// Each vertex's position, and its u.
+    pub vertices: Vec<Vec4>,
+    /// Each vertex's normal, 0 if there is none, and its v; empty if there are neither normals nor texture coordinates.
+    pub attributes: Vec<Vec4>,
+    /// Each triangle's group, in the order of the triangles; none if there is one group alone.
+    pub groups: Vec<u32>,
+    /// The lower corner of its box.
+    pub low: Vec3,
+    /// The upper corner of its box.
+    pub high: Vec3,
+}
+
+impl PackedMesh {
+    /// Packs a mesh, and builds its tree.
+    pub fn of(mesh: &Mesh) -> PackedMesh {
+        let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
+        let boxes: Vec<Aabb> = mesh.triangles.par_iter().map(|t| Aabb::around(&corners(t))).collect();
+        let whole = boxes.iter().fold(Aabb::EMPTY, |all, b| all.with(b));
+        let tree = build(&boxes, MOST_IN_LEAF);
+        let triangles = tree.order.par_iter().map(|&number| {
+            let [a, b, c] = mesh.triangles[number as usize];
+            UVec4::new(a, b, c, number)
+        });
+        let uv = |i: usize| mesh.uvs.get(i).copied().unwrap_or_default();
+        let normal = |i: usize| mesh.normals.get(i).copied().unwrap_or_default();
+        let vertices = mesh.positions.par_iter().enumerate().map(|(i, p)| p.extend(uv(i).x));
+        let with_attributes = match mesh.normals.is_empty() && mesh.uvs.is_empty() {
+            true => 0,
+            false => mesh.positions.len(),
+        };
+        let attributes = (0..with_attributes).into_par_iter().map(|i| normal(i).extend(uv(i).y));
+        let group = |&number: &u32| mesh.group_of.get(number as usize).copied();
+        PackedMesh {
+            triangles: triangles.collect(),
+            vertices: vertices.collect(),
+            attributes: attributes.collect(),
+            groups: tree.order.iter().filter_map(group).collect(),
+            low: whole.low,
+            high: whole.high,
+            nodes: cast_vec(tree.nodes),
+        }
+    }
+
+    /// The memory that it takes.
+    pub fn bytes(&self) -> u64 {
+        let lists = [
+            size_of_val(self.nodes.as_slice()),
+            size_of_val(self.triangles.as_slice()),
+            size_of_val(self.vertices.as_slice()),
+            size_of_val(self.attributes.as_slice()),
+            size_of_val(self.groups.as_slice()),
+        ];
+        lists.iter().map(|bytes| *bytes as u64).sum()
+    }
+
+    /// Its largest coordinate.
+    pub fn size(&self) -> f32 {
+        self.low.abs().max(self.high.abs()).max_element()
+    }
+}

@@ -1,0 +1,342 @@
+//! The binary tree that the wide one is made from: built top down by the surface area heuristic.
+//!
+//! Splits are found by bins (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007), in small nodes by
+//! trying all that there are along each axis.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec3, Vec4, Vec4Swizzles as _};
+use rayon::prelude::*;
+
+use super::Aabb;
+use super::wide::{SLOTS, costs};
+
+/// Nodes of so many items or more are split by several threads.
+const PARALLEL: usize = 1 << 16;
+/// Items that one thread looks at, at a time.
+const CHUNK: usize = 1 << 14;
+/// The two halves of a node of so many items or more are built by two threads.
+const JOIN: usize = 1 << 11;
+/// Nodes of so many items or fewer are split the best way there is.
+const SMALL: usize = 8;
+/// Bins along each axis: a power of two.
+const BINS: usize = 16;
+
+/// A box and its number. The number's bits are in `low.w`, which takes part in nothing; `high.w` is 1.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub struct Item {
+    low: Vec4,
+    high: Vec4,
+}
+
+impl Item {
+    fn new(number: usize, bounds: &Aabb) -> Item {
+        let whole = bounds.low.cmple(bounds.high).all(); // no NaN among them
+        let Aabb { low, high } = if whole {
+            *bounds
+        } else {
+            Aabb {
+                low: Vec3::ZERO,
+                high: Vec3::ZERO,
+            }
+        };
+        // + 0: there is one zero, so that the least of several numbers has the same bits in any order.
+        let finite = |v: Vec3| v.clamp(Vec3::MIN, Vec3::MAX) + Vec3::ZERO;
+        Item {
+            low: finite(low).extend(f32::from_bits(number as u32)),
+            high: finite(high).extend(1.0),
+        }
+    }
+
+    pub fn number(&self) -> u32 {
+        self.low.w.to_bits()
+    }
+
+    pub fn bounds(&self) -> Aabb {
+        Aabb {
+            low: self.low.xyz(),
+            high: self.high.xyz(),
+        }
+    }
+
+    /// Twice the middle.
+    fn middle(&self) -> Vec4 {
+        self.low + self.high
+    }
+}
+
+/// A node with two children. Those with one item are not stored.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub struct Inner {
+    pub low: Vec3,
+    pub high: Vec3,
+    /// Items in the first half.
+    pub first: u32,
+    /// What the items cost that are below, in a wide tree, if they take at most 1, 2, .. 7 slots of a node above.
+    pub costs: [f32; SLOTS - 1],
+}
+
+/// A binary tree. A node of n items has n - 1 inner nodes from its own on: itself, those of its first half, those of its
+/// second half.
+pub struct Binary {
+    pub items: Vec<Item>,
+    pub inner: Vec<Inner>,
+}
+
+impl Binary {
+    /// A tree with at most so many levels of inner nodes, as long as 2^`levels` items are not exceeded.
+    pub fn build(boxes: &[Aabb], levels: u32, most_in_leaf: usize) -> Binary {
+        let items = boxes.par_iter().enumerate().with_min_len(CHUNK);
+        let mut items: Vec<Item> = items.map(|(i, bounds)| Item::new(i, bounds)).collect();
+        let mut inner = bytemuck::zeroed_vec(boxes.len().saturating_sub(1));
+        build(&mut items, &mut inner, levels, most_in_leaf);
+        Binary { items, inner }
+    }
+}
+
+fn build(items: &mut [Item], inner: &mut [Inner], levels: u32, most_in_leaf: usize) {
+    let Some((node, below)) = inner.split_first_mut() else {
+        return;
+    };
+    let count = items.len();
+    let bounds = Bounds::over(items);
+    let first = split(items, &bounds, levels);
+    let halves = items.split_at_mut(first);
+    let inner = below.split_at_mut(first - 1);
+    let mut one = || build(halves.0, inner.0, levels - 1, most_in_leaf);
+    let mut other = || build(halves.1, inner.1, levels - 1, most_in_leaf);
+    if count >= JOIN {
+        rayon::join(one, other);
+    } else {
+        one();
+        other();
+    }
+    let sides = [(&*halves.0, &*inner.0), (&*halves.1, &*inner.1)].map(|(items, inner)| costs_of(items, inner));
+    let Aabb { low, high } = bounds.aabb();
+    *node = Inner {
+        low,
+        high,
+        first: first as u32,
+        costs: costs(area(bounds.low, bounds.high), count, most_in_leaf, &sides),
+    };
+}
+
+fn costs_of(items: &[Item], inner: &[Inner]) -> [f32; SLOTS - 1] {
+    match inner.first() {
+        Some(node) => node.costs,
+        None => [super::wide::leaf_cost(area(items[0].low, items[0].high), 1); SLOTS - 1],
+    }
+}
+
+/// What a node's items, and the middles of these, are inside of.
+#[derive(Clone, Copy)]
+struct Bounds {
+    low: Vec4,
+    high: Vec4,
+    low_middle: Vec4,
+    high_middle: Vec4,
+}
+
+impl Bounds {
+    const EMPTY: Bounds = Bounds {
+        low: Vec4::INFINITY,
+        high: Vec4::NEG_INFINITY,
+        low_middle: Vec4::INFINITY,
+        high_middle: Vec4::NEG_INFINITY,
+    };
+
+    fn of(items: &[Item]) -> Bounds {
+        items.iter().fold(Bounds::EMPTY, |bounds, item| Bounds {
+            low: bounds.low.min(item.low),
+            high: bounds.high.max(item.high),
+            low_middle: bounds.low_middle.min(item.middle()),
+            high_middle: bounds.high_middle.max(item.middle()),
+        })
+    }
+
+    fn over(items: &[Item]) -> Bounds {
+        if items.len() < PARALLEL {
+            return Bounds::of(items);
+        }
+        items.par_chunks(CHUNK).map(Bounds::of).reduce(
+            || Bounds::EMPTY,
+            |a, b| Bounds {
+                low: a.low.min(b.low),
+                high: a.high.max(b.high),
+                low_middle: a.low_middle.min(b.low_middle),
+                high_middle: a.high_middle.max(b.high_middle),
+            },
+        )
+    }
+
+    fn aabb(&self) -> Aabb {
+        Aabb {
+            low: self.low.xyz(),
+            high: self.high.xyz(),
+        }
+    }
+}
+
+/// What a box without a surface counts as, so that the number of nodes matters even there.
+const LEAST_AREA: f32 = 1e-30;
+
+/// Half the surface, of a box that is cut where it is so large that costs would be infinite.
+pub fn area(low: Vec4, high: Vec4) -> f32 {
+    let size = (high - low).min(Vec4::splat(1e15));
+    size.x * size.y + size.y * size.z + size.z * size.x + LEAST_AREA
+}
+
+/// Sorts the items into two parts, none of them empty; says how many the first has.
+fn split(items: &mut [Item], bounds: &Bounds, levels: u32) -> usize {
+    let count = items.len();
+    if count == 2 {
+        return 1;
+    }
+    let needed = usize::BITS - (count - 1).leading_zeros(); // levels of a balanced tree
+    let found = match () {
+        _ if levels <= needed || area(bounds.low, bounds.high) < 2.0 * LEAST_AREA => None,
+        _ if count <= SMALL => split_small(items),
+        _ => split_by_bins(items, bounds),
+    };
+    found.unwrap_or_else(|| split_in_half(items, bounds))
+}
+
+/// One half to the one side along the axis where the middles reach farthest.
+fn split_in_half(items: &mut [Item], bounds: &Bounds) -> usize {
+    let half = items.len() / 2;
+    let reach = (bounds.high_middle - bounds.low_middle).xyz();
+    if reach.max_element() > 0.0 {
+        let axis = reach.max_position();
+        let key = |item: &Item| (item.middle()[axis], item.number());
+        items.select_nth_unstable_by(half, |a, b| {
+            let (a, b) = (key(a), key(b));
+            a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+        });
+    }
+    half
+}
+
+/// The best of all splits along the axes, by the order of the middles.
+fn split_small(items: &mut [Item]) -> Option<usize> {
+    let count = items.len();
+    let mut best: Option<(f32, usize, [Item; SMALL])> = None;
+    for axis in 0..3 {
+        let mut sorted = [items[0]; SMALL];
+        sorted[..count].copy_from_slice(items);
+        for i in 1..count {
+            let mut j = i;
+            while j > 0 && sorted[j - 1].middle()[axis] > sorted[j].middle()[axis] {
+                sorted.swap(j - 1, j);
+                j -= 1;
+            }
+        }
+        let mut first = [0.0; SMALL];
+        let (mut low, mut high) = (Vec4::INFINITY, Vec4::NEG_INFINITY);
+        for i in 1..count {
+            low = low.min(sorted[i - 1].low);
+            high = high.max(sorted[i - 1].high);
+            first[i] = area(low, high) * i as f32;
+        }
+        (low, high) = (Vec4::INFINITY, Vec4::NEG_INFINITY);
+        for i in (1..count).rev() {
+            low = low.min(sorted[i].low);
+            high = high.max(sorted[i].high);
+            let cost = first[i] + area(low, high) * (count - i) as f32;
+            if best.as_ref().map_or(cost < f32::INFINITY, |best| cost < best.0) {
+                best = Some((cost, i, sorted));
+            }
+        }
+    }
+    let (_, first, sorted) = best?;
+    items.copy_from_slice(&sorted[..count]);
+    Some(first)
+}
+
+/// Items whose middles lie in the same part of an axis.
+#[derive(Clone, Copy)]
+struct Bin {
+    low: Vec4,
+    high: Vec4,
+    count: u32,
+}
+
+type Bins = [[Bin; BINS]; 3];
+
+const EMPTY_BINS: Bins = [[Bin {
+    low: Vec4::INFINITY,
+    high: Vec4::NEG_INFINITY,
+    count: 0,
+}; BINS]; 3];
+
+/// The best split between bins; none if all items are in one.
+fn split_by_bins(items: &mut [Item], bounds: &Bounds) -> Option<usize> {
+    let low = bounds.low_middle;
+    let per_unit = (BINS - 1) as f32 / (bounds.high_middle - low);
+    // A number + 2^23 is rounded to a whole one, which its bits end with.
+    let bins_of = |item: &Item| {
+        let place = (item.middle() - low) * per_unit + 8_388_608.0;
+        [place.x, place.y, place.z].map(|x| x.to_bits() as usize % BINS)
+    };
+    let fill = |items: &[Item]| {
+        let mut bins = EMPTY_BINS;
+        for item in items {
+            for (bins, i) in bins.iter_mut().zip(bins_of(item)) {
+                let bin = &mut bins[i];
+                bin.low = bin.low.min(item.low);
+                bin.high = bin.high.max(item.high);
+                bin.count += 1;
+            }
+        }
+        bins
+    };
+    let bins = if items.len() < PARALLEL {
+        fill(items)
+    } else {
+        items.par_chunks(CHUNK).map(fill).reduce(|| EMPTY_BINS, together)
+    };
+    let mut best: Option<(f32, usize, usize)> = None;
+    for (axis, bins) in bins.iter().enumerate() {
+        let mut first = [(0.0, 0); BINS];
+        let (mut low, mut high, mut count) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0);
+        for i in 1..BINS {
+            low = low.min(bins[i - 1].low);
+            high = high.max(bins[i - 1].high);
+            count += bins[i - 1].count;
+            first[i] = (area(low, high) * count as f32, count);
+        }
+        (low, high, count) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0);
+        for i in (1..BINS).rev() {
+            low = low.min(bins[i].low);
+            high = high.max(bins[i].high);
+            count += bins[i].count;
+            let cost = first[i].0 + area(low, high) * count as f32;
+            if count > 0 && first[i].1 > 0 && cost < best.map_or(f32::INFINITY, |best| best.0) {
+                best = Some((cost, axis, i));
+            }
+        }
+    }
+    let (_, axis, end) = best?;
+    Some(partition(items, |item| bins_of(item)[axis] < end))
+}
+
+fn together(mut a: Bins, b: Bins) -> Bins {
+    for (a, b) in a.iter_mut().flatten().zip(b.iter().flatten()) {
+        a.low = a.low.min(b.low);
+        a.high = a.high.max(b.high);
+        a.count += b.count;
+    }
+    a
+}
+
+/// Brings those that the condition holds for to the front; says how many they are.
+fn partition(items: &mut [Item], is_first: impl Fn(&Item) -> bool) -> usize {
+    let mut end = 0;
+    for i in 0..items.len() {
+        // No branch that is guessed wrong half the time.
+        let first = is_first(&items[i]);
+        items.swap(end, i);
+        end += usize::from(first);
+    }
+    end
+}

@@ -1,0 +1,114 @@
+//! Mesh files that scenes name: each is read once, and kept as long as any scene has it.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::SystemTime;
+
+use crate::mesh::{Mesh, MeshError, Normals};
+
+/// What tells two readings of a file apart.
+#[derive(PartialEq, Eq, Hash)]
+struct Key {
+    path: PathBuf,
+    length: u64,
+    changed: SystemTime,
+    normals: Option<Normals>,
+}
+
+/// The meshes that are in use. So a scene that is read again, as by the development mode, has the trees that are built.
+static IN_USE: Mutex<Option<HashMap<Key, Weak<Mesh>>>> = Mutex::new(None);
+
+/// Reads a mesh, unless it is in use and its file has not changed.
+pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshError> {
+    let Some(key) = key(path, normals) else {
+        return Mesh::load(path, normals).map(Arc::new); // which says what is wrong with the file
+    };
+    let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
+    let in_use = in_use.get_or_insert_default();
+    in_use.retain(|_, mesh| mesh.strong_count() > 0);
+    if let Some(mesh) = in_use.get(&key).and_then(Weak::upgrade) {
+        return Ok(mesh);
+    }
+    let mesh = Arc::new(Mesh::load(path, normals)?);
+    in_use.insert(key, Arc::downgrade(&mesh));
+    Ok(mesh)
+}
+
+fn key(path: &Path, normals: Option<Normals>) -> Option<Key> {
+    let data = fs::metadata(path).ok()?;
+    Some(Key {
+        path: path.to_owned(),
+        length: data.len(),
+        changed: data.modified().ok()?,
+        normals,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SMALL: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+    #[test]
+    fn a_mesh_in_use_is_not_read_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        fs::write(&path, SMALL).unwrap();
+        let first = load(&path, None).unwrap();
+        assert!(Arc::ptr_eq(&first, &load(&path, None).unwrap()));
+        // Other normals are another mesh.
+        let flat = load(&path, Some(Normals::Flat)).unwrap();
+        assert!(!Arc::ptr_eq(&first, &flat));
+        let smooth = load(&path, Some(Normals::Smooth)).unwrap();
+        assert_eq!((smooth.normals.len(), flat.normals.len()), (3, 0));
+        assert!(Arc::ptr_eq(&first, &load(&path, None).unwrap()));
+        // Another file of the same bytes too.
+        let copy = folder.path().join("b.obj");
+        fs::copy(&path, &copy).unwrap();
+        assert!(!Arc::ptr_eq(&first, &load(&copy, None).unwrap()));
+    }
+
+    #[test]
+    fn a_mesh_that_nobody_has_is_forgotten() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        fs::write(&path, SMALL).unwrap();
+        let weak = Arc::downgrade(&load(&path, None).unwrap());
+        assert_eq!(weak.strong_count(), 0);
+        let other = folder.path().join("b.obj");
+        fs::write(&other, SMALL).unwrap();
+        let _other = load(&other, None).unwrap();
+        let in_use = IN_USE.lock().unwrap();
+        let known = in_use.iter().flatten().filter(|(key, _)| key.path == path);
+        assert_eq!(known.count(), 0);
+    }
+
+    #[test]
+    fn a_changed_file_is_read_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        fs::write(&path, SMALL).unwrap();
+        let first = load(&path, None).unwrap();
+        // Another length.
+        fs::write(&path, format!("{SMALL}v 0 0 1\nf 1 2 4\n")).unwrap();
+        let second = load(&path, None).unwrap();
+        assert_eq!((first.triangles.len(), second.triangles.len()), (1, 2));
+        // The same length at another time.
+        fs::write(&path, format!("{SMALL}v 0 0 5\nf 1 2 4\n")).unwrap();
+        let file = fs::File::options().write(true).open(&path).unwrap();
+        file.set_modified(SystemTime::now() + std::time::Duration::from_secs(5))
+            .unwrap();
+        let third = load(&path, None).unwrap();
+        assert_eq!(third.positions[3].z, 5.0);
+        assert_eq!(second.positions[3].z, 1.0);
+        // A file that is gone, or wrong by now, is told although its mesh is in use.
+        fs::write(&path, "v 0 0 0\n").unwrap();
+        assert!(load(&path, None).is_err());
+        fs::remove_file(&path).unwrap();
+        let told = load(&path, None).unwrap_err().to_string();
+        assert!(told.contains("cannot be read"), "{told}");
+    }
+}

@@ -1,0 +1,341 @@
+//! The rules of meshes.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use glam::{DAffine3, DMat3, DQuat, DVec3};
+
+use super::super::image_file::Place;
+use super::super::mesh_file;
+use super::super::{
+    Assets, Color, Geometry, InstanceDescription, Material, MeshDescription, MeshFileDescription, Rotation, Scale,
+    Shape, ShapeDescription, Up,
+};
+use super::{At, Checked, FARTHEST, FLATTEST, LENGTHS, Problem, between, check, list, number, point, show, unit};
+use crate::mesh::{Group, Mesh, Normals};
+
+/// The most groups of all meshes' instances together.
+const MOST_GROUPS: usize = 1 << 24;
+
+/// What shapes name: materials, and meshes with the axis that is up.
+pub(super) struct Known<'a> {
+    pub names: &'a BTreeMap<&'a str, usize>,
+    pub materials: &'a [Material],
+    pub assets: &'a Assets,
+}
+
+/// A mesh that instances name.
+pub(super) struct NamedMesh {
+    mesh: Arc<Mesh>,
+    up: Up,
+    file: String,
+}
+
+/// What places a mesh, and what it is made of.
+struct Placement<'a> {
+    material: Option<&'a String>,
+    materials: &'a BTreeMap<String, String>,
+    translate: Option<DVec3>,
+    rotate: Option<Rotation>,
+    scale: Option<Scale>,
+    matrix: Option<&'a Vec<[f64; 4]>>,
+}
+
+/// A mesh of `[meshes.NAME]`.
+pub(super) fn named(description: &MeshFileDescription, assets: &Assets) -> Checked<NamedMesh> {
+    let MeshFileDescription { file, normals, up } = description;
+    Ok(NamedMesh {
+        mesh: load(file, *normals, assets)?,
+        up: *up,
+        file: file.clone(),
+    })
+}
+
+/// A shape of type `mesh`.
+pub(super) fn mesh(shape: &MeshDescription, known: &Known) -> Checked<Shape> {
+    let mesh = load(&shape.file, shape.normals, known.assets)?;
+    let placement = Placement {
+        material: shape.material.as_ref(),
+        materials: &shape.materials,
+        translate: shape.translate,
+        rotate: shape.rotate,
+        scale: shape.scale,
+        matrix: shape.matrix.as_ref(),
+    };
+    placed(mesh, shape.up, &shape.file, &placement, known)
+}
+
+/// One of `[[instances]]`.
+pub(super) fn instance(
+    instance: &InstanceDescription,
+    meshes: &BTreeMap<&str, NamedMesh>,
+    known: &Known,
+) -> Checked<Shape> {
+    let name = &instance.mesh;
+    let unknown = || {
+        Problem::new(match meshes.is_empty() {
+            true => format!("{name:?} is no mesh; the file has none"),
+            false => format!("{name:?} is no mesh; there are {}", list(meshes.keys())),
+        })
+    };
+    let NamedMesh { mesh, up, file } = meshes.get(name.as_str()).ok_or_else(unknown).at("mesh")?;
+    let placement = Placement {
+        material: instance.material.as_ref(),
+        materials: &instance.materials,
+        translate: instance.translate,
+        rotate: instance.rotate,
+        scale: instance.scale,
+        matrix: instance.matrix.as_ref(),
+    };
+    placed(Arc::clone(mesh), *up, file, &placement, known)
+}
+
+/// The words of all groups have to be numbered.
+pub(super) fn few_groups(shapes: &[Shape]) -> Checked<()> {
+    let groups = shapes.iter().map(|shape| match &shape.geometry {
+        Geometry::Mesh { materials, .. } => materials.len(),
+        _ => 0,
+    });
+    let groups: usize = groups.sum();
+    check(groups <= MOST_GROUPS, || {
+        format!("the meshes have {groups} groups together; they must be at most {MOST_GROUPS}")
+    })
+}
+
+/// What is odd about the mesh files, each file's once.
+pub(super) fn notes(
+    descriptions: &[ShapeDescription],
+    shapes: &[Shape],
+    meshes: &BTreeMap<&str, NamedMesh>,
+) -> Vec<String> {
+    let of_shapes = descriptions.iter().zip(shapes).filter_map(|pair| match pair {
+        (
+            ShapeDescription::Mesh(description),
+            Shape {
+                geometry: Geometry::Mesh { mesh, .. },
+                ..
+            },
+        ) => Some((&description.file, mesh)),
+        _ => None,
+    });
+    let named = meshes.values().map(|named| (&named.file, &named.mesh));
+    let of_mesh = |(file, mesh): (&String, &Arc<Mesh>)| -> Vec<String> {
+        mesh.notes.iter().map(|note| format!("{file}: {note}")).collect()
+    };
+    let notes: BTreeSet<String> = of_shapes.chain(named).flat_map(of_mesh).collect();
+    notes.into_iter().collect()
+}
+
+fn load(file: &str, normals: Option<Normals>, assets: &Assets) -> Checked<Arc<Mesh>> {
+    let place = assets.find(file).map_err(Problem::new).at("file")?;
+    let Place::File(path) = place else {
+        return Err(Problem::new(format!("{file:?} is an image in memory, and no mesh"))).at("file");
+    };
+    mesh_file::load(&path, normals)
+        .map_err(|error| Problem::new(error.to_string()))
+        .at("file")
+}
+
+fn placed(mesh: Arc<Mesh>, up: Up, file: &str, placement: &Placement, known: &Known) -> Checked<Shape> {
+    let to_world = transform(placement)? * turned_up(up);
+    let corners: Vec<DVec3> = mesh.corners().map(|corner| to_world.transform_point3(corner)).collect();
+    let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let high = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let farthest = low.abs().max(high.abs()).max_element();
+    check(farthest <= FARTHEST, || {
+        let (farthest, limit) = (number(farthest), number(FARTHEST));
+        format!("{file:?} reaches to {farthest} there; coordinates must be from -{limit} to {limit}")
+    })
+    .at("file")?;
+    let size = (high - low).max_element();
+    check(size >= LENGTHS.0, || {
+        format!(
+            "{file:?} must be at least {} long there; it is {}",
+            number(LENGTHS.0),
+            number(size)
+        )
+    })
+    .at("file")?;
+    let materials = materials(&mesh, file, placement, known)?;
+    Ok(Shape {
+        material: materials.first().copied().unwrap_or(0),
+        geometry: Geometry::Mesh {
+            mesh,
+            to_world,
+            materials,
+        },
+    })
+}
+
+/// For each group of a mesh the index of its material.
+fn materials(mesh: &Mesh, file: &str, placement: &Placement, known: &Known) -> Checked<Vec<usize>> {
+    let named = |name: &String| {
+        let unknown = || {
+            Problem::new(match known.names.is_empty() {
+                true => format!("{name:?} is no material; the file has none"),
+                false => format!("{name:?} is no material; there are {}", list(known.names.keys())),
+            })
+        };
+        let index = *known.names.get(name.as_str()).ok_or_else(unknown)?;
+        check(!mesh.uvs.is_empty() || !has_textures(&known.materials[index]), || {
+            format!("{name:?} must have no texture here, as {file:?} has no texture coordinates")
+        })?;
+        Ok(index)
+    };
+    let whole = placement.material.map(named).transpose().at("material")?;
+    let mut of_names = BTreeMap::new();
+    for (group, material) in placement.materials {
+        let is_there = mesh.groups.iter().any(|g| names(g).any(|name| name == group));
+        check(is_there, || {
+            let all = mesh.groups.iter().flat_map(names).filter(|name| !name.is_empty());
+            let all: BTreeSet<&str> = all.collect();
+            match all.is_empty() {
+                true => format!("{file:?} has no groups with names"),
+                false => format!("{file:?} has no such group or material; there are {}", list(all)),
+            }
+        })
+        .at(group.as_str())
+        .at("materials")?;
+        of_names.insert(group.as_str(), named(material).at(group.as_str()).at("materials")?);
+    }
+    let of_group = |group: &Group| {
+        let named = names(group).find_map(|name| of_names.get(name).copied());
+        named.or(whole).ok_or_else(|| {
+            let message = match names(group).find(|name| !name.is_empty()) {
+                Some(name) => format!("is missing; {file:?} has the group {name:?}, which materials does not name"),
+                None => "is missing".to_owned(),
+            };
+            Problem::of("material", message)
+        })
+    };
+    mesh.groups.iter().map(of_group).collect()
+}
+
+/// The names by which a file's group may be told: its own, and that of the material which the file gives it.
+fn names(group: &Group) -> impl Iterator<Item = &str> {
+    std::iter::once(group.name.as_str()).chain(group.material.as_deref())
+}
+
+fn has_textures(material: &Material) -> bool {
+    let is_texture = |color: &Color| matches!(color, Color::Texture(_));
+    material.normal_map().is_some()
+        || match material {
+            Material::Phong {
+                ambient,
+                diffuse,
+                specular,
+                ..
+            } => [ambient, diffuse, specular].into_iter().any(is_texture),
+            Material::Mirror { tint, .. } | Material::Glass { tint, .. } => is_texture(tint),
+        }
+}
+
+fn turned_up(up: Up) -> DAffine3 {
+    DAffine3::from_mat3(match up {
+        Up::X => DMat3::from_cols(DVec3::Z, DVec3::X, DVec3::Y),
+        Up::Y => DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y),
+        Up::Z => DMat3::IDENTITY,
+    })
+}
+
+fn transform(placement: &Placement) -> Checked<DAffine3> {
+    let Placement {
+        translate,
+        rotate,
+        scale,
+        matrix,
+        ..
+    } = placement;
+    if let Some(matrix) = matrix {
+        let others = translate.is_some() || rotate.is_some() || scale.is_some();
+        check(!others, || {
+            "must not be there beside translate, rotate or scale, which it stands in for".to_owned()
+        })
+        .at("matrix")?;
+        return self::matrix(matrix).at("matrix");
+    }
+    let scale = match scale {
+        None => DVec3::ONE,
+        Some(Scale::All(s)) => factors(DVec3::splat(*s)).at("scale")?,
+        Some(Scale::Each(s)) => factors(*s).at("scale")?,
+    };
+    let rotation = match rotate {
+        None => DMat3::IDENTITY,
+        Some(rotation) => turn(rotation).at("rotate")?,
+    };
+    let translate = translate.map_or(Ok(DVec3::ZERO), point).at("translate")?;
+    Ok(DAffine3::from_mat3_translation(
+        rotation * DMat3::from_diagonal(scale),
+        translate,
+    ))
+}
+
+fn factors(factors: DVec3) -> Checked<DVec3> {
+    let (low, high) = (1e-6, 1e6);
+    for x in factors.to_array() {
+        check((low..=high).contains(&x.abs()), || {
+            let (x, low, high) = (number(x), number(low), number(high));
+            format!("{x} must not be 0, and be from {low} to {high}, or from -{high} to -{low}")
+        })?;
+    }
+    Ok(factors)
+}
+
+fn turn(rotation: &Rotation) -> Checked<DMat3> {
+    let angle = |degrees: f64| between(degrees, -360.0, 360.0);
+    Ok(match rotation {
+        Rotation::Angles(angles) => {
+            let [x, y, z] = [angle(angles.x)?, angle(angles.y)?, angle(angles.z)?];
+            turn_about(DVec3::Z, z) * turn_about(DVec3::Y, y) * turn_about(DVec3::X, x)
+        }
+        Rotation::About(about) => {
+            let axis = unit(about.axis).at("axis")?;
+            turn_about(axis, angle(about.degrees).at("degrees")?)
+        }
+    })
+}
+
+/// A rotation. Of a quarter turn about an axis of the coordinates the numbers are whole.
+fn turn_about(axis: DVec3, degrees: f64) -> DMat3 {
+    let quarters = degrees / 90.0;
+    let is_axis = DVec3::AXES.iter().any(|a| a.abs() == axis.abs());
+    let turn = DMat3::from_quat(DQuat::from_axis_angle(axis, degrees.to_radians()));
+    match is_axis && quarters.fract() == 0.0 {
+        true => DMat3::from_cols(turn.x_axis.round(), turn.y_axis.round(), turn.z_axis.round()),
+        false => turn,
+    }
+}
+
+fn matrix(rows: &[[f64; 4]]) -> Checked<DAffine3> {
+    let rows: &[[f64; 4]; 3] = match rows {
+        [rows @ .., [0.0, 0.0, 0.0, 1.0]] if rows.len() == 3 => rows.try_into(),
+        rows => rows.try_into(),
+    }
+    .map_err(|_| {
+        Problem::new("must be a list of 3 rows of 4 numbers; there may be a fourth one, which is [0, 0, 0, 1]")
+    })?;
+    for (i, row) in rows.iter().enumerate() {
+        point(DVec3::new(row[0], row[1], row[2])).at(i)?;
+        point(DVec3::splat(row[3])).at(i)?;
+    }
+    let column = |i: usize| DVec3::new(rows[0][i], rows[1][i], rows[2][i]);
+    let columns = [column(0), column(1), column(2)];
+    for (i, c) in columns.iter().enumerate() {
+        let (low, high) = (1e-6, 1e6);
+        check((low..=high).contains(&c.length()), || {
+            let (c, low, high) = (show(*c), number(low), number(high));
+            format!("its column {i}, {c}, must have a length from {low} to {high}")
+        })?;
+    }
+    let [a, b, c] = columns.map(DVec3::normalize);
+    check(a.cross(b).dot(c).abs() > FLATTEST, || {
+        "its first three columns must not lie in one plane".to_owned()
+    })?;
+    Ok(DAffine3::from_mat3_translation(
+        DMat3::from_cols(columns[0], columns[1], columns[2]),
+        column(3),
+    ))
+}
+
+#[cfg(test)]
+mod tests;
