@@ -46,6 +46,8 @@ fn empty(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
         materials: Default::default(),
         lights: Vec::new(),
         shapes: Vec::new(),
+        meshes: Default::default(),
+        instances: Vec::new(),
     }
 }
 

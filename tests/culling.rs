@@ -9,13 +9,12 @@ use wgray::pack::{Packed, RANDOM, Sphere};
 
 use crate::random::Random;
 use crate::random_scenes::any_scene;
-use crate::scenes;
 
 /// Small scenes of all kinds.
 fn some_scenes(count: usize) -> Vec<Packed> {
     let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
-    let strategy = any_scene::description();
-    let scene = |_| scenes::packed(&strategy.new_tree(&mut runner).expect("a scene").current());
+    let strategy = any_scene::without_trees();
+    let scene = |_| any_scene::packed(&strategy.new_tree(&mut runner).expect("a scene").current());
     (0..count).map(scene).collect()
 }
 

@@ -3,9 +3,9 @@
 
 use glam::DVec3;
 use wgray::cpu::camera::camera_ray;
+use wgray::cpu::geometry::closest_hit;
 use wgray::cpu::surface::surface_at;
-use wgray::cpu::traverse::closest_hit;
-use wgray::pack::NOTHING;
+use wgray::pack::{NOTHING, NOWHERE};
 use wgray::scene::Description;
 
 use crate::oracle::{Flaw, Oracle};
@@ -230,7 +230,7 @@ fn rays_start_a_little_above_their_surface() {
             for _ in 0..2000 {
                 let at = glam::Vec2::new((random.unit() * 48.0) as f32, (random.unit() * 36.0) as f32);
                 let ray = camera_ray(&scene.camera, at);
-                let hit = closest_hit(&scene, ray, NOTHING, NOTHING);
+                let hit = closest_hit(&scene, ray, NOWHERE, NOWHERE);
                 if hit.primitive == NOTHING {
                     continue;
                 }

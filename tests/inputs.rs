@@ -2,17 +2,22 @@
 //! point of it, in its inside, on its edge or past it. Some of these have single numbers replaced by edge values or by
 //! one another, some are brought to halves, so that what is compared is often equal, and some are of all magnitudes.
 
-use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
+use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3};
 use naga::{Handle, Module, ScalarKind, Type};
 use wgray::cpu::differential::{Arrival, Derivative, Differential};
 use wgray::cpu::footprint::Footprint;
 use wgray::cpu::light::Segments;
+use wgray::cpu::mesh::{Spot, face_primitive, shear_of};
 use wgray::cpu::path::Path;
 use wgray::cpu::phong::Lobes;
 use wgray::cpu::ray::{Hit, Ray};
 use wgray::cpu::shadow::{Block, cone_to_light};
+use wgray::cpu::slab::{fan, slabs};
 use wgray::cpu::surface::Surface;
-use wgray::pack::{Camera, ELLIPSOID, FAR, KINDS, Light, Material, NOTHING, Primitive, Sphere, Texture};
+use wgray::pack::tree::{Aabb, build};
+use wgray::pack::{
+    Camera, ELLIPSOID, FAR, Instance, KINDS, Light, Material, NOTHING, NOWHERE, Node, PAD, Primitive, Sphere, Texture,
+};
 
 use crate::kernel::{Function, scalars};
 use crate::random::Random;
@@ -107,7 +112,171 @@ struct Situation {
     local_start: DVec3,
     direction: DVec3,
     light: Light,
+    face: Face,
 }
+
+/// A triangle of a mesh and a ray, both in the mesh's space.
+struct Face {
+    instance: Instance,
+    corners: [DVec3; 3],
+    /// Where the ray meets its plane: in its inside, on an edge, at a corner, or past it.
+    barycentric: DVec2,
+    origin: DVec3,
+    direction: DVec3,
+    /// How far the directions of a fan reach to either side of the ray's.
+    spread: DVec3,
+}
+
+impl Face {
+    fn new(random: &Random, anchor: DVec3, columns: DMat3) -> Face {
+        let size = random.pick(&[1.0, 1.0, 1e-3, 1e3]);
+        let at = vector(random) * random.pick(&[0.0, 1.0, 100.0]);
+        let mut corners = [(); 3].map(|()| (at + vector(random)) * size);
+        match random.below(8) {
+            0 => corners[2] = corners[0].lerp(corners[1], random.unit()), // a sliver
+            1 => corners.iter_mut().for_each(|corner| corner.z = size),
+            _ => {}
+        }
+        let corners = corners.map(|corner| corner.as_vec3().as_dvec3());
+        let (x, y) = (random.unit(), random.unit());
+        let barycentric = match random.below(8) {
+            0 => random.pick(&[DVec2::ZERO, DVec2::X, DVec2::Y]),
+            1 => random.pick(&[DVec2::new(x, 0.0), DVec2::new(0.0, x), DVec2::new(x, 1.0 - x)]),
+            2 => DVec2::new(x, y) * 3.0 - 1.0,
+            _ => DVec2::new(x * 0.5, y * 0.5),
+        };
+        let met = point_of(&corners, barycentric);
+        let away = match random.below(6) {
+            0 => random.pick(&DVec3::AXES) * random.pick(&[1.0, -1.0]),
+            1 => (corners[1] - corners[0]) / size, // edge on
+            _ => vector(random),
+        };
+        let origin = met - away * size * random.pick(&[0.1, 1.0, 100.0, -1.0]);
+        let rows = columns.inverse().transpose();
+        let uvs = random.below(2);
+        let instance = Instance {
+            x: rows.x_axis.as_vec3(),
+            y: rows.y_axis.as_vec3(),
+            z: rows.z_axis.as_vec3(),
+            anchor: anchor.as_vec3(),
+            u: columns.x_axis.as_vec3(),
+            v: columns.y_axis.as_vec3(),
+            w: columns.z_axis.as_vec3(),
+            shape: random.below(4),
+            attributes: random.pick(&[NOTHING, 9]),
+            has_uvs: uvs,
+            size: corners
+                .iter()
+                .map(|corner| corner.abs().max_element())
+                .fold(0.0, f64::max) as f32,
+            condition: random.magnitude(0.0, 2.0) as f32,
+            side: random.pick(&[1.0, -1.0]),
+            ..bytemuck::Zeroable::zeroed()
+        };
+        Face {
+            instance,
+            corners,
+            barycentric,
+            origin,
+            direction: away * random.pick(&[1.0, size, 1e-3]),
+            spread: vector(random).abs() * size * random.pick(&[0.0, 0.01, 1.0]),
+        }
+    }
+
+    fn edges(&self) -> [DVec3; 2] {
+        [self.corners[1] - self.corners[0], self.corners[2] - self.corners[0]]
+    }
+
+    fn spot(&self, random: &Random) -> Spot {
+        let i = &self.instance;
+        let columns = [i.u, i.v, i.w].map(Vec3::as_dvec3);
+        let to_world = DMat3::from_cols(columns[0], columns[1], columns[2]);
+        let [edge_1, edge_2] = self.edges().map(|edge| (to_world * edge).as_vec3());
+        let normal = edge_1.as_dvec3().cross(edge_2.as_dvec3()).normalize_or(DVec3::Z);
+        let bent = || (normal + vector(random) * 0.3).normalize().as_vec3();
+        let has_normals = !random.once_in(4);
+        let [normal_0, normal_1, normal_2] = [(); 3].map(|()| if has_normals { bent() } else { Vec3::ZERO });
+        let uv = || Vec2::new(random.unit() as f32, random.unit() as f32);
+        let uv_0 = uv();
+        Spot {
+            primitive: face_primitive(i, self.corners[0].as_vec3(), edge_1, edge_2, random.below(4)),
+            edge_1,
+            edge_2,
+            uv_0,
+            uv_1: if random.once_in(8) { uv_0 } else { uv() },
+            uv_2: uv(),
+            normal_0,
+            normal_1,
+            normal_2,
+            anchor: i.anchor,
+            condition: i.condition,
+        }
+    }
+
+    /// The root of a tree around the triangle and others.
+    fn node(&self, random: &Random) -> Node {
+        let size = self.edges()[0].length();
+        let away = || vector(random) * size * random.pick(&[0.5, 3.0]);
+        let around = |by: DVec3| Aabb::around(&self.corners.map(|corner| (corner + by).as_vec3()));
+        let boxes: Vec<Aabb> = (0..=random.below(40))
+            .map(|i| around(if i == 0 { DVec3::ZERO } else { away() }))
+            .collect();
+        bytemuck::cast(build(&boxes, 1 + random.below(4)).nodes[0])
+    }
+
+    fn bounds(&self) -> Aabb {
+        Aabb::around(&self.corners.map(|corner| corner.as_vec3()))
+    }
+
+    fn pad(&self) -> f32 {
+        let farthest = self.origin.abs().max_element() as f32 + self.instance.size;
+        PAD * farthest
+    }
+
+    /// A vector of its space, by an argument's name.
+    fn vector(&self, name: &str) -> Option<Vec3> {
+        Some(
+            match name {
+                "v0" => self.corners[0],
+                "v1" | "v" => self.corners[1],
+                "v2" => self.corners[2],
+                "low" => self.bounds().low.as_dvec3(),
+                "high" => self.bounds().high.as_dvec3(),
+                "edge_1" => self.edges()[0],
+                "edge_2" => self.edges()[1],
+                "origin" => self.origin,
+                "direction" => self.direction,
+                "least" => self.direction - self.spread,
+                "most" => self.direction + self.spread,
+                _ => return None,
+            }
+            .as_vec3(),
+        )
+    }
+}
+
+fn point_of(corners: &[DVec3; 3], barycentric: DVec2) -> DVec3 {
+    let [a, b, c] = *corners;
+    a + (b - a) * barycentric.x + (c - a) * barycentric.y
+}
+
+/// Functions of rays in a mesh's space, whose arguments a face has.
+const OF_FACES: &[&str] = &[
+    "slabs",
+    "box_passage",
+    "fan",
+    "fan_passage",
+    "octant_of",
+    "shear_of",
+    "permuted",
+    "sheared",
+    "triangle_crossing",
+    "lowest",
+    "highest",
+    "face_primitive",
+    "mesh_pad",
+    "vector_from_mesh",
+];
 
 impl Situation {
     fn new(random: &Random) -> Situation {
@@ -164,6 +333,7 @@ impl Situation {
             number: random.below(4),
         };
         let direction = target - start;
+        let face = Face::new(random, center, columns);
         Situation {
             primitive,
             local,
@@ -172,6 +342,7 @@ impl Situation {
             local_start,
             direction,
             light,
+            face,
         }
     }
 
@@ -191,7 +362,10 @@ impl Situation {
             "Hit" => {
                 Hit {
                     t: random.pick(&[FAR, self.t() as f32]),
+                    instance: random.pick(&[0, 0, 1, 2]),
                     primitive: random.pick(&[NOTHING, 0, 7]),
+                    slot: random.below(9),
+                    barycentric: self.face.barycentric.as_vec2(),
                 }
                 .write(words);
             }
@@ -222,6 +396,26 @@ impl Situation {
                 specular: random.unit() as f32,
             }
             .write(words),
+            "Instance" => self.face.instance.write(words),
+            "Node" => self.face.node(random).write(words),
+            "Spot" => self.face.spot(random).write(words),
+            "Slabs" => {
+                let (origin, direction) = (self.face.origin.as_vec3(), self.face.direction.as_vec3());
+                slabs(origin, direction, self.face.pad()).write(words);
+            }
+            "Shear" => shear_of(self.face.direction.as_vec3()).write(words),
+            "Fan" => {
+                let argument = |name| self.face.vector(name).unwrap_or_default();
+                fan(argument("origin"), argument("least"), argument("most"), self.face.pad()).write(words);
+            }
+            "vec3<f32>" if OF_FACES.contains(&function) && self.face.vector(name).is_some() => {
+                self.face.vector(name).unwrap_or_default().write(words);
+            }
+            "vec2<f32>" if function.starts_with("face_") => self.face.barycentric.as_vec2().write(words),
+            "vec2<f32>" if name == "passage" => {
+                let near = random.between(-1.0, 2.0) as f32;
+                Vec2::new(near, near + random.between(-0.3, 1.0) as f32).write(words);
+            }
             "vec3<f32>" => self.vector(name, random).write(words),
             "f32" => self.number(name, random).write(words),
             "u32" => whole(function, name, random).write(words),
@@ -274,8 +468,9 @@ impl Situation {
             wo,
             start: position + normal * 1e-5,
             side: random.pick(&[1.0, -1.0]),
-            above: random.pick(&[NOTHING, 3]),
-            below: random.pick(&[NOTHING, 3]),
+            bulge: vector(random).as_vec3() * 1e-3,
+            above: random.pick(&[NOWHERE, UVec2::new(0, 3), UVec2::new(2, 3)]),
+            below: random.pick(&[NOWHERE, UVec2::new(0, 3), UVec2::new(2, 3)]),
             uv: self.local.truncate().as_vec2(),
             du: vector(random).as_vec3(),
             dv: vector(random).as_vec3(),
@@ -289,8 +484,8 @@ impl Situation {
             throughput: color(random),
             depth: random.below(10),
             branch: random.below(4),
-            left: random.pick(&[NOTHING, 3]),
-            wall: random.pick(&[NOTHING, 3]),
+            left: random.pick(&[NOWHERE, UVec2::new(0, 3)]),
+            wall: random.pick(&[NOWHERE, UVec2::new(0, 3)]),
         }
     }
 
@@ -332,6 +527,9 @@ impl Situation {
 
     fn number(&self, name: &str, random: &Random) -> f32 {
         match name {
+            "pad" => self.face.pad(),
+            "side" => random.pick(&[1.0, -1.0]),
+            "far_low" | "far_high" => random.pick(&[0.0, random.between(-2.0, 2.0) as f32]),
             "limit" => random.pick(&[FAR, FAR, self.t() as f32, (2.0 * self.t()) as f32]),
             "t" => random.pick(&[self.t() as f32, FAR]),
             "start" => (self.local_start.length_squared() - 1.0) as f32,
@@ -480,6 +678,9 @@ fn whole(function: &str, name: &str, random: &Random) -> u32 {
         "i" if function == "block_sample" => random.below(32),
         "exponent_bits" => random.below(14),
         "bits" if function == "power_whole" => random.below(14),
+        "bits" if function == "in_order" => random.below(256),
+        "octant" | "slot" => random.below(8),
+        "axis" => random.below(3),
         "side" => 1 + random.below(16),
         "first" if function == "samples_wanted" => 1 + random.below(64),
         "most" => random.below(65_537),

@@ -4,15 +4,14 @@
 
 use glam::{UVec2, Vec3, Vec4};
 use wgray::cpu::camera::camera_ray;
-use wgray::cpu::geometry::{material_of, surface_of};
+use wgray::cpu::geometry::{closest_hit, hidden_samples, material_of, spot_of, surface_of};
 use wgray::cpu::light::{segment, segments_to_light};
 use wgray::cpu::math::{dot, normalize};
 use wgray::cpu::ray::Ray;
 use wgray::cpu::rng::unit_float;
 use wgray::cpu::sampling::{decision_bits, sample_key, sample_square};
 use wgray::cpu::shadow::Block;
-use wgray::cpu::traverse::{closest_hit, hidden_samples};
-use wgray::pack::{NOTHING, Packed, RANDOM};
+use wgray::pack::{NOTHING, NOWHERE, Packed, RANDOM};
 
 use crate::pictures::{Way, differing, exact_ways, reference, render_with};
 use crate::{scenes, sources};
@@ -21,11 +20,12 @@ const FILE: &str = "integrators/phong.wgsl";
 
 const WGSL: &str = "
 fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> vec3f {
-    let hit = closest_hit(ray, NOTHING, NOTHING);
+    let hit = closest_hit(ray, NOWHERE, NOWHERE);
     if hit.primitive == NOTHING {
         return environment.background;
     }
-    let surface = surface_of(hit, ray);
+    let spot = spot_of(hit);
+    let surface = surface_of(spot, hit, ray);
     let bits = decision_bits(pixel, camera.seed, sample, 1u, 77u);
     let random = vec3f(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
     let up = normalize(surface.shading_normal + random);
@@ -38,17 +38,18 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
         let to = segment(segments_to_light(light, surface.position), sample_square(RANDOM, 1u, 0u, sample, block.key));
         sum += light.color * select(0.0, abs(dot(normalize(to), surface.normal)), seen);
     }
-    return sum * material_of(hit).diffuse;
+    return sum * material_of(spot).diffuse;
 }
 ";
 
 /// The same in Rust.
 fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
-    let hit = closest_hit(scene, ray, NOTHING, NOTHING);
+    let hit = closest_hit(scene, ray, NOWHERE, NOWHERE);
     if hit.primitive == NOTHING {
         return scene.environment.background;
     }
-    let surface = surface_of(scene, hit, ray);
+    let spot = spot_of(scene, hit);
+    let surface = surface_of(scene, &spot, hit, ray);
     let bits = decision_bits(pixel, scene.camera.seed, sample, 1, 77);
     let random = Vec3::new(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
     let up = Ray {
@@ -73,7 +74,7 @@ fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
         let cosine = dot(normalize(to), surface.normal).abs();
         sum += light.color * if seen { cosine } else { 0.0 };
     }
-    sum * material_of(scene, hit).diffuse
+    sum * material_of(scene, &spot).diffuse
 }
 
 #[test]

@@ -5,7 +5,8 @@ use naga::proc::Layouter;
 use naga::{Expression, Literal, Module, TypeInner};
 use wgray::gpu::compose::{KERNELS, Source, built_in};
 use wgray::pack::{
-    Camera, Counts, Environment, FirstHit, Light, Material, Primitive, Record, Specialization, Sphere, Texture, Work,
+    Camera, Counts, Environment, FirstHit, Instance, Item, Light, Material, Node, Primitive, Record, Specialization,
+    Sphere, Texture, Work,
 };
 
 use wgray::scene::Integrator;
@@ -57,6 +58,9 @@ fn records_have_the_same_layout() {
         size::<Texture>(),
         size::<Light>(),
         size::<Counts>(),
+        size::<Node>(),
+        size::<Item>(),
+        size::<Instance>(),
         size::<FirstHit>(),
         size::<Work>(),
     ];

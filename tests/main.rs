@@ -18,6 +18,7 @@ mod integrator;
 mod kernel;
 mod layout;
 mod loops;
+mod meshes;
 mod nearly;
 mod oracle;
 mod patterns;

@@ -1,12 +1,19 @@
 //! A third renderer, in f64, straight from what the scene file says. It shares no code and no choice of formula with
 //! the twins, which could share a mistake: ellipsoids are quadrics, triangles Moeller and Trumbore's, rectangles are
-//! cut out of their planes by projection, and Phong's model is the formula of `docs/scene-format.md` with unit vectors.
+//! cut out of their planes by projection, meshes are lists of triangles that it reads itself, and Phong's model is the formula of `docs/scene-format.md` with unit vectors.
+
+use std::collections::HashMap;
 
 use glam::{DMat4, DVec2, DVec3, DVec4, Vec2Swizzles};
+use rayon::prelude::*;
+use wgray::mesh::Normals;
 use wgray::scene::{
-    CameraDescription, ColorDescription, Description, DiskDescription, LightDescription, MaterialDescription,
-    PhongDescription, Shadows, ShapeDescription, TextureDescription,
+    CameraDescription, ColorDescription, Description, DiskDescription, InstanceDescription, LightDescription,
+    MaterialDescription, MeshFileDescription, PhongDescription, Rotation, Scale, Shadows, ShapeDescription,
+    TextureDescription, Up,
 };
+
+use crate::sources;
 
 /// A mistake that the tests of the tests make on purpose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +35,10 @@ pub enum Flaw {
     InvertedIndex,
     /// Rows of a texture confused with columns.
     TransposedTexture,
+    /// Meshes shaded by the normals of their triangles.
+    Facets,
+    /// Normals turned like edges, not like planes.
+    StretchedNormals,
 }
 
 pub struct Oracle<'a> {
@@ -52,6 +63,8 @@ enum Form {
         from_local: DMat4,
     },
     Triangle([DVec3; 3]),
+    /// Facets by 32 that follow one another, with a box around each 32.
+    Mesh(Vec<(DVec3, DVec3, Vec<Facet>)>),
     /// Centre, unit tangent and bitangent, and half the sizes along them; endless if there are no sizes; `round` if only
     /// what is no farther from the centre than that.
     Flat {
@@ -63,6 +76,17 @@ enum Form {
     },
 }
 
+/// A triangle of a mesh in the world.
+#[derive(Clone)]
+struct Facet {
+    corners: [DVec3; 3],
+    uvs: [DVec2; 3],
+    /// Unit normals at its corners.
+    normals: Option<[DVec3; 3]>,
+    /// Outward.
+    normal: DVec3,
+}
+
 /// What a ray meets.
 pub struct Meeting {
     pub t: f64,
@@ -70,6 +94,10 @@ pub struct Meeting {
     /// Outward.
     pub normal: DVec3,
     pub uv: DVec2,
+    /// What it is shaded by, outward.
+    pub shading: DVec3,
+    /// From the surface up to the smooth one that a mesh stands for, as seen from outside and from inside.
+    bulges: [DVec3; 2],
     solid: usize,
 }
 
@@ -85,12 +113,19 @@ impl<'a> Oracle<'a> {
             };
             solids.extend(forms.into_iter().map(solid));
         }
+        for (number, instance) in scene.instances.iter().enumerate() {
+            solids.push(Solid {
+                form: mesh(instance, &scene.meshes[&instance.mesh], flaw),
+                shape: scene.shapes.len() + number,
+                material: instance.material.clone(),
+            });
+        }
         for (number, light) in scene.lights.iter().enumerate() {
             if let LightDescription::Rectangle(light) = light {
                 let form = flat(light.center, light.normal, light.tangent, Some(light.size), flaw);
                 solids.push(Solid {
                     form,
-                    shape: scene.shapes.len() + number,
+                    shape: scene.shapes.len() + scene.instances.len() + number,
                     material: None,
                 });
             }
@@ -101,7 +136,7 @@ impl<'a> Oracle<'a> {
     /// The means of all pixels. Samples are at the centres of square grids, whatever the scene says.
     pub fn picture(&self) -> Vec<[f64; 3]> {
         let pixels = self.scene.image.width * self.scene.image.height;
-        (0..pixels).map(|i| self.pixel(i)).collect()
+        (0..pixels).into_par_iter().map(|i| self.pixel(i)).collect()
     }
 
     /// One of them: row by row from the top left.
@@ -170,21 +205,33 @@ impl<'a> Oracle<'a> {
     }
 
     fn nearest(&self, origin: DVec3, direction: DVec3) -> Option<Meeting> {
-        let mut nearest: Option<(f64, usize)> = None;
+        let mut nearest: Option<(f64, usize, Option<&Facet>)> = None;
         for (i, solid) in self.solids.iter().enumerate() {
-            for t in crossings(&solid.form, origin, direction) {
-                if t > 0.0 && nearest.is_none_or(|(nearer, _)| t < nearer) {
-                    nearest = Some((t, i));
+            for (t, facet) in crossings(&solid.form, origin, direction) {
+                if t > 0.0 && nearest.is_none_or(|(nearer, ..)| t < nearer) {
+                    nearest = Some((t, i, facet));
                 }
             }
         }
-        let (t, i) = nearest?;
-        let (normal, uv) = facing(&self.solids[i].form, origin + direction * t);
+        let (t, i, facet) = nearest?;
+        let shape = self.solids[i].shape;
+        let point = origin + direction * t;
+        if let Some(facet) = facet {
+            return Some(Meeting {
+                t,
+                shape,
+                solid: i,
+                ..facet.meeting(point, self.flaw)
+            });
+        }
+        let (normal, uv) = facing(&self.solids[i].form, point);
         Some(Meeting {
             t,
-            shape: self.solids[i].shape,
+            shape,
             normal,
             uv,
+            shading: normal,
+            bulges: [DVec3::ZERO; 2],
             solid: i,
         })
     }
@@ -196,22 +243,29 @@ impl<'a> Oracle<'a> {
             return render.background;
         };
         let Some(material) = &self.solids[meeting.solid].material else {
-            return light_color(&self.scene.lights[meeting.shape - self.scene.shapes.len()]);
+            let shapes = self.scene.shapes.len() + self.scene.instances.len();
+            return light_color(&self.scene.lights[meeting.shape - shapes]);
         };
         let point = origin + direction * meeting.t;
         let facing = meeting.normal.dot(direction) < 0.0;
         let normal = if facing { meeting.normal } else { -meeting.normal };
+        let shading = if facing { meeting.shading } else { -meeting.shading };
         // "how far above the surface rays start at least, relative to the largest coordinate there": 1e-9 is enough in f64
         let offset = normal * (render.shadow_epsilon.max(1e-9) * point.abs().max_element().max(meeting.t));
         let follow = |origin: DVec3, direction: DVec3| self.radiance((origin, direction), bounces + 1);
         match &self.scene.materials[material] {
             MaterialDescription::Phong(phong) => {
-                self.direct(phong, &meeting, normal, point, point + offset, -direction)
+                let above = point + offset + meeting.bulges[usize::from(!facing)];
+                self.direct(phong, &meeting, [normal, shading], point, above, -direction)
             }
             _ if bounces == render.max_depth => render.background,
             MaterialDescription::Mirror(mirror) => {
                 assert!(mirror.normal_map.is_none(), "the oracle knows no normal maps");
-                self.color(&mirror.tint, meeting.uv) * follow(point + offset, direction.reflect(normal))
+                // where the shading normal would lead into the surface, its own takes its place
+                let mirrored = direction.reflect(shading);
+                let is_usable = mirrored.dot(normal) > 0.0 && shading.dot(direction) < 0.0;
+                let mirrored = if is_usable { mirrored } else { direction.reflect(normal) };
+                self.color(&mirror.tint, meeting.uv) * follow(point + offset, mirrored)
             }
             MaterialDescription::Glass(glass) => {
                 assert!(glass.normal_map.is_none(), "the oracle knows no normal maps");
@@ -242,7 +296,7 @@ impl<'a> Oracle<'a> {
         &self,
         phong: &PhongDescription,
         meeting: &Meeting,
-        normal: DVec3,
+        [normal, shading]: [DVec3; 2],
         point: DVec3,
         above: DVec3,
         viewer: DVec3,
@@ -257,7 +311,10 @@ impl<'a> Oracle<'a> {
         for light in &self.scene.lights {
             let samples = self.samples(light, point);
             for (to_light, distance) in &samples {
-                let reflected = self.reflected(diffuse, specular, phong.shininess, normal, viewer, *to_light);
+                if normal.dot(*to_light) <= 0.0 {
+                    continue;
+                }
+                let reflected = self.reflected(diffuse, specular, phong.shininess, shading, viewer, *to_light);
                 if self.flaw == Flaw::NoShadows || !self.hidden(above, *to_light, *distance) {
                     sum += light_color(light) * reflected / samples.len() as f64;
                 }
@@ -355,7 +412,7 @@ impl<'a> Oracle<'a> {
         let shapes = self.solids.iter().filter(blocks);
         shapes
             .flat_map(|solid| crossings(&solid.form, from, direction))
-            .any(|t| t > 0.0 && t < end)
+            .any(|(t, _)| t > 0.0 && t < end)
     }
 }
 
@@ -447,9 +504,155 @@ fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
     }
 }
 
-/// Where a line crosses a surface, as distances along it.
-fn crossings(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
+/// A mesh file in the world.
+fn mesh(i: &InstanceDescription, file: &MeshFileDescription, flaw: Flaw) -> Form {
+    assert!(
+        i.matrix.is_none() && i.materials.is_empty() && file.up == Up::Z,
+        "the oracle does not know such meshes"
+    );
+    let scale = match i.scale {
+        None => DVec3::ONE,
+        Some(Scale::All(s)) => DVec3::splat(s),
+        Some(Scale::Each(s)) => s,
+    };
+    // A rotation is told by where it takes the axes: Rodrigues' formula.
+    let turned = |v: DVec3, axis: DVec3, degrees: f64| {
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        v * cosine + axis.cross(v) * sine + axis * (axis.dot(v) * (1.0 - cosine))
+    };
+    let rotated = |v: DVec3| match &i.rotate {
+        None => v,
+        Some(Rotation::Angles(a)) => turned(turned(turned(v, DVec3::X, a.x), DVec3::Y, a.y), DVec3::Z, a.z),
+        Some(Rotation::About(about)) => turned(v, about.axis.normalize(), about.degrees),
+    };
+    let place = |p: DVec3| rotated(p * scale) + i.translate.unwrap_or_default();
+    let upright = |n: DVec3| match flaw {
+        Flaw::StretchedNormals => rotated(n * scale).normalize(),
+        _ => rotated(n / scale).normalize(),
+    };
+    let text = std::fs::read_to_string(sources::path("scenes").join(&file.file)).expect("a mesh");
+    let mut lists: HashMap<&str, Vec<DVec3>> = HashMap::new();
+    let mut facets = Vec::new();
+    for line in text.lines() {
+        let mut words = line.split_whitespace();
+        let (Some(tag), words) = (words.next(), words.collect::<Vec<_>>()) else {
+            continue;
+        };
+        if tag == "f" {
+            let corner = |word: &str| -> [usize; 3] {
+                let numbers: Vec<usize> = word.split('/').map(|n| n.parse().expect("a number")).collect();
+                numbers
+                    .try_into()
+                    .expect("a position, texture coordinates and a normal")
+            };
+            let polygon: Vec<[usize; 3]> = words.into_iter().map(corner).collect();
+            for i in 2..polygon.len() {
+                let corners = [polygon[0], polygon[i - 1], polygon[i]];
+                let [p, t, n] =
+                    [0, 1, 2].map(|part| corners.map(|corner| lists[["v", "vt", "vn"][part]][corner[part] - 1]));
+                let at = p.map(place);
+                let mirrored = (scale.x * scale.y * scale.z).signum();
+                facets.push(Facet {
+                    corners: at,
+                    uvs: t.map(|uv| uv.truncate()),
+                    normals: (file.normals != Some(Normals::Flat)).then(|| n.map(upright)),
+                    normal: (at[1] - at[0]).cross(at[2] - at[1]).normalize() * mirrored,
+                });
+            }
+        } else if ["v", "vt", "vn"].contains(&tag) {
+            let numbers: Vec<f64> = words.iter().map(|n| n.parse().expect("a number")).collect();
+            let third = numbers.get(2).copied().unwrap_or(0.0);
+            lists
+                .entry(tag)
+                .or_default()
+                .push(DVec3::new(numbers[0], numbers[1], third));
+        }
+    }
+    let around = |facets: &[Facet]| {
+        let points = || facets.iter().flat_map(|facet| facet.corners);
+        let low = points().fold(DVec3::INFINITY, DVec3::min);
+        (low, points().fold(DVec3::NEG_INFINITY, DVec3::max), facets.to_vec())
+    };
+    Form::Mesh(facets.chunks(32).map(around).collect())
+}
+
+impl Facet {
+    /// What it is like at a point of it; `t`, `shape` and `solid` are not its to say.
+    fn meeting(&self, point: DVec3, flaw: Flaw) -> Meeting {
+        let [a, b, c] = self.corners;
+        // Weights as ratios of areas.
+        let across = (b - a).cross(c - a);
+        let area = |p: DVec3, q: DVec3| (p - point).cross(q - point).dot(across) / across.length_squared();
+        let weights = [area(b, c), area(c, a), area(a, b)];
+        let uv = (0..3).map(|i| self.uvs[i] * weights[i]).sum();
+        let (mut shading, mut bulges) = (self.normal, [DVec3::ZERO; 2]);
+        if let Some(normals) = self.normals.filter(|_| flaw != Flaw::Facets) {
+            let smooth: DVec3 = (0..3).map(|i| normals[i] * weights[i]).sum();
+            shading = smooth.normalize() * smooth.dot(self.normal).signum();
+            // Up to the planes through the corners, where these are above the triangle: Hanika, "Hacking the Shadow
+            // Terminator", 2021.
+            bulges = [1.0, -1.0].map(|side| {
+                let lifted = |i: usize| {
+                    let n = normals[i] * side;
+                    point - n * (point - self.corners[i]).dot(n).min(0.0)
+                };
+                (0..3).map(|i| lifted(i) * weights[i]).sum::<DVec3>() - point
+            });
+        }
+        Meeting {
+            t: 0.0,
+            shape: 0,
+            normal: self.normal,
+            uv,
+            shading,
+            bulges,
+            solid: 0,
+        }
+    }
+}
+
+/// Whether a line's way forward passes a box.
+fn passes(low: DVec3, high: DVec3, origin: DVec3, direction: DVec3) -> bool {
+    let (a, b) = ((low - origin) / direction, (high - origin) / direction);
+    let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
+    let margin = 1e-9 * (1.0 + near.abs());
+    // NaN, of a side that the line lies in, passes
+    !(near > far + margin || far < -margin)
+}
+
+/// Where a line crosses a surface, as distances along it; and of a mesh which triangle.
+fn crossings(form: &Form, origin: DVec3, direction: DVec3) -> Vec<(f64, Option<&Facet>)> {
+    if let Form::Mesh(parts) = form {
+        let parts = parts
+            .iter()
+            .filter(|(low, high, _)| passes(*low, *high, origin, direction));
+        let facets = parts.flat_map(|(.., facets)| facets);
+        let met =
+            facets.filter_map(|facet| triangle_crossing(&facet.corners, origin, direction).map(|t| (t, Some(facet))));
+        return met.collect();
+    }
+    distances(form, origin, direction)
+        .into_iter()
+        .map(|t| (t, None))
+        .collect()
+}
+
+/// Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997.
+fn triangle_crossing([v0, v1, v2]: &[DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
+    let (edge1, edge2) = (*v1 - *v0, *v2 - *v0);
+    let p = direction.cross(edge2);
+    let determinant = edge1.dot(p);
+    let to_origin = origin - *v0;
+    let u = to_origin.dot(p) / determinant;
+    let q = to_origin.cross(edge1);
+    let v = direction.dot(q) / determinant;
+    let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
+    inside.then(|| edge2.dot(q) / determinant)
+}
+
+fn distances(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
     match form {
+        Form::Mesh(_) => Vec::new(),
         Form::Quadric { q, .. } => {
             let (o, d) = (origin.extend(1.0), direction.extend(0.0));
             let (a, b, c) = (d.dot(*q * d), 2.0 * d.dot(*q * o), o.dot(*q * o));
@@ -460,22 +663,7 @@ fn crossings(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
             let root = discriminant.sqrt();
             vec![(-b - root) / (2.0 * a), (-b + root) / (2.0 * a)]
         }
-        Form::Triangle([v0, v1, v2]) => {
-            // Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997
-            let (edge1, edge2) = (*v1 - *v0, *v2 - *v0);
-            let p = direction.cross(edge2);
-            let determinant = edge1.dot(p);
-            let to_origin = origin - *v0;
-            let u = to_origin.dot(p) / determinant;
-            let q = to_origin.cross(edge1);
-            let v = direction.dot(q) / determinant;
-            let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
-            if inside {
-                vec![edge2.dot(q) / determinant]
-            } else {
-                Vec::new()
-            }
-        }
+        Form::Triangle(corners) => triangle_crossing(corners, origin, direction).into_iter().collect(),
         Form::Flat {
             center,
             tangent,
@@ -498,6 +686,7 @@ fn crossings(form: &Form, origin: DVec3, direction: DVec3) -> Vec<f64> {
 /// Outward unit normal and texture coordinates at a point of a surface.
 fn facing(form: &Form, point: DVec3) -> (DVec3, DVec2) {
     match form {
+        Form::Mesh(_) => unreachable!("a mesh's triangle knows what it is like"),
         Form::Quadric { q, from_local } => {
             let gradient = *q * point.extend(1.0);
             let local = from_local.inverse().transform_point3(point);

@@ -203,15 +203,14 @@ fn rust_type(ty: &Type) -> String {
     match ty {
         Type::Reference(reference) => rust_type(&reference.elem),
         Type::Array(array) => {
-            let length = &array.len;
-            let syn::Expr::Lit(syn::ExprLit {
-                lit: syn::Lit::Int(length),
-                ..
-            }) = length
-            else {
-                panic!("the length of a shared array is a literal, not {length:?}");
+            let length = match &array.len {
+                syn::Expr::Lit(syn::ExprLit {
+                    lit: syn::Lit::Int(length),
+                    ..
+                }) => length.base10_digits().to_string(),
+                other => format!("{other:?}"), // like nothing in WGSL: the length of a shared array is a literal
             };
-            format!("array<{}, {}>", rust_type(&array.elem), length.base10_digits())
+            format!("array<{}, {length}>", rust_type(&array.elem))
         }
         Type::Path(path) => {
             let name = path.path.segments.last().expect("a path has a name").ident.to_string();

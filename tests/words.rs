@@ -4,13 +4,15 @@ use glam::{IVec2, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
 use wgray::cpu::differential::{Arrival, Derivative, Differential};
 use wgray::cpu::footprint::{Ellipse, Footprint};
 use wgray::cpu::light::Segments;
+use wgray::cpu::mesh::{Crossing, Shear, Spot};
 use wgray::cpu::path::{Path, Scattered};
 use wgray::cpu::phong::Lobes;
 use wgray::cpu::primitive::Tangents;
 use wgray::cpu::ray::{Hit, Ray};
 use wgray::cpu::shadow::{Block, Cone};
+use wgray::cpu::slab::{Fan, Slabs};
 use wgray::cpu::surface::Surface;
-use wgray::pack::{Camera, Environment, FirstHit, Light, Material, Primitive, Sphere, Texture};
+use wgray::pack::{Camera, Environment, FirstHit, Instance, Light, Material, Node, Primitive, Sphere, Texture};
 
 pub trait Words: Sized {
     /// Takes its words from the front.
@@ -66,7 +68,9 @@ pod![
     Light,
     FirstHit,
     Sphere,
-    Texture
+    Texture,
+    Node,
+    Instance
 ];
 
 /// Records of `src/cpu/`; a field that is missing here does not compile.
@@ -86,8 +90,8 @@ macro_rules! records {
 }
 records! {
     Ray { origin, direction }
-    Hit { t, primitive }
-    Surface { position, normal, shading_normal, wo, start, side, above, below, uv, du, dv }
+    Hit { t, instance, primitive, slot, barycentric }
+    Surface { position, normal, shading_normal, wo, start, bulge, side, above, below, uv, du, dv }
     Derivative { position, direction }
     Differential { x, y }
     Arrival { x, y, normal_x, normal_y }
@@ -100,6 +104,13 @@ records! {
     Lobes { diffuse, specular }
     Block { pattern, side, first, count, group, key }
     Cone { apex, to, length2, inverse_depth }
+    Slabs { low_origin, high_origin, inverse }
+    Fan { low_origin, high_origin, near_low, near_high, far_low, far_high }
+    Shear { axis, slope, scale }
+    Crossing { met, t, barycentric }
+    Spot {
+        primitive, edge_1, edge_2, uv_0, uv_1, uv_2, normal_0, normal_1, normal_2, anchor, condition,
+    }
 }
 
 /// Something that a twin takes as an argument, by value or by reference.
@@ -134,5 +145,8 @@ by_reference![
     Sphere,
     Surface,
     Cone,
-    Texture
+    Texture,
+    Node,
+    Instance,
+    Spot
 ];

@@ -34,6 +34,7 @@ ANSWERS = [
     ["main", "textures::", "against_oracle::", "radiance::", "culling::", "--skip", "is_found", "--skip", "textures::agreement"],
     ["main", "bounds::", "analytic::", "statistics::", "robust::", "--skip", "is_found"],
     ["main", "sampling::", "--skip", "is_found"],
+    ["main", "meshes::", "--skip", "is_found", "--skip", "meshes::bad_input", "--skip", "meshes::readers"],
 ]
 # What else there is, of the command line and of how work is cut.
 REST = [["main", "render::", "cli::", "sampling::"], ["lib"]]
@@ -45,7 +46,7 @@ def copy(folder):
     """A copy of the project with the switch, in which mistakes can be made."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    for name in ["Cargo.toml", "Cargo.lock", "rustfmt.toml", "src", "shaders", "scenes", "tests", "benches", "docs", "README.md"]:
+    for name in ["Cargo.toml", "Cargo.lock", "rustfmt.toml", "src", "shaders", "scenes", "tests", "examples", "benches", "docs", "README.md"]:
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, folder / name)
         else:

@@ -1,13 +1,68 @@
 //! Small valid scenes of everything that a scene file can say, as strategies of proptest.
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::sync::OnceLock;
 
 use glam::DVec3;
 use proptest::prelude::*;
 use proptest::sample::select;
+use wgray::mesh::Normals;
+use wgray::pack::{MOST_OUTSIDE, Packed, pack};
 use wgray::scene::*;
 
+use crate::meshes::forms::Form;
 use crate::patterns;
+use crate::random::Random;
+
+/// Mesh files, and whether they have texture coordinates and normals. They are beside the scenes that failing tests write.
+const MESHES: &[(&str, bool, bool)] = &[
+    ("soup.obj", true, false),
+    ("slivers.obj", false, false),
+    ("ball.obj", true, true),
+    ("cube.obj", true, false),
+    ("rock.obj", true, true),
+];
+
+/// The folder that random scenes and their meshes are in.
+pub fn folder() -> &'static Path {
+    static FOLDER: OnceLock<&Path> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+        let random = Random::new(21);
+        for (name, has_uvs, has_normals) in MESHES {
+            let form = match *name {
+                "soup.obj" => Form::soup(60, &random),
+                "slivers.obj" => Form::slivers(40, &random),
+                "ball.obj" => Form::icosphere(1),
+                "cube.obj" => Form::cube(),
+                _ => bumpy(&random),
+            };
+            let uvs: Vec<[f64; 2]> = form.points.iter().map(|p| [p.x * 0.7 + p.z, p.y - 0.3 * p.x]).collect();
+            let normals: Vec<DVec3> = form.points.iter().map(|p| p.normalize()).collect();
+            let text = form.obj(has_normals.then_some(&normals), has_uvs.then_some(&uvs));
+            // Whoever reads it sees one whole file.
+            let draft = folder.join(format!("{name}.{}", std::process::id()));
+            fs::write(&draft, text).expect("a place for a mesh");
+            fs::rename(&draft, folder.join(name)).expect("a place for a mesh");
+        }
+        folder
+    })
+}
+
+/// A sphere with dents and horns.
+fn bumpy(random: &Random) -> Form {
+    let mut form = Form::icosphere(2);
+    form.points.iter_mut().for_each(|p| *p *= random.between(0.4, 1.3));
+    form
+}
+
+/// A random scene as the backends read it.
+pub fn packed(d: &Description) -> Packed {
+    let beside = Assets::beside(folder());
+    pack(&d.validate_with(&beside).unwrap_or_else(|problem| panic!("{problem}")))
+}
 
 /// Often one of a few numbers, so that things touch, coincide and lie in one plane.
 fn coordinate() -> impl Strategy<Value = f64> {
@@ -200,6 +255,99 @@ fn shape() -> impl Strategy<Value = ShapeDescription> {
     ]
 }
 
+/// What places a mesh: translate, rotate and scale, or a matrix.
+type Placement = (Option<DVec3>, Option<Rotation>, Option<Scale>, Option<Vec<[f64; 4]>>);
+
+fn placement() -> impl Strategy<Value = Placement> {
+    let angle = || prop_oneof![2 => select(&[0.0, 90.0, -180.0, 30.0][..]), 1 => -360.0..360.0];
+    let angles = [angle(), angle(), angle()].prop_map(|a| Rotation::Angles(DVec3::from_array(a)));
+    let about = (direction(), angle()).prop_map(|(axis, degrees)| Rotation::About(RotationAbout { axis, degrees }));
+    let rotation = prop_oneof![1 => Just(None), 1 => angles.prop_map(Some), 1 => about.prop_map(Some)];
+    let size = || select(&[1.0, 0.7, 0.3, -0.5, 1.0, 1e-3, 1e3][..]);
+    let each = [size(), size(), size()].prop_map(|s| Scale::Each(DVec3::from_array(s)));
+    let scale = prop_oneof![2 => Just(None), 2 => size().prop_map(|s| Some(Scale::All(s))), 1 => each.prop_map(Some)];
+    let parts = (prop::option::of(point()), rotation, scale).prop_map(|(t, r, s)| (t, r, s, None));
+    let row = || [coordinate(), coordinate(), coordinate(), coordinate()];
+    let matrix = [row(), row(), row()].prop_map(|rows| (None, None, None, Some(rows.to_vec())));
+    prop_oneof![5 => parts, 1 => matrix]
+}
+
+fn normals() -> impl Strategy<Value = Option<Normals>> {
+    select(vec![None, Some(Normals::Smooth), Some(Normals::Flat)])
+}
+
+fn up() -> impl Strategy<Value = Up> {
+    select(vec![Up::Z, Up::Y, Up::X])
+}
+
+/// Materials of groups that have others than the rest.
+fn materials_of_groups() -> impl Strategy<Value = BTreeMap<String, String>> {
+    prop::option::of(select(&["a", "b", "c"][..])).prop_map(|material| {
+        let named = material.map(|material| ("second".to_string(), material.to_string()));
+        named.into_iter().collect()
+    })
+}
+
+fn mesh() -> impl Strategy<Value = ShapeDescription> {
+    let material = select(&["a", "b", "c"][..]).prop_map(str::to_string);
+    let file = select(MESHES).prop_map(|(name, ..)| name.to_string());
+    (file, normals(), up(), material, materials_of_groups(), placement()).prop_map(
+        |(file, normals, up, material, materials, (translate, rotate, scale, matrix))| {
+            ShapeDescription::Mesh(MeshDescription {
+                file,
+                normals,
+                up,
+                material: Some(material),
+                materials,
+                translate,
+                rotate,
+                scale,
+                matrix,
+            })
+        },
+    )
+}
+
+fn instance() -> impl Strategy<Value = InstanceDescription> {
+    let name = || select(&["a", "b", "c"][..]).prop_map(str::to_string);
+    (name(), name(), materials_of_groups(), placement()).prop_map(
+        |(mesh, material, materials, (translate, rotate, scale, matrix))| InstanceDescription {
+            mesh,
+            material: Some(material),
+            materials,
+            translate,
+            rotate,
+            scale,
+            matrix,
+        },
+    )
+}
+
+/// Meshes for instances, which some scenes have.
+fn meshes() -> impl Strategy<Value = (BTreeMap<String, MeshFileDescription>, Vec<InstanceDescription>)> {
+    let file = || {
+        (select(MESHES), normals(), up()).prop_map(|((name, ..), normals, up)| {
+            let mut mesh = MeshFileDescription::new(name.to_string());
+            (mesh.normals, mesh.up) = (normals, up);
+            mesh
+        })
+    };
+    let files = [file(), file(), file()].prop_map(|files| {
+        let names = ["a", "b", "c"].map(str::to_string);
+        names.into_iter().zip(files).collect()
+    });
+    let some = (files, prop::collection::vec(instance(), 1..5));
+    prop_oneof![3 => Just(Default::default()), 1 => some]
+}
+
+/// A few shapes, or so many that they are in a tree. Meshes are few among them, as kernels that walk through trees take seconds
+/// to compile.
+fn shapes() -> impl Strategy<Value = Vec<ShapeDescription>> {
+    let shape = || prop_oneof![9 => shape(), 1 => mesh()];
+    let many = MOST_OUTSIDE + 1..MOST_OUTSIDE + 20;
+    prop_oneof![11 => prop::collection::vec(shape(), 0..7), 1 => prop::collection::vec(shape(), many)]
+}
+
 /// Anywhere: on the surface of something, in the middle of it, or away from all.
 fn camera() -> impl Strategy<Value = CameraDescription> {
     let position = prop_oneof![2 => point().prop_map(|p| p * 3.0 + DVec3::new(0.01, -0.02, 0.03)), 1 => point()];
@@ -279,17 +427,38 @@ fn render() -> impl Strategy<Value = RenderDescription> {
     )
 }
 
+/// Scenes of everything.
 pub fn description() -> impl Strategy<Value = Description> {
-    let (shapes, lights) = (
-        prop::collection::vec(shape(), 0..7),
-        prop::collection::vec(light(), 0..4),
-    );
+    described((shapes(), meshes()))
+}
+
+/// Scenes of a few primitives, none of which is in a tree.
+pub fn without_trees() -> impl Strategy<Value = Description> {
+    described((prop::collection::vec(shape(), 0..7), Just(Default::default())))
+}
+
+type Shapes = (
+    Vec<ShapeDescription>,
+    (BTreeMap<String, MeshFileDescription>, Vec<InstanceDescription>),
+);
+
+fn described(shapes: impl Strategy<Value = Shapes>) -> impl Strategy<Value = Description> {
+    let lights = prop::collection::vec(light(), 0..4);
     let materials = [material(), material(), material()];
     let size = (1u32..25, 1u32..25);
     let place = (select(&[1.0, 1.0, 0.001, 1000.0][..]), select(&[0.0, 0.0, 100.0][..]));
     (shapes, lights, materials, textures(), camera(), render(), size, place)
         .prop_map(
-            |(shapes, lights, materials, textures, camera, render, (width, height), (scale, offset))| {
+            |(
+                (shapes, (meshes, instances)),
+                lights,
+                materials,
+                textures,
+                camera,
+                render,
+                (width, height),
+                (scale, offset),
+            )| {
                 let names = ["a", "b", "c"].map(str::to_string);
                 let mut d = Description {
                     image: ImageDescription { width, height },
@@ -299,12 +468,14 @@ pub fn description() -> impl Strategy<Value = Description> {
                     materials: names.into_iter().zip(materials).collect(),
                     lights,
                     shapes,
+                    meshes,
+                    instances,
                 };
                 moved(&mut d, scale, DVec3::new(offset, -offset, offset));
                 d
             },
         )
-        .prop_filter("a sound scene", |d| d.validate().is_ok())
+        .prop_filter("a sound scene", |d| d.validate_with(&Assets::beside(folder())).is_ok())
 }
 
 /// Scales and moves all that a scene has.
@@ -351,7 +522,34 @@ fn moved(d: &mut Description, scale: f64, offset: DVec3) {
             ShapeDescription::Triangle(s) => s.vertices.iter_mut().for_each(point),
             ShapeDescription::Tetrahedron(s) => s.vertices.iter_mut().for_each(point),
             ShapeDescription::Plane(s) => point(&mut s.point),
+            ShapeDescription::Mesh(s) => placed(&mut s.translate, &mut s.scale, &mut s.matrix, scale, offset),
             other => panic!("no random scene has the shape {other:?}"),
         }
     }
+    for i in &mut d.instances {
+        placed(&mut i.translate, &mut i.scale, &mut i.matrix, scale, offset);
+    }
+}
+
+/// Scales and moves a mesh.
+fn placed(
+    translate: &mut Option<DVec3>,
+    factors: &mut Option<Scale>,
+    matrix: &mut Option<Vec<[f64; 4]>>,
+    scale: f64,
+    offset: DVec3,
+) {
+    if let Some(rows) = matrix {
+        for (row, offset) in rows.iter_mut().zip(offset.to_array()) {
+            *row = row.map(|x| x * scale);
+            row[3] += offset;
+        }
+        return;
+    }
+    *translate = Some(translate.unwrap_or_default() * scale + offset);
+    *factors = Some(match factors {
+        None => Scale::All(scale),
+        Some(Scale::All(s)) => Scale::All(*s * scale),
+        Some(Scale::Each(s)) => Scale::Each(*s * scale),
+    });
 }

@@ -3,7 +3,7 @@
 pub mod any_scene;
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
@@ -14,14 +14,14 @@ use wgray::scene::{Description, Scene};
 use crate::adapter::{self, bit_exact};
 use crate::nearly::Nearly;
 use crate::pictures::{Way, differing, first_hits, reference, render_with};
-use crate::{patterns, rounding, scenes, sources};
+use crate::{patterns, rounding, sources};
 
 /// How many scenes; with this variable each run has others, else they are the same in every run.
 const CASES: &str = "WGRAY_TEST_CASES";
 
 /// Renders a scene both ways.
 fn check(d: &Description, shaders: &Shaders) -> Result<(), String> {
-    let packed = scenes::packed(d);
+    let packed = any_scene::packed(d);
     let cpu = reference(&packed);
     if !cpu.sums.iter().all(|sum| sum.is_finite()) {
         return Err("a pixel is no number".into());
@@ -67,7 +67,7 @@ fn failing(cases: u32, shrinks: u32, always_the_same: bool, shaders: &Shaders) -
 
 /// Writes a scene to a file that `wgray render` takes.
 fn save(d: &Description, name: &str) -> PathBuf {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let path = any_scene::folder().join(name);
     std::fs::write(&path, toml::to_string(d).expect("a scene as TOML")).expect("a place for the scene");
     path
 }
@@ -122,7 +122,7 @@ fn random_scenes_are_nearly_the_same_where_bits_are_not_promised() {
     let (mut plain, mut poor, mut shifted) = (Nearly::default(), Nearly::default(), Nearly::default());
     for _ in 0..24 {
         let d = strategy.new_tree(&mut runner).expect("a scene").current();
-        let packed = scenes::packed(&d);
+        let packed = any_scene::packed(&d);
         let cpu = reference(&packed);
         let by_plain_wgsl = render_with(&packed, Way::Plain, sources::shaders());
         if bit_exact(device) {
@@ -158,7 +158,7 @@ fn shaders_that_differ_by_one_ulp_are_found_by_random_scenes() {
     assert!(reason.contains("pixels differ"), "{reason}");
     let path = save(&d, "scene-of-a-negative-control.toml");
     let scene = Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(wgray::pack::pack(&scene), scenes::packed(&d));
+    assert_eq!(wgray::pack::pack(&scene), any_scene::packed(&d));
 }
 
 /// Random scenes have everything that scene files can: every type that the parser knows, but for these.

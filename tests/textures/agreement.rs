@@ -171,7 +171,7 @@ fn texels_in_several_buffers_give_the_same_picture() {
         let problem = compare(way, scene, &found, &expected);
         assert!(problem.is_ok(), "{way:?}: {}", problem.unwrap_err());
     }
-    small.info.storage_buffers = 7;
+    small.info.storage_buffers = 9;
     let error = new(&small, false).err().unwrap().to_string();
     assert!(
         error.contains("the scene's images take 0.0 MiB, a shader sees 2 x 0.0 MiB"),

@@ -6,12 +6,11 @@ use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3};
 use wgray::cpu::camera::{camera_differential, camera_ray};
 use wgray::cpu::differential::{Arrival, reflected_derivative};
 use wgray::cpu::footprint::surface_footprint;
-use wgray::cpu::geometry::{arrival_of, surface_of};
+use wgray::cpu::geometry::{arrival_of, closest_hit, material_of, spot_of, surface_of};
 use wgray::cpu::integrators::phong::{is_specular, scatter};
 use wgray::cpu::path::Path;
 use wgray::cpu::surface::{Surface, with_coordinates};
-use wgray::cpu::traverse::closest_hit;
-use wgray::pack::{NOTHING, Packed, Primitive};
+use wgray::pack::{NOTHING, NOWHERE, Packed, Primitive};
 
 use super::scene;
 
@@ -134,19 +133,22 @@ fn arrive(scene: &Packed, at: Vec2) -> Option<(Primitive, Surface, Arrival, u32)
         throughput: Vec3::ONE,
         depth: 0,
         branch: 0,
-        left: NOTHING,
-        wall: NOTHING,
+        left: NOWHERE,
+        wall: NOWHERE,
     };
     loop {
         let hit = closest_hit(scene, path.ray, path.left, path.wall);
-        let q = scene.primitives.get(hit.primitive as usize)?;
-        if is_specular(scene, hit) {
-            path = scatter(scene, hit, path, UVec2::ZERO, 0).onward;
+        if hit.primitive == NOTHING {
+            return None;
+        }
+        let spot = spot_of(scene, hit);
+        if is_specular(material_of(scene, &spot)) {
+            path = scatter(scene, &spot, hit, path, UVec2::ZERO, 0).onward;
             continue;
         }
-        let surface = with_coordinates(surface_of(scene, hit, path.ray), q);
-        let at = arrival_of(scene, hit, surface, path.ray, path.differential);
-        return Some((*q, surface, at, path.depth));
+        let surface = with_coordinates(surface_of(scene, &spot, hit, path.ray), &spot.primitive);
+        let at = arrival_of(scene, &spot, hit, surface, path.ray, path.differential);
+        return Some((spot.primitive, surface, at, path.depth));
     }
 }
 
@@ -270,9 +272,10 @@ fn a_curved_mirror_needs_its_curvature() {
     let at = Vec2::new(33.0, 22.0);
     let differential = camera_differential(&scene.camera, at, 1.0);
     let ray = camera_ray(&scene.camera, at);
-    let hit = closest_hit(&scene, ray, NOTHING, NOTHING);
-    let surface = surface_of(&scene, hit, ray);
-    let arrival = arrival_of(&scene, hit, surface, ray, differential);
+    let hit = closest_hit(&scene, ray, NOWHERE, NOWHERE);
+    let spot = spot_of(&scene, hit);
+    let surface = surface_of(&scene, &spot, hit, ray);
+    let arrival = arrival_of(&scene, &spot, hit, surface, ray, differential);
     let mirrored = |at: DVec2| {
         let (o, d) = exact.camera(at);
         let (center, m) = Exact::rows();

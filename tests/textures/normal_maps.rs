@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 use wgray::cpu::differential::Arrival;
-use wgray::cpu::geometry::{material_of, surface_of};
+use wgray::cpu::geometry::{material_of, spot_of, surface_of};
 use wgray::cpu::path::usable_normal;
 use wgray::cpu::phong::phong_lobes;
-use wgray::cpu::ray::{Hit, Ray};
+use wgray::cpu::ray::{Hit, Ray, no_hit};
 use wgray::cpu::surface::surface_at;
 use wgray::cpu::texture::appearance;
 use wgray::pack::Packed;
@@ -60,9 +60,12 @@ fn normal(scene: &Packed, primitive: usize, origin: Vec3, target: Vec3) -> Vec3 
     let hit = Hit {
         t: (target - origin).length(),
         primitive: primitive as u32,
+        ..no_hit()
     };
-    let surface = surface_of(scene, hit, ray);
-    appearance(scene, hit, material_of(scene, hit), surface, Arrival::default(), 1).normal
+    let spot = spot_of(scene, hit);
+    let surface = surface_of(scene, &spot, hit, ray);
+    let plain = material_of(scene, &spot);
+    appearance(scene, &spot, hit, plain, surface, Arrival::default(), 1).normal
 }
 
 fn near(a: Vec3, b: Vec3) -> bool {

@@ -1,0 +1,452 @@
+//! Bad mesh files: each is told with its place, the value and the rule; none ends in a panic.
+
+use wgray::mesh::{Mesh, MeshError, Normals};
+
+use super::load;
+use super::readers::in_all_formats;
+use crate::random::Random;
+
+/// Files by name and content, and what is told.
+const BAD: &[(&str, &str, &str)] = &[
+    ("a.fbx", "", "a.fbx: the name of a mesh must end in .obj, .ply or .stl"),
+    ("a", "", "a: the name of a mesh must end in .obj, .ply or .stl"),
+    ("a.obj", "", "a.obj: has no triangles"),
+    ("a.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n", "a.obj: has no triangles"),
+    ("a.obj", "\nv 1 2\n", "a.obj:2: z is missing"),
+    ("a.obj", "v 1 2 1,5\n", "a.obj:1: z: \"1,5\" must be a number"),
+    (
+        "a.obj",
+        "v 1 nan 2\n",
+        "a.obj:1: y: NaN must be finite, from -1e9 to 1e9",
+    ),
+    (
+        "a.obj",
+        "v \\\n1e99 2 3\n",
+        "a.obj:2: x: 1e99 must be finite, from -1e9 to 1e9",
+    ),
+    (
+        "a.obj",
+        "vt 1e40 2\n",
+        "a.obj:1: u: 1e40 must be finite as a 32-bit float",
+    ),
+    (
+        "a.obj",
+        "vt 1 inf\n",
+        "a.obj:1: v: inf must be finite as a 32-bit float",
+    ),
+    ("a.obj", "vt 1 b\n", "a.obj:1: v: \"b\" must be a number"),
+    ("a.obj", "vn 1 2\n", "a.obj:1: z is missing"),
+    (
+        "a.obj",
+        "v 1 2 3\nf 1 1 2\n",
+        "a.obj:2: vertex 2 of the face is not there; there are 1 so far",
+    ),
+    (
+        "a.obj",
+        "v 1 2 3\nf 1 1 -2\n",
+        "a.obj:2: vertex -2 of the face is not there; there are 1 so far",
+    ),
+    (
+        "a.obj",
+        "v 1 2 3\nf 0 1 1\n",
+        "a.obj:2: vertex 0 of the face: they are counted from 1, or from -1 backwards",
+    ),
+    (
+        "a.obj",
+        "v 1 2 3\nf 1/1 1 1\n",
+        "a.obj:2: texture coordinate 1 of the face is not there; there are 0 so far",
+    ),
+    (
+        "a.obj",
+        "v 1 2 3\nf 1//4294967297 1 1\n",
+        "a.obj:2: normal 4294967297 of the face is not there; there are 0 so far",
+    ),
+    (
+        "a.obj",
+        "v 1 2 3\nf 1 1 99999999999999999999999999999999999999\n",
+        "a.obj:2: vertex 999999999999999999999999999999 of the face is not there; there are 1 so far",
+    ),
+    (
+        "a.obj",
+        "v 1 2 3\nf 1 1\n",
+        "a.obj:2: a face must have 3 corners or more; this one has 2",
+    ),
+    (
+        "a.obj",
+        "v 1 2 3\nf 1 1 1/2/3/4\n",
+        "a.obj:2: \"1/2/3/4\" must be a corner of a face: v, v/t, v//n or v/t/n",
+    ),
+    (
+        "a.obj",
+        "v 1 2 3\nf 1 1 /\n",
+        "a.obj:2: \"/\" must be a corner of a face: v, v/t, v//n or v/t/n",
+    ),
+    (
+        "a.obj",
+        "v 1 2 3\nf 1 1 1.5\n",
+        "a.obj:2: \"1.5\" must be a corner of a face: v, v/t, v//n or v/t/n",
+    ),
+    (
+        "a.obj",
+        "v 1 2 3\nf 1 1 -\n",
+        "a.obj:2: \"-\" must be a corner of a face: v, v/t, v//n or v/t/n",
+    ),
+    ("a.ply", "", "a.ply:1: the file must begin with \"ply\""),
+    ("a.ply", "solid\n", "a.ply:1: the file must begin with \"ply\""),
+    (
+        "a.ply",
+        "ply\n",
+        "a.ply:2: the file ends inside of its header; \"end_header\" is missing",
+    ),
+    (
+        "a.ply",
+        "ply\nend_header\n",
+        "a.ply:3: the header must have a line \"format\"",
+    ),
+    (
+        "a.ply",
+        "ply\nformat text 1.0\n",
+        "a.ply:2: format: \"text\" must be ascii, binary_little_endian or binary_big_endian",
+    ),
+    (
+        "a.ply",
+        "ply\nformat ascii 2.0\n",
+        "a.ply:2: format: version \"2.0\" must be 1.0",
+    ),
+    (
+        "a.ply",
+        "ply\nfromat ascii\n",
+        "a.ply:2: \"fromat\" must be \"format\", \"comment\", \"obj_info\", \"element\", \"property\" or \"end_header\"",
+    ),
+    (
+        "a.ply",
+        "ply\nelement vertex -1\n",
+        "a.ply:2: element \"vertex\": \"-1\" must be a whole number that memory has room for",
+    ),
+    (
+        "a.ply",
+        "ply\nproperty float x\n",
+        "a.ply:2: a property must follow its element",
+    ),
+    (
+        "a.ply",
+        "ply\nelement vertex 1\nproperty half x\n",
+        "a.ply:3: property: \"half\" must be a type: char, uchar, short, ushort, int, uint, float or double",
+    ),
+    (
+        "a.ply",
+        "ply\nelement vertex 1\nproperty list float int x\n",
+        "a.ply:3: property: \"float\" must be a type of whole numbers",
+    ),
+    (
+        "a.ply",
+        "ply\nelement vertex 1\nproperty int\n",
+        "a.ply:3: property: its name is missing",
+    ),
+    (
+        "a.stl",
+        "",
+        "a.stl: must begin with \"solid\" or a header of 84 bytes; it has 0 bytes",
+    ),
+    (
+        "a.stl",
+        "solid",
+        "a.stl:1: the file ends inside of a solid; \"endsolid\" is missing",
+    ),
+    ("a.stl", "solid a\nendsolid", "a.stl: has no triangles"),
+    (
+        "a.stl",
+        "solid\nendsolid\nfacet",
+        "a.stl:3: \"facet\" must be \"solid\", or the end of the file",
+    ),
+    (
+        "a.stl",
+        "solid\nface",
+        "a.stl:2: \"face\" must be \"facet\" or \"endsolid\"",
+    ),
+    ("a.stl", "solid\nfacet normal 0 0\nouter", "a.stl:2: z is missing"),
+    (
+        "a.stl",
+        "solid\nfacet normal 0 0 1\nloop",
+        "a.stl:3: \"loop\" must be \"outer\"",
+    ),
+    (
+        "a.stl",
+        "solid\nfacet normal 0 0 1\nouter",
+        "a.stl:3: the file ends where \"loop\" must be",
+    ),
+    (
+        "a.stl",
+        "solid\nfacet normal 0 0 1\nouter loop\nvertex 1 -inf 2",
+        "a.stl:4: y: -inf must be finite, from -1e9 to 1e9",
+    ),
+];
+
+#[test]
+fn bad_files_are_told() {
+    for (name, text, told) in BAD {
+        assert_eq!(load(name, text, None).unwrap_err(), *told, "{text:?}");
+    }
+}
+
+/// An ASCII PLY with these elements and lines.
+fn ply(vertex: &str, face: &str, lines: &str) -> String {
+    format!("ply\nformat ascii 1.0\n{vertex}{face}end_header\n{lines}")
+}
+
+#[test]
+fn bad_ply_bodies_are_told() {
+    let vertex = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+    let face = "element face 1\nproperty list char int vertex_indices\n";
+    let points = "0 0 0\n1 0 0\n0 1 0\n";
+    for (text, told) in [
+        (ply("", face, ""), "a.ply: the header must have an element \"vertex\""),
+        (
+            ply(vertex, "", points),
+            "a.ply: has no triangles: it must have an element \"face\"",
+        ),
+        (
+            ply(vertex, "element face 0\n", points),
+            "a.ply: has no triangles: it must have an element \"face\"",
+        ),
+        (
+            ply(
+                vertex,
+                "element tristrips 1\nproperty list int int vertex_indices\n",
+                points,
+            ),
+            "a.ply: has tristrips, which are not read: it must have an element \"face\"",
+        ),
+        (
+            ply(
+                "element vertex 1\nproperty float x\nproperty list int float z\nproperty float y\n",
+                face,
+                points,
+            ),
+            "a.ply:3: element \"vertex\": it must have a property \"z\"",
+        ),
+        (
+            ply(
+                vertex,
+                "element face 1\nproperty list int float vertex_indices\n",
+                points,
+            ),
+            "a.ply:7: element \"face\": it must have a list of whole numbers, \"vertex_indices\"",
+        ),
+        (
+            ply(vertex, face, points),
+            "a.ply:13: the file ends too early: values are missing",
+        ),
+        (
+            ply(vertex, face, "0 0 0\n1 0 1e10\n0 1 0\n3 0 1 2\n"),
+            "a.ply:11: vertex 1: z: 10000000000 must be finite, from -1e9 to 1e9",
+        ),
+        (
+            ply(vertex, face, "0 0 0\n1 0 x\n0 1 0\n3 0 1 2\n"),
+            "a.ply:11: \"x\" must be a number",
+        ),
+        (
+            ply(vertex, face, &format!("{points}3 0 1 3\n")),
+            "a.ply:13: face 0: vertex 3 is not there; there are 3, counted from 0",
+        ),
+        (
+            ply(vertex, face, &format!("{points}3 0 1 -1\n")),
+            "a.ply:13: face 0: vertex -1 is not there; there are 3, counted from 0",
+        ),
+        (
+            ply(vertex, face, &format!("{points}3 0 1 1.5\n")),
+            "a.ply:13: face 0: vertex 1.5 is not there; there are 3, counted from 0",
+        ),
+        (
+            ply(vertex, face, &format!("{points}2 0 1\n")),
+            "a.ply:13: face 0: it must have 3 vertices or more; it has 2",
+        ),
+        (
+            ply(vertex, face, &format!("{points}-3 0 1 2\n")),
+            "a.ply:13: vertex_indices: the length -3 must be a whole number, 0 or greater",
+        ),
+        (
+            ply(vertex, face, &format!("{points}4 0 1 2\n")),
+            "a.ply:14: the file ends too early: values are missing",
+        ),
+        (
+            ply(
+                &format!("{vertex}property float u\nproperty float v\n"),
+                face,
+                "0 0 0 0 inf\n1 0 0 0 0\n0 1 0 0 0\n3 0 1 2\n",
+            ),
+            "a.ply:12: vertex 0: v: inf must be finite as a 32-bit float",
+        ),
+    ] {
+        let error = load("a.ply", &text, None).unwrap_err();
+        assert_eq!(error, told, "{text}");
+    }
+}
+
+#[test]
+fn counts_without_bytes_are_refused_at_once() {
+    let vertex = |count: &str, properties: &str| format!("element vertex {count}\n{properties}");
+    let xyz = "property float x\nproperty float y\nproperty float z\n";
+    let face = "element face 1\nproperty list int int vertex_indices\n";
+    for format in ["ascii", "binary_little_endian"] {
+        for (elements, told) in [
+            (vertex("99999999999", xyz) + face, "must be at most 1073741824"),
+            (
+                vertex("99999999999999999999", xyz) + face,
+                "must be a whole number that memory has room for",
+            ),
+            (vertex("1073741824", xyz) + face, "bytes or more; the file has "),
+            (
+                format!(
+                    "element other 99999999999\nproperty list uchar int x\n{}{face}",
+                    vertex("3", xyz)
+                ),
+                "bytes or more; the file has ",
+            ),
+            (
+                vertex("3", xyz) + "element face 18446744073709551615\nproperty list uchar int vertex_indices\n",
+                "take ",
+            ),
+        ] {
+            let text = format!(
+                "ply\nformat {format} 1.0\n{elements}end_header\n{}",
+                "0 0 0 0 0 0 ".repeat(4)
+            );
+            let error = load("a.ply", text, None).unwrap_err();
+            assert!(error.contains(told), "{error}");
+        }
+    }
+    // A list that is longer than the file, and a triangle count that is.
+    let mut list = format!(
+        "ply\nformat binary_little_endian 1.0\n{}{face}end_header\n",
+        vertex("3", xyz)
+    )
+    .into_bytes();
+    list.extend([0; 36]);
+    list.extend(i32::MAX.to_le_bytes());
+    list.extend([0; 24]);
+    let error = load("a.ply", &list, None).unwrap_err();
+    assert!(
+        error.ends_with("the file ends too early: values are missing"),
+        "{error}"
+    );
+    let mut stl = vec![0; 84];
+    stl[80..].fill(0xff);
+    let error = load("a.stl", &stl, None).unwrap_err();
+    assert_eq!(
+        error,
+        "a.stl: byte 80: 4294967295 triangles must be a file of 214748364834 bytes; it has 84"
+    );
+}
+
+#[test]
+fn what_is_no_file_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("none.obj");
+    let error = Mesh::load(&path, None).unwrap_err();
+    assert!(matches!(error, MeshError::Read { .. }), "{error}");
+    assert!(error.to_string().contains("none.obj: cannot be read: "), "{error}");
+    std::fs::create_dir(&path).unwrap();
+    let error = Mesh::load(&path, None).unwrap_err().to_string();
+    assert!(
+        error.ends_with("none.obj: cannot be read: it must be a file"),
+        "{error}"
+    );
+}
+
+/// More files that can be read: with everything that there is.
+fn good_files() -> Vec<(&'static str, Vec<u8>)> {
+    let mut files = in_all_formats();
+    let text = "mtllib none.mtl\no a\nv 0 0 0\nv 1 0 0\nv 1 1 0 1\nvt 0 0.5\nvt 1\nvn 0 0 -1\nvn 0 1 0\nusemtl red\n\
+                f 1/1/1 2/1/1 \\\n-1/2/2\ng b # c\nf 3//1 2//1 1//2\ns 1\nvt 2 3 4\nf 1/3 2/2 3/1\n";
+    files.push(("all.obj", text.into()));
+    files
+}
+
+/// A message has the file, and a place where there is one.
+fn check(name: &str, result: Result<Mesh, String>) -> bool {
+    match result {
+        Ok(mesh) => {
+            let count = mesh.positions.len();
+            assert!(!mesh.triangles.is_empty() && !mesh.groups.is_empty());
+            assert!(mesh.positions.iter().all(|p| p.is_finite()));
+            assert!(mesh.triangles.iter().flatten().all(|vertex| (*vertex as usize) < count));
+            assert!(mesh.group_of.iter().all(|group| (*group as usize) < mesh.groups.len()));
+            assert!(mesh.group_of.is_empty() || mesh.group_of.len() == mesh.triangles.len());
+            assert!(mesh.uvs.is_empty() || mesh.uvs.len() == count);
+            assert!(mesh.uvs.iter().all(|uv| uv.is_finite()));
+            assert!(mesh.normals.is_empty() || mesh.normals.len() == count);
+            for normal in &mesh.normals {
+                assert!((normal.length() - 1.0).abs() < 1e-5, "{normal}");
+            }
+            true
+        }
+        Err(message) => {
+            assert!(message.starts_with(&format!("{name}:")), "{message}");
+            assert!(message.len() < 300, "{message}");
+            false
+        }
+    }
+}
+
+const ALL_NORMALS: [Option<Normals>; 4] = [None, Some(Normals::Smooth), Some(Normals::Flat), Some(Normals::File)];
+
+#[test]
+fn files_that_are_cut_anywhere_are_meshes_or_errors() {
+    for (name, bytes) in good_files() {
+        let mut errors = 0;
+        for end in 0..=bytes.len() {
+            let normals = ALL_NORMALS[end % 4];
+            errors += usize::from(!check(name, load(name, &bytes[..end], normals)));
+        }
+        assert!(errors > 10, "{name}");
+        assert!(check(name, load(name, &bytes, None)), "{name}");
+    }
+}
+
+#[test]
+fn files_with_random_bytes_are_meshes_or_errors() {
+    let random = Random::new(13);
+    let words: &[&[u8]] = &[
+        b"nan",
+        b"-1",
+        b"1e308",
+        b" 99999999999",
+        b"\\\n",
+        b"\n",
+        b"/",
+        b"f ",
+        b"v ",
+        b"list ",
+        b"\xff\xff\xff\xff",
+        b"\0",
+        b"#",
+        b"-",
+        b"4294967295",
+        b"5e-324",
+        b"0",
+    ];
+    for (name, bytes) in good_files() {
+        let (mut good, mut bad) = (0, 0);
+        for i in 0..1000 {
+            let mut bytes = bytes.clone();
+            for _ in 0..=random.below(3) {
+                let at = random.below(bytes.len() as u32) as usize;
+                match random.below(4) {
+                    0 => bytes[at] = random.bits() as u8,
+                    1 => bytes[at] ^= 1 << random.below(8),
+                    2 => drop(bytes.splice(at..at + 1, random.pick(words).iter().copied())),
+                    _ => drop(bytes.drain(at..(at + random.below(20) as usize).min(bytes.len()))),
+                }
+                if bytes.is_empty() {
+                    break;
+                }
+            }
+            match check(name, load(name, &bytes, ALL_NORMALS[i % 4])) {
+                true => good += 1,
+                false => bad += 1,
+            }
+        }
+        assert!(good > 20 && bad > 20, "{name}: {good} meshes, {bad} errors");
+    }
+}

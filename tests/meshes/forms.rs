@@ -1,0 +1,177 @@
+//! Meshes for tests, made by formula, and scenes of them.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use glam::DVec3;
+use wgray::pack::{Packed, pack};
+use wgray::scene::{Assets, Description};
+
+use crate::random::Random;
+
+/// Positions, and triangles that share them, counter-clockwise as seen from outside.
+#[derive(Clone, Debug)]
+pub struct Form {
+    pub points: Vec<DVec3>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl Form {
+    /// The cube from -1 to 1.
+    pub fn cube() -> Form {
+        let point = |i: u32| {
+            let side = |axis: u32| if i >> axis & 1 == 1 { 1.0 } else { -1.0 };
+            DVec3::new(side(0), side(1), side(2))
+        };
+        let faces = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        Form {
+            points: (0..8).map(point).collect(),
+            triangles: faces
+                .iter()
+                .flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]])
+                .collect(),
+        }
+    }
+
+    /// An icosahedron on the unit sphere, its triangles divided into four so many times.
+    pub fn icosphere(times: u32) -> Form {
+        let golden = (1.0 + 5f64.sqrt()) / 2.0;
+        let mut points = Vec::new();
+        for (a, b) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
+            points.extend([DVec3::new(0.0, a, b), DVec3::new(a, b, 0.0), DVec3::new(b, 0.0, a)].map(DVec3::normalize));
+        }
+        // The faces are the triples of points that are neighbours of one another.
+        let near = |i: usize, j: usize| points[i].distance(points[j]) < 1.1;
+        let mut triangles = Vec::new();
+        for i in 0..12 {
+            for j in i + 1..12 {
+                for k in j + 1..12 {
+                    if near(i, j) && near(j, k) && near(k, i) {
+                        let outward = (points[j] - points[i]).cross(points[k] - points[i]).dot(points[i]) > 0.0;
+                        triangles.push(if outward { [i, j, k] } else { [i, k, j] }.map(|i| i as u32));
+                    }
+                }
+            }
+        }
+        let mut form = Form { points, triangles };
+        for _ in 0..times {
+            form = form.divided();
+        }
+        form
+    }
+
+    fn divided(&self) -> Form {
+        let (mut points, mut middles, mut triangles) = (self.points.clone(), HashMap::new(), Vec::new());
+        for &[a, b, c] in &self.triangles {
+            let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(i, j)| {
+                *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
+                    points.push((points[i as usize] + points[j as usize]).normalize());
+                    points.len() as u32 - 1
+                })
+            });
+            triangles.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
+        }
+        Form { points, triangles }
+    }
+
+    /// Two pyramids over one polygon of many sides, some of which are a thousandth of others.
+    pub fn slivers(sides: u32, random: &Random) -> Form {
+        let mut angles: Vec<f64> = (0..sides).map(|_| TAU * random.unit()).collect();
+        angles.sort_by(f64::total_cmp);
+        let rim = angles.iter().map(|angle| DVec3::new(angle.cos(), angle.sin(), 0.0));
+        let points = [DVec3::Z, DVec3::NEG_Z].into_iter().chain(rim).collect();
+        let next = |i: u32| 2 + (i + 1) % sides;
+        let triangles = (0..sides)
+            .flat_map(|i| [[0, 2 + i, next(i)], [1, next(i), 2 + i]])
+            .collect();
+        Form { points, triangles }
+    }
+
+    /// Triangles anywhere, of all sizes and shapes, some of which share corners.
+    pub fn soup(triangles: u32, random: &Random) -> Form {
+        let point = || DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
+        let (mut points, mut faces) = (Vec::new(), Vec::new());
+        for i in 0..triangles {
+            let (at, size) = (point(), random.magnitude(-2.0, 0.0));
+            let mut corners = [(); 3].map(|()| at + point() * size);
+            match random.below(6) {
+                0 => corners[2] = corners[0].lerp(corners[1], random.unit()) + point() * size * 1e-4,
+                1 => corners.iter_mut().for_each(|corner| corner.z = at.z), // a flat box
+                2 => corners = corners.map(|corner| (corner * 8.0).round() / 8.0), // in one plane with others
+                _ => {}
+            }
+            let first = points.len() as u32;
+            points.extend(corners);
+            faces.push([
+                first,
+                first + 1,
+                if i > 0 && random.once_in(4) {
+                    first - 1
+                } else {
+                    first + 2
+                },
+            ]);
+        }
+        Form {
+            points,
+            triangles: faces,
+        }
+    }
+
+    /// Its text as a Wavefront OBJ file, with a group for each third of the triangles. `vn` and `vt` are for each point.
+    pub fn obj(&self, normals: Option<&[DVec3]>, uvs: Option<&[[f64; 2]]>) -> String {
+        let mut text = String::new();
+        for p in &self.points {
+            let _ = writeln!(text, "v {} {} {}", p.x, p.y, p.z);
+        }
+        for [u, v] in uvs.unwrap_or_default() {
+            let _ = writeln!(text, "vt {u} {v}");
+        }
+        for n in normals.unwrap_or_default() {
+            let _ = writeln!(text, "vn {} {} {}", n.x, n.y, n.z);
+        }
+        let third = self.triangles.len().div_ceil(3);
+        for (i, triangle) in self.triangles.iter().enumerate() {
+            if i % third == 0 {
+                let _ = writeln!(text, "g {}", ["first", "second", "third"][i / third]);
+            }
+            let corner = |i: u32| match (normals.is_some(), uvs.is_some()) {
+                (false, false) => format!("{}", i + 1),
+                (true, false) => format!("{0}//{0}", i + 1),
+                (false, true) => format!("{0}/{0}", i + 1),
+                (true, true) => format!("{0}/{0}/{0}", i + 1),
+            };
+            let [a, b, c] = triangle.map(corner);
+            let _ = writeln!(text, "f {a} {b} {c}");
+        }
+        text
+    }
+}
+
+/// A scene from its text; files are beside `folder`.
+pub fn scene(text: &str, folder: &Path) -> Packed {
+    let description = Description::parse(text, "test.toml").unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let scene = description.validate_with(&Assets::beside(folder));
+    pack(&scene.unwrap_or_else(|problem| panic!("{problem}\n{text}")))
+}
+
+/// What scenes of these tests begin with: a camera that looks at the origin, and a material.
+pub const HEAD: &str = "image = { width = 48, height = 36 }
+camera = { position = [0.3, -4, 1.6], look_at = [0, 0, 0], fov = 40 }
+[materials.m]
+type = 'phong'
+color = [0.7, 0.7, 0.7]
+shininess = 16
+[materials.glass]
+type = 'glass'
+ior = 1.5
+";

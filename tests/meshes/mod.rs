@@ -1,0 +1,33 @@
+//! Meshes: what is read of files, how mistakes in them are told, those that are made by formula; and that rays meet them as they
+//! should, by whatever trees, without holes, on a sphere as on a sphere.
+
+mod bad_input;
+pub mod forms;
+mod made;
+mod readers;
+mod sphere;
+mod trees;
+mod watertight;
+
+use wgray::mesh::{Mesh, Normals};
+
+/// Loads a file with this name and content. A message begins with the file's name.
+pub fn load(name: &str, bytes: impl AsRef<[u8]>, normals: Option<Normals>) -> Result<Mesh, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    Mesh::load(&path, normals).map_err(|error| {
+        let message = error.to_string();
+        let start = format!("{}/", folder.path().display());
+        message
+            .strip_prefix(&start)
+            .unwrap_or_else(|| panic!("{message}"))
+            .to_string()
+    })
+}
+
+/// The corners of a mesh's triangles, in the file's coordinates.
+pub fn corners(mesh: &Mesh) -> Vec<[[f64; 3]; 3]> {
+    let position = |vertex: u32| (mesh.positions[vertex as usize].as_dvec3() + mesh.center).to_array();
+    mesh.triangles.iter().map(|triangle| triangle.map(position)).collect()
+}

@@ -1,0 +1,421 @@
+//! What is read of each format.
+
+use wgray::mesh::{Mesh, Normals};
+
+use super::{corners, load};
+
+const TWO_TRIANGLES: [[[f64; 3]; 3]; 2] = [
+    [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]],
+    [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+];
+const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+/// A solid with corners of all kinds, some of them not exact in binary.
+fn crystal() -> (Vec<[f32; 3]>, Vec<Vec<u32>>) {
+    let positions = vec![
+        [0.1, 0.2, 0.3],
+        [1.1, 0.2, 0.3],
+        [1.1, 1.3, 0.3],
+        [0.1, 1.3, 0.3],
+        [0.5, 0.75, 1.7e-3],
+        [0.6, 0.7, 2.5],
+    ];
+    let faces = vec![
+        vec![0, 1, 5],
+        vec![1, 2, 5],
+        vec![2, 3, 5],
+        vec![3, 0, 5],
+        vec![1, 0, 3, 2],
+    ];
+    (positions, faces)
+}
+
+/// A mesh in each format, by the name of its file. STL files have triangles.
+pub fn in_all_formats() -> Vec<(&'static str, Vec<u8>)> {
+    let (positions, faces) = crystal();
+    let fans: Vec<[u32; 3]> = faces
+        .iter()
+        .flat_map(|face| (2..face.len()).map(|i| [face[0], face[i - 1], face[i]]))
+        .collect();
+
+    let mut obj = String::from("o crystal\r\n");
+    for [x, y, z] in &positions {
+        obj += &format!("v {x} {y} {z}\n");
+    }
+    let mut ascii_ply = ply_header("ascii");
+    for [x, y, z] in &positions {
+        ascii_ply += &format!("{x} {y} {z}\n");
+    }
+    let mut little = ply_header("binary_little_endian").into_bytes();
+    let mut big = ply_header("binary_big_endian").into_bytes();
+    for x in positions.iter().flatten() {
+        little.extend(x.to_le_bytes());
+        big.extend(x.to_be_bytes());
+    }
+    for face in &faces {
+        let numbers = |first: u32| face.iter().map(move |i| format!(" {}", i + first)).collect::<String>();
+        obj += &format!("f{}\n", numbers(1));
+        ascii_ply += &format!("{}{}\n", face.len(), numbers(0));
+        for bytes in [&mut little, &mut big] {
+            bytes.push(face.len() as u8);
+        }
+        for i in face {
+            little.extend(i.to_le_bytes());
+            big.extend(i.to_be_bytes());
+        }
+    }
+    let mut ascii_stl = String::from("solid crystal\n");
+    let mut binary_stl = b"solid as many binary files begin".to_vec();
+    binary_stl.resize(80, b' ');
+    binary_stl.extend((fans.len() as u32).to_le_bytes());
+    for fan in &fans {
+        ascii_stl += "facet normal 0 0 0\n  outer loop\n";
+        binary_stl.extend([0; 12]);
+        for [x, y, z] in fan.map(|i| positions[i as usize]) {
+            ascii_stl += &format!("    vertex {x} {y} {z}\n");
+            binary_stl.extend([x, y, z].iter().flat_map(|x| x.to_le_bytes()));
+        }
+        ascii_stl += "  endloop\nendfacet\n";
+        binary_stl.extend([0; 2]);
+    }
+    ascii_stl += "endsolid crystal\n";
+    vec![
+        ("crystal.obj", obj.into_bytes()),
+        ("ascii.ply", ascii_ply.into_bytes()),
+        ("little.PLY", little),
+        ("big.ply", big),
+        ("ascii.stl", ascii_stl.into_bytes()),
+        ("binary.Stl", binary_stl),
+    ]
+}
+
+fn ply_header(format: &str) -> String {
+    format!(
+        "ply\nformat {format} 1.0\ncomment of a test\nelement vertex 6\nproperty float x\nproperty float y\n\
+         property float z\nelement face 5\nproperty list uchar uint vertex_indices\nend_header\n"
+    )
+}
+
+#[test]
+fn all_formats_have_the_same_triangles() {
+    let (positions, faces) = crystal();
+    let mut expected = Vec::new();
+    for face in &faces {
+        for i in 2..face.len() {
+            expected.push([face[0], face[i - 1], face[i]].map(|i| positions[i as usize]));
+        }
+    }
+    for (name, bytes) in in_all_formats() {
+        for normals in [None, Some(Normals::Flat), Some(Normals::Smooth)] {
+            let mesh = load(name, &bytes, normals).unwrap();
+            let triangles: Vec<_> = mesh
+                .triangles
+                .iter()
+                .map(|triangle| triangle.map(|vertex| mesh.positions[vertex as usize].to_array()))
+                .collect();
+            assert_eq!(mesh.center.to_array(), [0.0; 3], "{name}");
+            assert_eq!(triangles, expected, "{name}");
+            // The point within is no triangle's.
+            assert_eq!(mesh.positions.len(), 5, "{name}");
+            assert_eq!(mesh.groups.len(), 1, "{name}");
+            assert_eq!(mesh.notes, Vec::<String>::new(), "{name}");
+            assert_eq!(mesh.normals.is_empty(), normals != Some(Normals::Smooth), "{name}");
+        }
+    }
+}
+
+#[test]
+fn obj_corners_may_have_all_forms() {
+    let text = "# a square\r\nv 0 0 0 1.0 0.5 0.5\r\nv 1 0 0 1\nv 1 1 0\n\tv 0 1 0 # the last one\nvt 0 0\nvt 1 0 0\nvt 1\n\
+                vn 0 0 2\nf 1 2 \\\n 3\nf -4/1 -2/3/1 \\\r\n  4//1\ncurv 0 1 \\\n 2 3\ns off\nl 1 2\n";
+    let mesh = load("a.obj", text, None).unwrap();
+    assert_eq!(corners(&mesh), TWO_TRIANGLES);
+    // Three vertices by their positions alone, and three others.
+    assert_eq!(mesh.positions.len(), 6);
+    let uvs: Vec<[f32; 2]> = mesh.uvs.iter().map(|uv| uv.to_array()).collect();
+    assert_eq!(uvs[3..], [[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]]);
+    assert!(mesh.normals.iter().all(|normal| normal.to_array() == [0.0, 0.0, 1.0]));
+    assert_eq!(mesh.notes.len(), 2, "{:?}", mesh.notes);
+}
+
+#[test]
+fn obj_vertices_are_shared_where_all_is_equal() {
+    let text =
+        format!("{SQUARE}vt 0 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1/1/1 3/2/1 4/1/1\nf 3/2/1 4/1/1 1/1/1\n");
+    let mesh = load("a.obj", &text, None).unwrap();
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 3, 4], [3, 4, 0]]);
+    // Normals that are made anew tell no vertices apart.
+    let text = format!("{SQUARE}vn 0 0 1\nvn 1 0 0\nf 1//1 2//1 3//1\nf 1//2 3//2 4//2\n");
+    let count = |normals| load("a.obj", &text, normals).unwrap().positions.len();
+    assert_eq!(count(None), 6);
+    assert_eq!(count(Some(Normals::File)), 6);
+    assert_eq!(count(Some(Normals::Flat)), 4);
+    assert_eq!(count(Some(Normals::Smooth)), 4);
+}
+
+#[test]
+fn polygons_are_fans() {
+    let mesh = load(
+        "a.obj",
+        "v 0 0 0\nv 2 0 0\nv 3 1 0\nv 2 2 0\nv 0 2 0\nf 5 1 2 3 4\n",
+        None,
+    )
+    .unwrap();
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+    assert_eq!(mesh.positions[0].to_array(), [0.0, 2.0, 0.0]);
+}
+
+#[test]
+fn degenerate_triangles_are_dropped_and_counted() {
+    // Equal numbers, equal positions, points on a line; and a triangle that is nearly one.
+    let text = "v 0 0 0\nv 1 1 1\nv 0.1 0.1 0.1\nv 0 0 0\nv 0.1 0.1 0.10000001\nv -0 0 0\n\
+                g a\nf 1 1 2\nf 1 4 2\nf 1 2 3\nf 6 2 1\ng b\nf 1 2 5\n";
+    let mesh = load("a.obj", text, Some(Normals::Smooth)).unwrap();
+    assert_eq!(mesh.triangles.len(), 1);
+    assert_eq!(mesh.notes, ["4 degenerate triangles dropped"]);
+    assert_eq!(mesh.group_of, [1]);
+    assert!(mesh.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-6));
+    let error = load("a.obj", "v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n", None).unwrap_err();
+    assert_eq!(error, "a.obj: has no triangles but 1 without an area");
+    // 0.1, 0.2 and 0.3 are on a line, but not as 32-bit floats.
+    let mesh = load(
+        "a.obj",
+        "v 0 0 0\nv 0.1 0.3 0\nv 0.2 0.6 0\nv 0.3 0.9 0\nf 1 2 3\nf 1 2 4\n",
+        None,
+    )
+    .unwrap();
+    assert_eq!(mesh.triangles.len(), 1);
+}
+
+#[test]
+fn obj_groups_are_pairs_of_name_and_material() {
+    let face = "f 1 2 3\n";
+    let text = format!(
+        "{SQUARE}{face}o box\nusemtl dark red\n{face}g lid of it\nusemtl blue\n{face}o box\nusemtl dark red\n{face}{face}\
+         o empty\ng lid of it\n{face}usemtl blue\n{face}usemtl\n{face}"
+    );
+    let mesh = load("a.obj", text, None).unwrap();
+    let groups: Vec<(&str, Option<&str>)> = mesh
+        .groups
+        .iter()
+        .map(|group| (group.name.as_str(), group.material.as_deref()))
+        .collect();
+    assert_eq!(
+        groups,
+        [
+            ("", None),
+            ("box", Some("dark red")),
+            ("lid of it", Some("blue")),
+            ("lid of it", Some("dark red")),
+            ("lid of it", None)
+        ]
+    );
+    assert_eq!(mesh.group_of, [0, 1, 2, 1, 1, 3, 2, 4]);
+}
+
+#[test]
+fn materials_come_from_the_folder_of_the_mesh() {
+    let folder = tempfile::tempdir().unwrap();
+    let inner = folder.path().join("inner");
+    std::fs::create_dir_all(inner.join("more")).unwrap();
+    std::fs::write(inner.join("more/my red.mtl"), "newmtl red\nKd 1 0 0\nNs a\nNi b\n").unwrap();
+    std::fs::write(inner.join("blue.mtl"), "newmtl blue\n").unwrap();
+    std::fs::write(folder.path().join("outside.mtl"), "newmtl secret\n").unwrap();
+    let path = inner.join("a.obj");
+    let text = format!(
+        "mtllib more/my red.mtl\nmtllib ../outside.mtl\nmtllib blue.mtl none.mtl\nmtllib more/my red.mtl\n{SQUARE}f 1 2 3\n"
+    );
+    std::fs::write(&path, text).unwrap();
+    let mesh = Mesh::load(&path, None).unwrap();
+    let names: Vec<&str> = mesh.library.iter().map(|material| material.name.as_str()).collect();
+    assert_eq!(names, ["red", "blue"]);
+    assert_eq!(mesh.library[0].diffuse, Some([1.0, 0.0, 0.0]));
+    let [values, outside, none] = &mesh.notes[..] else {
+        panic!("{:?}", mesh.notes)
+    };
+    assert_eq!(
+        values,
+        "more/my red.mtl:3: the value: \"a\" must be a number; 1 more lines cannot be read"
+    );
+    assert_eq!(
+        outside,
+        "the file of materials \"../outside.mtl\" is not read: it must be in the folder of the mesh"
+    );
+    assert!(
+        none.starts_with("the file of materials \"none.mtl\" is not read: "),
+        "{none}"
+    );
+}
+
+#[test]
+fn ply_may_have_all_types_in_any_order() {
+    let text = "ply\r\nformat ascii 1.0\r\nobj_info made by hand\r\nelement extra 2\r\nproperty list char double what\r\n\
+                property int8 n\r\nelement nothing 99999999999\r\nelement vertex 4\r\nproperty uchar red\r\n\
+                property double y\r\nproperty list uchar int ring\r\nproperty short x\r\nproperty float32 z\r\n\
+                property float t\r\nproperty float s\r\nelement face 2\r\nproperty list uchar float texcoord\r\n\
+                property uint16 flags\r\nproperty list int16 uint8 vertex_index\r\nend_header\r\n\
+                2 1.5 2.5 7\r\n0 8\r\n\
+                255 0 1 9 0 0 0 0\r\n255 0 0 1 0 0 1\r\n255 1 0 1 0 1 1\r\n255 1 0 0 0 1 0\r\n\
+                2 0.5 0.5 1 3 0 1 2\r\n0 2 3 0 2 3 and more\r\n";
+    let mesh = load("a.ply", text, None).unwrap();
+    assert_eq!(corners(&mesh), TWO_TRIANGLES);
+    let uvs: Vec<[f32; 2]> = mesh.uvs.iter().map(|uv| uv.to_array()).collect();
+    assert_eq!(uvs, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
+    assert_eq!(
+        mesh.notes,
+        ["texture coordinates of faces (\"texcoord\") are not looked at, only those of vertices"]
+    );
+}
+
+/// A binary file whose faces come before their vertices, of 64-bit floats, with normals.
+fn faces_first(is_big: bool, normal: [f64; 3]) -> Vec<u8> {
+    let name = if is_big { "big" } else { "little" };
+    let mut bytes = format!(
+        "ply\nformat binary_{name}_endian 1.0\nelement face 1\nproperty list ushort short polygon\nproperty int flags\n\
+         element vertex 3\nproperty double x\nproperty double y\nproperty double z\nproperty double nx\n\
+         property double ny\nproperty double nz\nproperty double texture_u\nproperty double texture_v\nend_header\n"
+    )
+    .into_bytes();
+    let mut put = |little: &[u8]| {
+        let mut value = little.to_vec();
+        if is_big {
+            value.reverse();
+        }
+        bytes.extend(value);
+    };
+    put(&3u16.to_le_bytes());
+    (0..3i16).for_each(|i| put(&i.to_le_bytes()));
+    put(&77i32.to_le_bytes());
+    for position in TWO_TRIANGLES[0] {
+        let row = position.iter().chain(&normal).chain(&[0.25, 0.75]);
+        row.for_each(|x| put(&x.to_le_bytes()));
+    }
+    bytes
+}
+
+#[test]
+fn binary_ply_has_normals_and_texture_coordinates() {
+    for is_big in [false, true] {
+        let mesh = load("a.ply", faces_first(is_big, [0.0, -3e200, 4e200]), None).unwrap();
+        assert_eq!(corners(&mesh), TWO_TRIANGLES[..1]);
+        assert_eq!(mesh.normals[2].to_array(), [0.0, -0.6, 0.8]);
+        assert_eq!(mesh.uvs[2].to_array(), [0.25, 0.75]);
+        // A normal that is none gives way to that of the triangle.
+        for none in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 1.0]] {
+            let mesh = load("a.ply", faces_first(is_big, none), Some(Normals::File)).unwrap();
+            assert_eq!(mesh.normals[2].to_array(), [0.0, 0.0, 1.0]);
+            let rest = "have no normal, or one that is zero or not finite; they get those of their triangles";
+            assert_eq!(mesh.notes, [format!("3 vertices {rest}")]);
+        }
+    }
+}
+
+const SOLIDS: &str = "solid a b\nfacet normal 0 0 -1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendloop\n\
+                      endfacet\nendsolid a b\nSOLID\n FACET NORMAL 0 0 1 OUTER LOOP\n  VERTEX 0 0 0\n VERTEX 1 1 0\n\
+                      VERTEX 0 1 0\n ENDLOOP ENDFACET\nENDSOLID whatever\nsolid a b\nendsolid\n";
+
+#[test]
+fn stl_solids_are_groups() {
+    let mesh = load("a.stl", SOLIDS, None).unwrap();
+    assert_eq!(corners(&mesh), TWO_TRIANGLES);
+    assert_eq!(mesh.positions.len(), 4);
+    assert!(mesh.normals.is_empty());
+    let names: Vec<&str> = mesh.groups.iter().map(|group| group.name.as_str()).collect();
+    assert_eq!((names, mesh.group_of), (vec!["a b", "", "a b"], vec![0, 1]));
+    // Normals of facets tell vertices apart.
+    let mesh = load("a.stl", SOLIDS, Some(Normals::File)).unwrap();
+    let normals: Vec<f32> = mesh.normals.iter().map(|normal| normal.z).collect();
+    assert_eq!(normals, [-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]);
+}
+
+#[test]
+fn binary_stl_is_told_by_its_size() {
+    let (_, bytes) = in_all_formats().pop().unwrap();
+    assert!(bytes.starts_with(b"solid"));
+    let mut longer = bytes.clone();
+    longer[0] = b'S'; // still a text's first word
+    longer.push(0);
+    let error = load("a.stl", &longer, None).unwrap_err();
+    assert!(error.starts_with("a.stl:1: "), "{error}");
+    longer[0] = b'x';
+    let mesh = load("a.stl", &longer, None).unwrap();
+    assert_eq!(mesh.notes, ["1 bytes behind the last triangle are not looked at"]);
+    assert_eq!(
+        load("a.stl", &longer[..300], None).unwrap_err(),
+        "a.stl: byte 80: 6 triangles must be a file of 384 bytes; it has 300"
+    );
+}
+
+#[test]
+fn smooth_normals_are_weighted_by_angles() {
+    // The corner of a cube, whose sides are one, two and three triangles there; vertices of a side are its own by their
+    // texture coordinates.
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 1 0\nv 1 0 1\nv 1 0 0.5\nv 0 1 1\nvt 0 0\nvt 0 1\nvt 1 0\n\
+                f 1/1 3/1 5/1\nf 1/1 5/1 2/1\nf 1/2 2/2 7/2\nf 1/2 7/2 6/2\nf 1/2 6/2 4/2\nf 1/3 4/3 8/3\nf 1/3 8/3 3/3\n";
+    let mesh = load("a.obj", text, Some(Normals::Smooth)).unwrap();
+    assert_eq!(mesh.positions.len(), 4 + 5 + 4);
+    let third = -(1.0f64 / 3.0).sqrt() as f32;
+    let mut count = 0;
+    for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
+        if position.to_array() == [0.0; 3] {
+            assert!((*normal - third).length() < 1e-6, "{normal}");
+            count += 1;
+        }
+    }
+    assert_eq!(count, 3);
+}
+
+#[test]
+fn normals_that_cancel_are_those_of_the_triangles() {
+    let text = format!("{SQUARE}vt 0.5 0.5\nf 1/1 2/1 3/1\nf 3/1 2/1 1/1\n");
+    let mesh = load("a.obj", text, Some(Normals::Smooth)).unwrap();
+    assert_eq!(mesh.positions.len(), 6);
+    assert_eq!(mesh.uvs.len(), 6);
+    assert_eq!(
+        corners(&mesh),
+        [TWO_TRIANGLES[0], [2, 1, 0].map(|i| TWO_TRIANGLES[0][i])]
+    );
+    for (triangle, up) in mesh.triangles.iter().zip([1.0, -1.0]) {
+        for vertex in triangle {
+            assert_eq!(mesh.normals[*vertex as usize].to_array(), [0.0, 0.0, up]);
+        }
+    }
+}
+
+#[test]
+fn normals_of_a_file_without_any_are_an_error() {
+    for (name, bytes) in in_all_formats() {
+        let result = load(name, bytes, Some(Normals::File));
+        if name.to_lowercase().ends_with("stl") {
+            // STL files always have a place for them; here all are zero.
+            assert!(result.unwrap().notes[0].contains("no normal"));
+        } else {
+            let rest = "has no normals; \"smooth\" and \"flat\" ones are made from the triangles";
+            assert_eq!(result.unwrap_err(), format!("{name}: {rest}"));
+        }
+    }
+}
+
+#[test]
+fn a_mesh_far_away_keeps_its_digits() {
+    let text = "v 500000.001 -3 4\nv 500000.002 -3 4\nv 500000.002 -3 4.0009765625\nv -9e8 0 0\nf 1 2 3\n";
+    let mesh = load("a.obj", text, None).unwrap();
+    for (corner, x) in corners(&mesh)[0].iter().zip([500_000.001, 500_000.002, 500_000.002]) {
+        assert!((corner[0] - x).abs() < 1e-9, "{corner:?}");
+    }
+    assert_eq!(mesh.center.y, -3.0);
+    // Around the origin coordinates stay, even where it is at the edge.
+    let mesh = load("a.obj", "v 0 0 1e-20\nv 0.7 0 1\nv 1 0.1 0\nf 1 2 3\n", None).unwrap();
+    assert_eq!(mesh.center.to_array(), [0.0; 3]);
+    assert_eq!(mesh.positions[0].to_array(), [0.0, 0.0, 1e-20]);
+}
+
+#[test]
+fn surfaces_that_are_odd_are_noted() {
+    let text = format!("{SQUARE}v 0 0 1\nf 1 2 3\nf 1 4 3\nf 1 5 3\n");
+    let mesh = load("a.obj", text, None).unwrap();
+    assert_eq!(mesh.notes, ["1 edges belong to more than two triangles (non-manifold)"]);
+    let mesh = load("a.obj", format!("{SQUARE}f 1 2 3\nf 1 4 3\n"), None).unwrap();
+    let rest = "edges are passed in the same direction by both triangles (windings differ)";
+    assert_eq!(mesh.notes, [format!("1 {rest}")]);
+}

@@ -1,0 +1,150 @@
+//! A sphere of 80,000 triangles against the formulas of a sphere: a mesh whose corners lie on a sphere lies between that and the
+//! smaller one that touches its triangles. So must what rays and shadow rays meet.
+
+use glam::DVec3;
+use wgray::cpu::camera::camera_ray;
+use wgray::pack::Packed;
+
+use super::forms::{Form, scene};
+use crate::pictures::{Way, first_hits, reference};
+
+const CENTER: DVec3 = DVec3::new(0.0, 0.0, 1.3);
+const LIGHT: DVec3 = DVec3::new(0.3, 0.2, -1.0);
+
+/// The sphere above a floor, lit from far away.
+fn above_floor(form: &Form) -> Packed {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("sphere.obj"), form.obj(Some(&form.points), None)).expect("a mesh");
+    let text = format!(
+        "image = {{ width = 200, height = 150 }}
+        camera = {{ position = [0.5, -6, 3.5], look_at = [0, 0, 0.9], fov = 40 }}
+        [render]
+        ambient = [0, 0, 0]
+        pixel_samples = {{ pattern = 'grid', count = 1 }}
+        [materials.m]
+        type = 'phong'
+        color = [1, 1, 1]
+        shininess = 1
+        [[lights]]
+        type = 'directional'
+        direction = [{}, {}, {}]
+        color = [1, 1, 1]
+        [[shapes]]
+        type = 'mesh'
+        file = 'sphere.obj'
+        normals = 'file'
+        material = 'm'
+        translate = [{}, {}, {}]
+        [[shapes]]
+        type = 'plane'
+        material = 'm'
+        point = [0, 0, 0]
+        normal = [0, 0, 1]
+        tangent = [1, 0, 0]",
+        LIGHT.x, LIGHT.y, LIGHT.z, CENTER.x, CENTER.y, CENTER.z
+    );
+    scene(&text, folder.path())
+}
+
+/// Where a ray enters a sphere, as a distance along it.
+fn entry(origin: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
+    let to = origin - CENTER;
+    let b = to.dot(direction);
+    let discriminant = b * b - to.length_squared() + radius * radius;
+    (discriminant >= 0.0)
+        .then(|| -b - discriminant.sqrt())
+        .filter(|t| *t > 0.0)
+}
+
+/// What was found of a mesh: pixels where it cannot be so, and how many pixels there are of each kind.
+#[derive(Debug, Default, PartialEq)]
+struct Found {
+    wrong_hits: usize,
+    wrong_shadows: usize,
+    wrong_light: usize,
+    hits: usize,
+    shadows: usize,
+    /// Neither surely in shadow nor surely lit.
+    open: usize,
+}
+
+/// Looks at all pixels. `inner` is the radius of the smaller sphere.
+fn found(form: &Form, inner: f64) -> Found {
+    let packed = above_floor(form);
+    let hits = first_hits(&packed, Way::Cpu);
+    let radiances: Vec<[f32; 3]> = reference(&packed).means().collect();
+    let to_light = -LIGHT.normalize();
+    // A triangle's normal leans so far at most, and light may graze the mesh where it leaves the sphere's dark half.
+    let lean = inner.acos();
+    let mut found = Found::default();
+    for (i, (hit, radiance)) in hits.iter().zip(radiances).enumerate() {
+        let at = glam::Vec2::new((i % 200) as f32, (i / 200) as f32) + 0.5;
+        let ray = camera_ray(&packed.camera, at);
+        let (origin, direction) = (ray.origin.as_dvec3() + packed.origin, ray.direction.as_dvec3());
+        let (outer, inner_t) = (entry(origin, direction, 1.0), entry(origin, direction, inner));
+        let point = origin + direction * f64::from(hit.depth);
+        let is_lit = radiance[0] > 0.0;
+        if hit.shape == 0 {
+            found.hits += 1;
+            let radial = (point - CENTER).normalize();
+            let radius = point.distance(CENTER);
+            let between = radius > inner - 1e-5 && radius < 1.0 + 1e-5 && outer.is_some();
+            // Where a ray grazes the sphere, what is rounded moves its point far along the ray.
+            let grazing = -radial.dot(direction);
+            let normals = (hit.shading_normal.as_dvec3() - radial).length() * grazing < 2e-5
+                && hit.normal.as_dvec3().angle_between(radial) < 1.01 * lean + 1e-4;
+            found.wrong_hits += usize::from(!(between && normals));
+            let cosine = radial.dot(to_light);
+            found.wrong_light += usize::from(cosine > 2.0 * lean && !is_lit || cosine < -1e-5 && is_lit);
+        } else {
+            found.wrong_hits += usize::from(inner_t.is_some());
+            if hit.shape == 1 && hit.depth < 20.0 {
+                let [surely, maybe] = [inner, 1.0].map(|radius| entry(point, to_light, radius).is_some());
+                found.shadows += usize::from(surely);
+                found.open += usize::from(maybe && !surely);
+                found.wrong_shadows += usize::from(surely && is_lit || !maybe && !is_lit);
+            }
+        }
+    }
+    found
+}
+
+/// The radius of the sphere that a mesh's triangles touch, the nearest of them.
+fn inner(form: &Form) -> f64 {
+    let height = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|i| form.points[i as usize]);
+        (b - a).cross(c - a).normalize().dot(a)
+    };
+    form.triangles.iter().map(height).fold(1.0, f64::min)
+}
+
+#[test]
+fn a_sphere_of_triangles_is_nearly_a_sphere() {
+    let fine = Form::icosphere(6);
+    assert_eq!(fine.triangles.len(), 81_920);
+    let fine_inner = inner(&fine);
+    let result = found(&fine, fine_inner);
+    println!("between the radii {fine_inner} and 1: {result:?}");
+    assert!(
+        result.hits > 3000 && result.shadows > 1000 && result.open < 100,
+        "{result:?}"
+    );
+    assert_eq!(
+        (result.wrong_hits, result.wrong_shadows, result.wrong_light),
+        (0, 0, 0),
+        "{result:?}"
+    );
+    // The control: a coarser mesh by the same bounds; and by its own ones it is right.
+    let coarse = Form::icosphere(2);
+    let wrong = found(&coarse, fine_inner);
+    assert!(
+        wrong.wrong_hits > 1000 && wrong.wrong_shadows > 10 && wrong.wrong_light > 10,
+        "{wrong:?}"
+    );
+    let right = found(&coarse, inner(&coarse));
+    assert_eq!(
+        (right.wrong_hits, right.wrong_shadows, right.wrong_light),
+        (0, 0, 0),
+        "{right:?}"
+    );
+}

@@ -1,0 +1,532 @@
+//! What a ray meets does not depend on the trees: the rule of `docs/decisions/trees.md`, by a loop over all triangles of all
+//! instances, gives the same bits as the trees that are built, and as any other ones.
+
+use std::sync::Arc;
+
+use glam::{UVec2, Vec3, Vec4Swizzles as _};
+use proptest::strategy::{Strategy as _, ValueTree as _};
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use wgray::cpu::geometry::{closest_hit, hidden_samples};
+use wgray::cpu::light::{segment, segments_to_light};
+use wgray::cpu::mesh::{highest, lowest, mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
+use wgray::cpu::primitive::intersect;
+use wgray::cpu::ray::{Hit, Ray, by_itself, nearer_hit, no_hit};
+use wgray::cpu::shadow::{Block, block_sample, shadow_bits};
+use wgray::cpu::slab::{box_passage, is_passed, slabs};
+use wgray::cpu::surface::{Surface, largest};
+use wgray::cpu::traverse::{closest_primitive, hidden_by_primitives};
+use wgray::pack::tree::{self, Aabb};
+use wgray::pack::{
+    BLOCK, CASTS_SHADOW, FAR, INSTANCE, Instance, Item, Light, NO_SHADOW, NOTHING, NOWHERE, Packed, RANDOM,
+};
+
+use super::forms::{Form, HEAD, scene};
+use crate::random::Random;
+use crate::random_scenes::any_scene;
+use crate::scenes;
+
+/// The corners of a mesh's triangle in a slot, in the mesh's space.
+fn corners(scene: &Packed, i: &Instance, slot: usize) -> [Vec3; 3] {
+    let mesh = &scene.meshes[i.mesh as usize];
+    let triangle = mesh.triangles[slot];
+    [triangle.x, triangle.y, triangle.z].map(|vertex| mesh.vertices[vertex as usize].xyz())
+}
+
+fn room(scene: &Packed, origin: Vec3) -> f32 {
+    scene.counts.room.x * (largest(origin) + scene.counts.room.y)
+}
+
+/// The nearest hit of all, by the rule. Distances are looked at last.
+fn nearest(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
+    let mut hit = closest_primitive(scene, ray, by_itself(left), by_itself(wall));
+    let world = slabs(ray.origin, ray.direction, room(scene, ray.origin));
+    for item in &scene.items {
+        let passage = box_passage(item.low, item.high, world);
+        if !is_passed(passage, FAR) {
+            continue;
+        }
+        let kind = item.kind & 0xff;
+        if kind != INSTANCE {
+            let wall = item.index == by_itself(wall);
+            let met = intersect(kind, &scene.primitives[item.index as usize], wall, ray, FAR);
+            if met < FAR && item.index != by_itself(left) {
+                let found = Hit {
+                    t: met.max(passage.x),
+                    primitive: item.index,
+                    ..no_hit()
+                };
+                hit = nearer_hit(hit, found);
+            }
+            continue;
+        }
+        let i = &scene.instances[item.index as usize];
+        let start = passage.x.max(0.0);
+        let direction = vector_to_mesh(i, ray.direction);
+        let origin = point_to_mesh(i, ray.origin) + direction * start;
+        let s = slabs(origin, direction, mesh_pad(i, origin));
+        for (slot, triangle) in scene.meshes[i.mesh as usize].triangles.iter().enumerate() {
+            let [v0, v1, v2] = corners(scene, i, slot);
+            let crossing = triangle_crossing(v0, v1, v2, origin, shear_of(direction), s);
+            let found = Hit {
+                t: start + crossing.t.max(0.0),
+                instance: item.index + 1,
+                primitive: triangle.w,
+                slot: slot as u32,
+                barycentric: crossing.barycentric,
+            };
+            let own = left == UVec2::new(found.instance, found.primitive);
+            if crossing.met && found.t > 0.0 && !own {
+                hit = nearer_hit(hit, found);
+            }
+        }
+    }
+    hit
+}
+
+/// Which samples of a light anything hides, by the rule.
+fn hidden(scene: &Packed, surface: &Surface, light: &Light, block: Block) -> u32 {
+    let mut bits = hidden_by_primitives(scene, surface, light, block);
+    let origin = surface.start;
+    let to = segments_to_light(light, origin);
+    for item in scene.items.iter().filter(|item| item.kind & CASTS_SHADOW != 0) {
+        for sample in 0..block.count {
+            let at = block_sample(block, sample);
+            let world = slabs(origin, segment(to, at), room(scene, origin));
+            if !is_passed(box_passage(item.low, item.high, world), light.reach) {
+                continue;
+            }
+            let is_hidden = if item.kind & 0xff == INSTANCE {
+                let i = &scene.instances[item.index as usize];
+                let start = point_to_mesh(i, origin);
+                let [towards, u, v] = [to.towards, to.u, to.v].map(|v| vector_to_mesh(i, v));
+                let direction = segment(wgray::cpu::light::Segments { towards, u, v }, at);
+                let s = slabs(start, direction, mesh_pad(i, start));
+                let mesh = &scene.meshes[i.mesh as usize];
+                mesh.triangles.iter().enumerate().any(|(slot, triangle)| {
+                    let group = mesh.groups.get(slot).copied().unwrap_or(0);
+                    let casts = scene.group_words[(i.materials + group) as usize] & NO_SHADOW == 0;
+                    let [v0, v1, v2] = corners(scene, i, slot);
+                    let crossing = triangle_crossing(v0, v1, v2, start, shear_of(direction), s);
+                    let own = surface.above == UVec2::new(item.index + 1, triangle.w);
+                    casts && !own && crossing.met && crossing.t > 0.0 && crossing.t < light.reach
+                })
+            } else {
+                let (own, wall) = (by_itself(surface.above), item.index == by_itself(surface.below));
+                let q = &scene.primitives[item.index as usize];
+                item.index != own && shadow_bits(item.kind & 0xff, q, origin, wall, light, block) >> sample & 1 == 1
+            };
+            bits |= u32::from(is_hidden) << sample;
+        }
+    }
+    bits
+}
+
+/// Where a scene's rays start, and what they are aimed at: points on edges and in the inside of triangles, corners, corners of
+/// items' boxes.
+struct Aims<'a> {
+    scene: &'a Packed,
+    random: &'a Random,
+    low: Vec3,
+    high: Vec3,
+}
+
+impl<'a> Aims<'a> {
+    fn new(scene: &'a Packed, random: &'a Random) -> Aims<'a> {
+        let boxes = scene.items.iter().map(|item| (item.low, item.high));
+        let (low, high) = boxes.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), (l, h)| {
+            (low.min(l), high.max(h))
+        });
+        Aims {
+            scene,
+            random,
+            low,
+            high,
+        }
+    }
+
+    fn number(&self) -> f32 {
+        self.random.unit() as f32
+    }
+
+    fn anywhere(&self) -> Vec3 {
+        let middle = (self.low + self.high) * 0.5;
+        let part = Vec3::new(self.number(), self.number(), self.number()) * 2.0 - 1.0;
+        middle + part * (self.high - middle) * self.random.pick(&[1.0, 2.0, 20.0])
+    }
+
+    /// A point of a mesh, and the triangle that it is on.
+    fn target(&self) -> (Vec3, UVec2) {
+        let (scene, random) = (self.scene, self.random);
+        let item: &Item = &scene.items[random.below(scene.items.len() as u32) as usize];
+        if item.kind & 0xff != INSTANCE || random.once_in(8) {
+            let corner = Vec3::select(
+                glam::BVec3::new(random.once_in(2), random.once_in(2), random.once_in(2)),
+                item.low,
+                item.high,
+            );
+            let at = if random.once_in(4) {
+                corner
+            } else {
+                item.low + (item.high - item.low) * self.number()
+            };
+            return (at, NOWHERE);
+        }
+        let i = &scene.instances[item.index as usize];
+        let slot = random.below(scene.meshes[i.mesh as usize].triangles.len() as u32) as usize;
+        let [a, b, c] = corners(scene, i, slot);
+        let p = match random.below(4) {
+            0 => a,
+            1 => a + (b - a) * self.number(),
+            _ => {
+                let (x, y) = (self.number() * 0.5, self.number() * 0.5);
+                a + (b - a) * x + (c - a) * y
+            }
+        };
+        let at = i.anchor + i.u * p.x + i.v * p.y + i.w * p.z;
+        (
+            at,
+            UVec2::new(item.index + 1, scene.meshes[i.mesh as usize].triangles[slot].w),
+        )
+    }
+
+    fn ray(&self) -> (Ray, UVec2) {
+        let (start, own) = if self.random.once_in(3) {
+            self.target()
+        } else {
+            (self.anywhere(), NOWHERE)
+        };
+        let (target, _) = self.target();
+        let direction = match self.random.below(8) {
+            0 => self.random.pick(&Vec3::AXES) * self.random.pick(&[1.0, -1.0]),
+            1 => target - start,
+            2 => Vec3::new(target.x - start.x, target.y - start.y, 0.0).normalize_or(Vec3::X),
+            _ => (target - start).normalize_or(Vec3::X),
+        };
+        let left = if self.random.once_in(2) { own } else { NOWHERE };
+        (
+            Ray {
+                origin: start,
+                direction,
+            },
+            left,
+        )
+    }
+
+    fn shadow(&self) -> (Surface, Light, Block) {
+        let (start, own) = if self.random.once_in(2) {
+            self.target()
+        } else {
+            (self.anywhere(), NOWHERE)
+        };
+        let (end, _) = self.target();
+        let size = (self.high - self.low).max_element() * self.random.pick(&[0.0, 0.1, 1.0]);
+        let edge = || (Vec3::new(self.number(), self.number(), self.number()) - 0.5) * size;
+        let mut light: Light = bytemuck::Zeroable::zeroed();
+        light.primitive = NOTHING;
+        (light.u, light.v) = (edge(), edge());
+        if self.random.once_in(4) {
+            (light.center, light.finite, light.reach) = ((end - start).normalize_or(Vec3::Z), 0.0, 1e10);
+        } else {
+            light.center = start + (end - start) * self.random.pick(&[0.5, 1.0, 2.0]);
+            (light.finite, light.reach) = (1.0, 1.0 - 1e-5);
+        }
+        let mut surface = nothing();
+        surface.start = start;
+        (surface.above, surface.below) = (own, own);
+        let key = UVec2::new(self.random.bits() as u32, self.random.bits() as u32);
+        let count = self.random.pick(&[1, 7, BLOCK]);
+        let block = Block {
+            pattern: RANDOM,
+            side: 1,
+            first: 0,
+            count,
+            group: 3,
+            key,
+        };
+        (surface, light, block)
+    }
+}
+
+fn nothing() -> Surface {
+    let zero = Vec3::ZERO;
+    Surface {
+        position: zero,
+        normal: Vec3::Z,
+        shading_normal: Vec3::Z,
+        wo: Vec3::Z,
+        start: zero,
+        bulge: zero,
+        side: 1.0,
+        above: NOWHERE,
+        below: NOWHERE,
+        uv: zero.truncate(),
+        du: zero,
+        dv: zero,
+    }
+}
+
+/// The bits of a hit, but for the slot, which belongs to the tree.
+fn bits(hit: Hit) -> [u32; 5] {
+    let [u, v] = hit.barycentric.to_array().map(f32::to_bits);
+    [hit.t.to_bits(), hit.instance, hit.primitive, u, v]
+}
+
+/// How many of so many rays, and of as many blocks of shadow rays, have another answer by a scene's trees than by the rule;
+/// and of how many of them the rule says that they meet something.
+fn differing(scene: &Packed, rays: u32, seed: u64) -> [u32; 4] {
+    let random = Random::new(seed);
+    let aims = Aims::new(scene, &random);
+    let [mut hits, mut shadows, mut met, mut dark] = [0; 4];
+    for _ in 0..rays {
+        let (ray, left) = aims.ray();
+        let rule = nearest(scene, ray, left, NOWHERE);
+        let found = closest_hit(scene, ray, left, NOWHERE);
+        hits += u32::from(bits(rule) != bits(found) || rule.slot != found.slot);
+        met += u32::from(rule.primitive != NOTHING);
+        let (surface, light, block) = aims.shadow();
+        let rule = hidden(scene, &surface, &light, block);
+        shadows += u32::from(rule != hidden_samples(scene, &surface, &light, block));
+        dark += u32::from(rule != 0);
+    }
+    [hits, shadows, met, dark]
+}
+
+/// The nodes of a tree over these boxes, and the boxes' order.
+type Builder<'a> = &'a dyn Fn(&[Aabb]) -> (Vec<tree::Node>, Vec<u32>);
+
+/// A scene with other trees.
+fn with_trees(scene: &Packed, tree: Builder) -> Packed {
+    let mut scene = scene.clone();
+    let boxes: Vec<Aabb> = scene
+        .items
+        .iter()
+        .map(|item| Aabb {
+            low: item.low,
+            high: item.high,
+        })
+        .collect();
+    let (nodes, order) = tree(&boxes);
+    scene.nodes = bytemuck::cast_vec(nodes);
+    scene.items = order.iter().map(|i| scene.items[*i as usize]).collect();
+    for mesh in &mut scene.meshes {
+        let mesh = Arc::make_mut(mesh);
+        let position = |vertex: u32| mesh.vertices[vertex as usize].xyz();
+        let around = |t: &glam::UVec4| {
+            let [a, b, c] = [t.x, t.y, t.z].map(position);
+            Aabb {
+                low: lowest(a, b, c),
+                high: highest(a, b, c),
+            }
+        };
+        let boxes: Vec<Aabb> = mesh.triangles.iter().map(around).collect();
+        let (nodes, order) = tree(&boxes);
+        mesh.nodes = bytemuck::cast_vec(nodes);
+        mesh.triangles = order.iter().map(|i| mesh.triangles[*i as usize]).collect();
+        if !mesh.groups.is_empty() {
+            mesh.groups = order.iter().map(|i| mesh.groups[*i as usize]).collect();
+        }
+    }
+    scene
+}
+
+fn built(boxes: &[Aabb], most_in_leaf: u32) -> (Vec<tree::Node>, Vec<u32>) {
+    let tree = tree::build(boxes, most_in_leaf);
+    (tree.nodes, tree.order)
+}
+
+/// A tree that has nothing to do with where the boxes are: any of them together, in any slots.
+fn random_tree(boxes: &[Aabb], random: &Random) -> (Vec<tree::Node>, Vec<u32>) {
+    let empty: tree::Node = bytemuck::Zeroable::zeroed();
+    let (mut nodes, mut order) = (vec![empty], Vec::new());
+    let mut waiting = std::collections::VecDeque::from([(0, (0..boxes.len() as u32).collect::<Vec<_>>())]);
+    while let Some((number, items)) = waiting.pop_front() {
+        let around = |items: &[u32]| items.iter().fold(Aabb::EMPTY, |all, i| all.with(&boxes[*i as usize]));
+        let whole = around(&items);
+        let mut node = grid(&whole);
+        node.first_item = order.len() as u32;
+        node.first_child = nodes.len() as u32;
+        let mut parts: Vec<Vec<u32>> = vec![Vec::new(); 8];
+        let used = 2 + random.below(7) as usize;
+        for (i, item) in items.iter().enumerate() {
+            parts[(i * 5 + random.below(2) as usize) % used].push(*item);
+        }
+        for (slot, part) in parts.iter().enumerate() {
+            (0..3).for_each(|axis| (node.low[axis][slot], node.high[axis][slot]) = (255, 0));
+            if part.is_empty() {
+                continue;
+            }
+            set_bounds(&mut node, slot, &around(part));
+            if part.len() <= 1 + random.below(4) as usize {
+                node.leaves[slot] = (part.len() << 5 | (order.len() - node.first_item as usize)) as u8;
+                order.extend(part);
+            } else {
+                node.inner |= 1 << slot;
+                waiting.push_back((nodes.len(), part.clone()));
+                nodes.push(empty);
+            }
+        }
+        nodes[number] = node;
+    }
+    (nodes, order)
+}
+
+/// A node without children whose grid reaches over a box.
+fn grid(bounds: &Aabb) -> tree::Node {
+    let mut node: tree::Node = bytemuck::Zeroable::zeroed();
+    node.base = bounds.low.to_array();
+    node.exponents = [0, 1, 2].map(|axis| {
+        let reaches = |e: &u8| bounds.low[axis] + 255.0 * f32::from_bits(u32::from(*e) << 23) >= bounds.high[axis];
+        (0..=254).find(reaches).expect("a grid as large as a box")
+    });
+    node
+}
+
+fn set_bounds(node: &mut tree::Node, slot: usize, bounds: &Aabb) {
+    for axis in 0..3 {
+        let step = f32::from_bits(u32::from(node.exponents[axis]) << 23);
+        let at = |q: u8| node.base[axis] + f32::from(q) * step;
+        let low = (0..=255).rev().find(|q| at(*q) <= bounds.low[axis]);
+        let high = (0..=255).find(|q| at(*q) >= bounds.high[axis]);
+        node.low[axis][slot] = low.expect("a box in its parent's");
+        node.high[axis][slot] = high.expect("a box in its parent's");
+    }
+}
+
+/// The same tree with its boxes one step too small on their upper sides.
+fn too_small(boxes: &[Aabb]) -> (Vec<tree::Node>, Vec<u32>) {
+    let (mut nodes, order) = built(boxes, 2);
+    for node in &mut nodes {
+        for (low, high) in node.low.iter().zip(&mut node.high) {
+            for (low, high) in low.iter().zip(high) {
+                *high -= u8::from(*high > *low);
+            }
+        }
+    }
+    (nodes, order)
+}
+
+/// Soups in the world: mirrored, sheared, tiny, in groups, some of glass that casts no shadow, and shapes beside them.
+fn soups() -> Packed {
+    let folder = tempfile::tempdir().expect("a folder");
+    let random = Random::new(11);
+    std::fs::write(folder.path().join("a.obj"), Form::soup(300, &random).obj(None, None)).expect("a mesh");
+    std::fs::write(folder.path().join("b.obj"), Form::soup(37, &random).obj(None, None)).expect("a mesh");
+    let mut text = format!(
+        "{HEAD}[render]
+        shadows = 'transparent'
+        [meshes.a]
+        file = 'a.obj'
+        [meshes.b]
+        file = 'b.obj'
+        up = 'y'
+        [[instances]]
+        mesh = 'a'
+        material = 'm'
+        materials = {{ second = 'glass' }}
+        [[instances]]
+        mesh = 'a'
+        material = 'm'
+        scale = [-0.7, 1.2, 0.4]
+        rotate = [20, 30, 40]
+        [[instances]]
+        mesh = 'b'
+        material = 'm'
+        matrix = [[0.5, 0.4, 0, 0.3], [0, 0.5, 0.1, -0.2], [0.3, 0, -0.9, 0.1]]
+        [[instances]]
+        mesh = 'b'
+        material = 'glass'
+        scale = 0.001
+        translate = [0.2, 0.1, 0]
+        [[instances]]
+        mesh = 'a'
+        material = 'm'
+        scale = 1e3
+        "
+    );
+    for _ in 0..80 {
+        let [x, y, z] = [(); 3].map(|()| random.between(-1.0, 1.0));
+        let material = random.pick(&["m", "glass"]);
+        text += &format!(
+            "[[shapes]]\ntype = 'sphere'\nmaterial = '{material}'\ncenter = [{x}, {y}, {z}]\nradius = {}\n",
+            random.between(0.01, 0.3)
+        );
+    }
+    scene(&text, folder.path())
+}
+
+#[test]
+fn trees_leave_out_no_hit_and_no_shadow() {
+    for (name, scene, rays) in [
+        ("soups", soups(), 6000),
+        ("knots", scenes::packed(&scenes::scene("twisted-tube.toml")), 600),
+    ] {
+        assert!(!scene.items.is_empty());
+        let [hits, shadows, met, dark] = differing(&scene, rays, 1);
+        println!("{name}: {met} of {rays} rays meet something, {dark} are in some shadow");
+        assert!(met > rays / 4 && dark > rays / 10, "{name}: {met} {dark}");
+        assert_eq!((hits, shadows), (0, 0), "{name}: {rays} rays");
+    }
+}
+
+/// Rays for which the two scenes do not find the same.
+fn differing_between(a: &Packed, b: &Packed, rays: u32) -> [u32; 2] {
+    let random = Random::new(3);
+    let aims = Aims::new(a, &random);
+    let [mut hits, mut shadows] = [0; 2];
+    for _ in 0..rays {
+        let (ray, left) = aims.ray();
+        let found = [a, b].map(|scene| bits(closest_hit(scene, ray, left, NOWHERE)));
+        hits += u32::from(found[0] != found[1]);
+        let (surface, light, block) = aims.shadow();
+        let found = [a, b].map(|scene| hidden_samples(scene, &surface, &light, block));
+        shadows += u32::from(found[0] != found[1]);
+    }
+    [hits, shadows]
+}
+
+#[test]
+fn any_other_tree_gives_the_same_bits() {
+    let random = Random::new(2);
+    for (name, scene) in [
+        ("soups", soups()),
+        ("knots", scenes::packed(&scenes::scene("twisted-tube.toml"))),
+    ] {
+        for most in 1..=4 {
+            let other = with_trees(&scene, &|boxes| built(boxes, most));
+            assert_eq!(
+                differing_between(&scene, &other, 4000),
+                [0, 0],
+                "{name}, {most} in a leaf"
+            );
+        }
+        let other = with_trees(&scene, &|boxes| random_tree(boxes, &random));
+        assert_ne!(other.nodes, scene.nodes);
+        assert_eq!(differing_between(&scene, &other, 250), [0, 0], "{name}, a random tree");
+    }
+}
+
+#[test]
+fn a_tree_whose_boxes_are_too_small_is_found() {
+    let scene = soups();
+    let [hits, shadows] = differing_between(&scene, &with_trees(&scene, &too_small), 20_000);
+    println!("{hits} hits and {shadows} shadows of 20000 are lost");
+    assert!(hits > 10 && shadows > 10, "{hits} {shadows}");
+}
+
+/// Random scenes have meshes and shapes of all kinds, of all sizes and anywhere.
+#[test]
+fn trees_of_random_scenes_leave_out_nothing() {
+    let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
+    let strategy = any_scene::description();
+    let mut with_tree = 0;
+    for case in 0..60 {
+        let scene = any_scene::packed(&strategy.new_tree(&mut runner).expect("a scene").current());
+        if scene.items.is_empty() {
+            continue;
+        }
+        with_tree += 1;
+        let [hits, shadows, ..] = differing(&scene, 100, case);
+        assert_eq!((hits, shadows), (0, 0), "random scene {case}");
+    }
+    assert!(with_tree > 12, "{with_tree} scenes have a tree");
+}

@@ -1,0 +1,329 @@
+//! Closed meshes have no holes: rays at their edges and corners do not pass, from outside or inside, wherever a mesh is and
+//! however large.
+
+use glam::{DMat3, DVec3, UVec2, Vec3, Vec4Swizzles as _};
+use rayon::prelude::*;
+use wgray::cpu::geometry::{closest_hit, hidden_samples};
+use wgray::cpu::ray::Ray;
+use wgray::cpu::shadow::Block;
+use wgray::cpu::surface::Surface;
+use wgray::pack::{CASTS_SHADOW, FAR, GRID, Instance, Light, NOTHING, NOWHERE, Packed};
+
+use super::forms::{Form, HEAD, scene};
+use crate::random::Random;
+use crate::sources;
+
+/// Where meshes are put, and how far from their own size that is from the origin at most.
+const PLACES: &[&str] = &[
+    "",
+    "rotate = [30, 40, 50]",
+    "rotate = { axis = [1, 2, 3], degrees = 17 }\nscale = [1, 2.5, -0.6]",
+    "rotate = [0, 45, 45]\ntranslate = [1000, -700, 300]",
+    "rotate = [10, 20, 30]\ntranslate = [3e4, 1e5, -2e4]",
+    "rotate = [70, 80, 90]\ntranslate = [1e6, 1e6, 1e6]",
+    "rotate = [1, 2, 3]\nscale = 1e-6",
+    "rotate = [1, 2, 3]\nscale = 1e6",
+    "rotate = [4, 5, 6]\nscale = 1e-6\ntranslate = [1e-3, 0, 1e-2]",
+    "matrix = [[1, 0.6, 0, 0], [0, 1, 0.4, 0], [0.2, 0, 1, 3]]",
+];
+
+/// A scene of one mesh.
+fn placed(obj: &str, place: &str) -> Packed {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("a.obj"), obj).expect("a mesh");
+    scene(
+        &format!("{HEAD}[[shapes]]\ntype = 'mesh'\nfile = 'a.obj'\nmaterial = 'm'\n{place}\n"),
+        folder.path(),
+    )
+}
+
+/// A mesh in the world as its records have it, in f64.
+struct Solid {
+    corners: Vec<[DVec3; 3]>,
+    center: DVec3,
+    /// Of a ball around the center that is all inside; of a mesh that is not convex it says nothing.
+    radius: f64,
+    /// How far its coordinates are rounded at most.
+    rounding: f64,
+}
+
+impl Solid {
+    fn new(scene: &Packed) -> Solid {
+        let (i, mesh): (&Instance, _) = (&scene.instances[0], &scene.meshes[0]);
+        let columns = DMat3::from_cols(i.u.as_dvec3(), i.v.as_dvec3(), i.w.as_dvec3());
+        let corner = |vertex: u32| {
+            let p = mesh.vertices[vertex as usize].xyz().as_dvec3();
+            i.anchor.as_dvec3() + columns * p
+        };
+        let corners: Vec<[DVec3; 3]> = mesh.triangles.iter().map(|t| [t.x, t.y, t.z].map(corner)).collect();
+        let center = corners.iter().flatten().sum::<DVec3>() / (3.0 * corners.len() as f64);
+        let height = |[a, b, c]: &[DVec3; 3]| (b - a).cross(c - a).normalize().dot(center - a).abs();
+        Solid {
+            center,
+            radius: corners.iter().map(height).fold(f64::INFINITY, f64::min),
+            rounding: corners
+                .iter()
+                .flatten()
+                .map(|p| p.abs().max_element())
+                .fold(0.0, f64::max)
+                / 16_777_216.0,
+            corners,
+        }
+    }
+
+    /// A corner, or a point on an edge, of any triangle.
+    fn target(&self, random: &Random) -> DVec3 {
+        let [a, b, _] = self.triangle(random);
+        match random.below(4) {
+            0 => a,
+            1 => a.lerp(b, 0.5),
+            2 => a.lerp(b, f64::from(random.below(257)) / 256.0),
+            _ => a.lerp(b, random.unit()),
+        }
+    }
+
+    /// Its corners, from any of them on.
+    fn triangle(&self, random: &Random) -> [DVec3; 3] {
+        let mut corners = self.corners[random.below(self.corners.len() as u32) as usize];
+        corners.rotate_left(random.below(3) as usize);
+        corners
+    }
+}
+
+/// How many rays at a convex mesh pass it. They go through the ball in its middle, and so must meet its surface before they are
+/// there; from inside where they were aimed at, but for what a sliver's width leaves of the digits of its length.
+fn passing(scene: &Packed, rays: u32, inside: bool) -> u32 {
+    let solid = Solid::new(scene);
+    let chunks = (0..64u64).into_par_iter().map(|seed| {
+        let random = Random::new(seed + if inside { 100 } else { 0 });
+        (0..rays / 64)
+            .filter(|_| passes_convex(scene, &solid, inside, &random))
+            .count() as u32
+    });
+    chunks.sum()
+}
+
+fn passes_convex(scene: &Packed, solid: &Solid, inside: bool, random: &Random) -> bool {
+    let target = solid.target(random);
+    let sideways = DVec3::from_array([(); 3].map(|()| random.between(-0.3, 0.3))) * solid.radius;
+    let out = target - solid.center;
+    let origin = match inside {
+        true => solid.center + sideways,
+        false => target + (out - sideways) * random.magnitude(-1.0, 3.0),
+    };
+    let origin = origin.as_vec3();
+    let direction = (target - origin.as_dvec3()).as_vec3();
+    let ray = Ray {
+        origin,
+        direction: if random.once_in(2) {
+            direction
+        } else {
+            direction.normalize()
+        },
+    };
+    let d = ray.direction.as_dvec3();
+    // How far along the ray it is nearest to the center; it may be past the target by rounding alone.
+    let to_center = (solid.center - origin.as_dvec3()).dot(d) / d.length_squared();
+    let to_target = (target - origin.as_dvec3()).dot(d) / d.length_squared();
+    let slack = 30.0 * solid.rounding / d.length();
+    let limit = if inside { to_target * 1.05 + slack } else { to_center };
+    let hit = closest_hit(scene, ray, NOWHERE, NOWHERE);
+    let casts = scene.items.iter().any(|item| item.kind & CASTS_SHADOW != 0);
+    let times = if inside { 2.0 } else { 1.0 + to_center / to_target };
+    !(f64::from(hit.t) <= limit) || casts && !is_hidden(scene, origin, direction, times)
+}
+
+/// Whether a point light is hidden from the origin, so many times as far as the direction reaches.
+fn is_hidden(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> bool {
+    let zero = Vec3::ZERO;
+    let surface = Surface {
+        position: origin,
+        normal: Vec3::Z,
+        shading_normal: Vec3::Z,
+        wo: Vec3::Z,
+        start: origin,
+        bulge: zero,
+        side: 1.0,
+        above: NOWHERE,
+        below: NOWHERE,
+        uv: zero.truncate(),
+        du: zero,
+        dv: zero,
+    };
+    let light = Light {
+        center: (origin.as_dvec3() + direction.as_dvec3() * times).as_vec3(),
+        finite: 1.0,
+        reach: 1.0 - 1e-5,
+        primitive: NOTHING,
+        ..bytemuck::Zeroable::zeroed()
+    };
+    let block = Block {
+        pattern: GRID,
+        side: 1,
+        first: 0,
+        count: 1,
+        group: 0,
+        key: UVec2::ZERO,
+    };
+    hidden_samples(scene, &surface, &light, block) == 1
+}
+
+fn convex() -> [(&'static str, Form); 4] {
+    let mut slivers = Form::slivers(600, &Random::new(1));
+    slivers.points.iter_mut().for_each(|p| p.z *= 0.7);
+    [
+        ("a cube", Form::cube()),
+        ("an icosahedron", Form::icosphere(0)),
+        ("an icosphere", Form::icosphere(4)),
+        ("slivers", slivers),
+    ]
+}
+
+#[test]
+fn no_ray_passes_a_closed_mesh() {
+    let mut total = 0;
+    for (name, form) in convex() {
+        let obj = form.obj(None, None);
+        for place in PLACES {
+            let scene = placed(&obj, place);
+            assert_eq!(
+                scene.meshes[0].triangles.len(),
+                form.triangles.len(),
+                "{name}: all triangles are there"
+            );
+            for inside in [false, true] {
+                let rays = 12_800;
+                total += rays;
+                assert_eq!(
+                    passing(&scene, rays, inside),
+                    0,
+                    "{name}, {place:?}, from inside: {inside}"
+                );
+            }
+        }
+    }
+    println!("{total} rays at edges and corners, and as many shadow rays: none passes");
+    assert!(total > 1_000_000);
+}
+
+#[test]
+fn a_mesh_with_a_hole_is_found() {
+    for (name, form) in convex() {
+        let mut open = form.clone();
+        open.triangles.pop();
+        for place in PLACES {
+            let scene = placed(&open.obj(None, None), place);
+            let count = passing(&scene, 64_000, true);
+            assert!(count > 0, "{name}, {place:?}");
+        }
+    }
+}
+
+/// The ordinary test, of triangles that are shapes by themselves, lets rays through between two of them.
+#[test]
+fn triangles_that_do_not_share_their_edges_are_found() {
+    let form = Form::icosphere(2);
+    let mesh = placed(&form.obj(None, None), "rotate = [30, 40, 50]");
+    let mut text = HEAD.to_string();
+    for corners in Solid::new(&mesh).corners {
+        let [a, b, c] = corners.map(|p| p.to_array());
+        text += &format!("[[shapes]]\ntype = 'triangle'\nmaterial = 'm'\nvertices = [{a:?}, {b:?}, {c:?}]\n");
+    }
+    let mut apart = scene(&text, sources::path("scenes").as_path());
+    (apart.instances, apart.meshes) = (mesh.instances.clone(), mesh.meshes.clone()); // for what they are aimed at
+    let count = [false, true].map(|inside| passing(&apart, 64_000, inside));
+    println!("{count:?} of 64000 rays from outside and inside pass triangles by themselves");
+    assert!(count[0] + count[1] > 0, "{count:?}");
+    assert_eq!([false, true].map(|inside| passing(&mesh, 64_000, inside)), [0, 0]);
+}
+
+/// The knot is not convex. Rays at an edge whose triangles all face them meet it there or before; rays from inside of the tube
+/// never leave it.
+#[test]
+fn no_ray_passes_the_knot() {
+    let knot = std::fs::read_to_string(sources::path("scenes/meshes/knot.obj")).expect("the knot");
+    for place in &PLACES[..4] {
+        let packed = placed(&knot, place);
+        let solid = Solid::new(&packed);
+        let [outside, inside] = knot_rays(&packed, &solid, 40_000);
+        println!("{place:?}: {outside:?} from outside, {inside:?} from inside");
+        assert!(
+            outside.0 > 5000 && inside.0 > 20_000,
+            "{place:?}: {outside:?} {inside:?}"
+        );
+        assert_eq!((outside.1, inside.1), (0, 0), "{place:?}");
+    }
+    // The control: with some of its triangles gone.
+    let mut gone = 0;
+    let few = knot.lines().filter(|line| {
+        gone += u32::from(line.starts_with("f "));
+        !(line.starts_with("f ") && gone % 50 == 0)
+    });
+    let packed = placed(&few.collect::<Vec<_>>().join("\n"), "");
+    let whole = Solid::new(&placed(&knot, ""));
+    let [outside, inside] = knot_rays(&packed, &whole, 40_000);
+    assert!(outside.1 > 10 && inside.1 > 10, "{outside:?} {inside:?}");
+}
+
+/// How many rays were aimed from outside and from inside, and how many of them pass.
+fn knot_rays(scene: &Packed, solid: &Solid, rays: u32) -> [(u32, u32); 2] {
+    let side = f64::from(scene.instances[0].side);
+    let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize() * side;
+    let size = solid
+        .corners
+        .iter()
+        .flatten()
+        .map(|p| p.distance(solid.center))
+        .fold(0.0, f64::max);
+    let key = |p: DVec3| p.to_array().map(f64::to_bits);
+    let mut around = std::collections::HashMap::<_, Vec<DVec3>>::new();
+    for corners in &solid.corners {
+        corners
+            .iter()
+            .for_each(|p| around.entry(key(*p)).or_default().push(normal(*corners)));
+    }
+    let random = Random::new(9);
+    let [mut outside, mut inside] = [(0, 0); 2];
+    for _ in 0..rays {
+        let corners = solid.triangle(&random);
+        let [a, b, c] = corners;
+        let target = match random.below(3) {
+            0 => a,
+            1 => a.lerp(b, 0.5),
+            _ => a.lerp(b, random.unit()),
+        };
+        let away = DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
+        let origin = (target + away * size * random.pick(&[0.1, 1.0, 10.0])).as_vec3();
+        let direction = (target - origin.as_dvec3()).as_vec3();
+        let faces = [key(a), key(b)].into_iter().flat_map(|corner| &around[&corner]);
+        let d = direction.as_dvec3().normalize();
+        if faces.map(|n| n.dot(d)).all(|cosine| cosine < -0.2) {
+            let hit = closest_hit(scene, Ray { origin, direction }, NOWHERE, NOWHERE);
+            let limit = 1.0 + 1e-4 + 30.0 * solid.rounding / f64::from(direction.length());
+            outside.0 += 1;
+            outside.1 += u32::from(!(f64::from(hit.t) <= limit));
+        }
+        // A quarter of the way through the tube: inside.
+        let middle = (a + b + c) / 3.0;
+        let inwards = -normal(corners);
+        let start = (middle + inwards * 1e-4 * size).as_vec3();
+        let across = closest_hit(
+            scene,
+            Ray {
+                origin: start,
+                direction: inwards.as_vec3(),
+            },
+            NOWHERE,
+            NOWHERE,
+        );
+        if across.t == FAR || f64::from(across.t) < 0.01 * size {
+            continue;
+        }
+        let origin = (middle + inwards * 0.25 * f64::from(across.t)).as_vec3();
+        let direction = (solid.target(&random) - origin.as_dvec3()).as_vec3();
+        let hit = closest_hit(scene, Ray { origin, direction }, NOWHERE, NOWHERE);
+        inside.0 += 1;
+        inside.1 += u32::from(hit.t == FAR || !is_hidden(scene, origin, direction, 1e3));
+    }
+    [outside, inside]
+}
