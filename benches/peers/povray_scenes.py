@@ -9,6 +9,7 @@ mean shadow by the mean shading, `mean(V) * mean(f)`, where wgray takes `mean(V 
 point light for each sample, which is wgray's formula.
 """
 import math
+import struct
 import sys
 
 sys.dont_write_bytecode = True
@@ -40,8 +41,35 @@ def shape(s, ambient):
     if isinstance(s, scenes.Quad):
         corners = [add(s.center, scenes.scaled(s.u, i), scenes.scaled(s.v, j)) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
         s = scenes.Triangles(corners, [(0, 1, 2), (0, 2, 3)], s.material)
+    if isinstance(s, scenes.Mesh):
+        return mesh(s, paint)
     faces = " ".join(f"triangle {{ {', '.join(vec(s.vertices[i]) for i in face)} }}" for face in s.faces)
     return f"mesh {{ {faces} {paint} }}"
+
+
+def mesh(s, paint):
+    """A `mesh2`: flat triangles, as wgray's are where a file has no normals."""
+    vertices, triangles = read_ply(s.file)
+    rows = ", ".join(f"<{x:.9g},{y:.9g},{z:.9g}>" for x, y, z in vertices)
+    faces = ", ".join(f"<{a},{b},{c}>" for a, b, c in triangles)
+    columns = ", ".join(f"{s.to_world[i][j]:.9g}" for j in range(4) for i in range(3))
+    return (f"mesh2 {{ vertex_vectors {{ {len(vertices)}, {rows} }} face_indices {{ {len(triangles)}, {faces} }} "
+            f"matrix <{columns}> {paint} }}")
+
+
+def read_ply(file):
+    """Vertices and triangles of a binary PLY file as examples/make_mesh.rs writes it."""
+    with open(file, "rb") as f:
+        header, _, body = f.read().partition(b"end_header\n")
+    lines = header.decode("ascii").splitlines()
+    if lines[1:2] != ["format binary_little_endian 1.0"] or [line.split()[-1] for line in lines[3:6]] != ["x", "y", "z"]:
+        raise ValueError(f"{file}: must be a binary PLY file of positions and triangles")
+    counts = [int(line.split()[2]) for line in lines if line.startswith("element")]
+    vertices = list(struct.iter_unpack("<3f", body[:12 * counts[0]]))
+    triangles = [row[1:] for row in struct.iter_unpack("<B3i", body[12 * counts[0]:])]
+    if len(triangles) != counts[1]:
+        raise ValueError(f"{file}: has {len(triangles)} triangles; there must be {counts[1]}")
+    return vertices, triangles
 
 
 def light(l, samples, points):

@@ -3,6 +3,7 @@
 `load` takes the part of the format that the benchmark scenes use (docs/scene-format.md) and refuses the rest.
 """
 import math
+import os
 import tomllib
 from dataclasses import dataclass, field
 
@@ -70,6 +71,15 @@ class Plane:
 
 
 @dataclass
+class Mesh:
+    """The triangles of a file, moved by an affine map of three rows of four numbers. `normals`: "smooth", "flat", "file", None."""
+    file: str
+    normals: str | None
+    to_world: list
+    material: Material
+
+
+@dataclass
 class Scene:
     width: int
     height: int
@@ -86,6 +96,43 @@ def quad(row, **more):
     n, t = unit(row["normal"]), row["tangent"]
     t = unit(sub(t, scaled(n, dot(n, t))))
     return Quad(row["center"], scaled(t, row["size"][0] / 2), scaled(cross(n, t), row["size"][1] / 2), **more)
+
+
+def product(a, b):
+    """The affine map that applies b, then a; each is three rows of four numbers."""
+    rows = [*b, [0, 0, 0, 1]]
+    return [[sum(row[k] * rows[k][j] for k in range(4)) for j in range(4)] for row in a]
+
+
+def about(axis, degrees):
+    """Rodrigues' rotation formula."""
+    x, y, z = unit(axis)
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    k = 1 - c
+    return [[c + k * x * x, k * x * y - s * z, k * x * z + s * y, 0],
+            [k * x * y + s * z, c + k * y * y, k * y * z - s * x, 0],
+            [k * x * z - s * y, k * y * z + s * x, c + k * z * z, 0]]
+
+
+UP = {"x": [[0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0]],
+      "y": [[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0]],
+      "z": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}
+
+
+def to_world(row, up):
+    """The map of a mesh: its axis that is up, then scale, rotate, translate, or the matrix in their place."""
+    if "matrix" in row:
+        return product(row["matrix"][:3], UP[up])
+    x, y, z = row["scale"] if isinstance(row.get("scale"), list) else [row.get("scale", 1)] * 3
+    turn = [[x, 0, 0, 0], [0, y, 0, 0], [0, 0, z, 0]]
+    rotate = row.get("rotate", [0, 0, 0])
+    if isinstance(rotate, dict):
+        turn = product(about(rotate["axis"], rotate["degrees"]), turn)
+    else:
+        for axis, degrees in zip(([1, 0, 0], [0, 1, 0], [0, 0, 1]), rotate):
+            turn = product(about(axis, degrees), turn)
+    moved = [[*line[:3], by] for line, by in zip(turn, row.get("translate", [0, 0, 0]))]
+    return product(moved, UP[up])
 
 
 def load(path):
@@ -106,8 +153,20 @@ def load(path):
         if any(not isinstance(term, list) for term in terms):
             raise ValueError(f"{path}: materials.{name}: the peers' colours are plain")
         materials[name] = Material(*terms, row["shininess"])
-    for row in text["shapes"]:
-        material, kind = materials[row["material"]], row["type"]
+    folder = os.path.dirname(os.path.abspath(path))
+
+    def mesh(row, source):
+        if "material" not in row or "materials" in row:
+            raise ValueError(f"{path}: the peers' meshes have one material, `material`")
+        file = os.path.join(folder, source["file"])
+        scene.shapes.append(Mesh(file, source.get("normals"), to_world(row, source.get("up", "z")), materials[row["material"]]))
+
+    for row in text.get("shapes", []):
+        kind = row["type"]
+        if kind == "mesh":
+            mesh(row, row)
+            continue
+        material = materials[row["material"]]
         if kind == "rectangle":
             scene.shapes.append(quad(row, material=material))
         elif kind == "ellipsoid":
@@ -123,6 +182,8 @@ def load(path):
             scene.shapes.append(Plane(row["point"], unit(row["normal"]), material))
         else:
             raise ValueError(f"{path}: no peer has shapes of type {kind!r}")
+    for row in text.get("instances", []):
+        mesh(row, text["meshes"][row["mesh"]])
     for row in text["lights"]:
         if row["type"] != "rectangle":
             raise ValueError(f"{path}: the peers' lights are rectangles, not {row['type']!r}")

