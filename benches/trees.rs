@@ -5,7 +5,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use rayon::prelude::*;
-use wgray::cpu::walk::{Level, Line, Mesh, Nearest, Segments, closest, hidden};
+use wgray::cpu::walk::{Directions, Level, Line, Mesh, Nearest, Segments, closest, hidden};
 use wgray::pack::tree::{Aabb, MOST_IN_LEAF, Tree, build};
 
 /// Triangles, three corners each.
@@ -164,7 +164,7 @@ impl View {
         let segments = Segments {
             o,
             pad: PAD,
-            directions: &directions,
+            directions: &Directions::new(&directions),
             reach: 1.0,
             skip: hit.number,
         };

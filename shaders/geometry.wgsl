@@ -11,13 +11,14 @@ fn closest_hit(ray: Ray, left: vec2u, wall: vec2u) -> Hit {
 }
 
 // Bit i is set where anything hides sample i of the block from a surface. What the surface is of hides none that are above it,
-// unless it is round and seen from inside.
-fn hidden_samples(surface: Surface, light: Light, block: Block) -> u32 {
+// unless it is round and seen from inside. What is hidden or not of the samples whose bits are set in `unlit` does not matter:
+// trees are not asked.
+fn hidden_samples(surface: Surface, light: Light, block: Block, unlit: u32) -> u32 {
     let bits = hidden_by_primitives(surface, light, block);
     if IN_TREE == 0u {
         return bits;
     }
-    return hidden_by_tree(bits, surface, light, block);
+    return hidden_by_tree(bits | unlit, surface, light, block);
 }
 
 // Whether a hit is on a mesh.

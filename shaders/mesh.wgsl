@@ -95,6 +95,9 @@ struct Spot {
     normal_0: vec3f,       // unit normals of the vertices, outwards; 0 where the mesh has none
     normal_1: vec3f,
     normal_2: vec3f,
+    tangents_0: Tangents,  // of the vertices, up to a factor; 0 where the mesh has none
+    tangents_1: Tangents,
+    tangents_2: Tangents,
     anchor: vec3f,         // where the mesh's origin is
     condition: f32,        // by how much its map enlarges what is rounded
 }
@@ -102,7 +105,8 @@ struct Spot {
 // A primitive by itself.
 fn spot_by_itself(q: Primitive) -> Spot {
     let zero = vec3f(0.0);
-    return Spot(q, zero, zero, zero.xy, zero.xy, zero.xy, zero, zero, zero, zero, 0.0);
+    let none = Tangents(zero, zero);
+    return Spot(q, zero, zero, zero.xy, zero.xy, zero.xy, zero, zero, zero, none, none, none, zero, 0.0);
 }
 
 // The triangle as a primitive: local x and y are the barycentric coordinates of its second and third vertex. Edges are the
@@ -130,10 +134,10 @@ fn face_surface(face: Spot, place: vec2u, b: vec2f, d: vec3f, epsilon: f32) -> S
     let size = max(max(largest(position), largest(position - face.anchor)), 0.25 * edge) * max(1.0, 0.125 * face.condition);
     // A little back towards the viewer too: what is met on an edge is then inside of what else has that edge.
     let start = position + (normal - d) * (epsilon * size);
-    let tangents = face_tangents(face);
-    let shading_normal = face_normal(face, b) * side;
-    return Surface(position, normal, shading_normal, -d, start, face_bulge(face, b, side), side, place, place, face_uv(face, b),
-                   tangents.u, tangents.v);
+    let tangents = face_frame(face, b);
+    let smooth_normal = face_normal(face, b) * side;
+    return Surface(position, normal, smooth_normal, smooth_normal, -d, start, face_bulge(face, b, side), side, place, place,
+                   face_uv(face, b), tangents.u, tangents.v);
 }
 
 fn face_uv(face: Spot, b: vec2f) -> vec2f {
@@ -145,8 +149,12 @@ fn face_normal(face: Spot, b: vec2f) -> vec3f {
     let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
     let length2 = dot(n, n);
     let unit = n / sqrt(max(length2, 1e-12));
-    let outward = unit * select(1.0, -1.0, dot(unit, face.primitive.z) < 0.0);
-    return select(face.primitive.z, outward, length2 > 1e-12);
+    return select(face.primitive.z, turned_to(unit, face.primitive.z), length2 > 1e-12);
+}
+
+// A vector or its opposite: files have normals on either side of their triangles.
+fn turned_to(v: vec3f, side: vec3f) -> vec3f {
+    return v * select(1.0, -1.0, dot(v, side) < 0.0);
 }
 
 // From the triangle to the smooth surface that the vertices' normals tell of, where that is above it: shadow rays start there,
@@ -155,9 +163,9 @@ fn face_normal(face: Spot, b: vec2f) -> vec3f {
 fn face_bulge(face: Spot, b: vec2f, side: f32) -> vec3f {
     let p = face.edge_1 * b.x + face.edge_2 * b.y;
     let up = face.primitive.z * side;
-    let lift_0 = lift(face.normal_0 * side, p, up);
-    let lift_1 = lift(face.normal_1 * side, p - face.edge_1, up);
-    let lift_2 = lift(face.normal_2 * side, p - face.edge_2, up);
+    let lift_0 = lift(turned_to(face.normal_0, up), p, up);
+    let lift_1 = lift(turned_to(face.normal_1, up), p - face.edge_1, up);
+    let lift_2 = lift(turned_to(face.normal_2, up), p - face.edge_2, up);
     return lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y;
 }
 
@@ -165,6 +173,16 @@ fn face_bulge(face: Spot, b: vec2f, side: f32) -> vec3f {
 // than 37 degrees off the triangle's, `up`, tells of no surface nearby, as at a cube's corner: what stands there would lose its shadow.
 fn lift(n: vec3f, way: vec3f, up: vec3f) -> vec3f {
     return n * select(0.0, max(-dot(n, way), 0.0), dot(n, up) > 0.8);
+}
+
+// Whether light that comes from the direction of `to` passes the triangle itself on its way to where shadow rays start: from behind
+// it may come past the edges up to a bulge, but not through the triangle.
+fn face_lets_pass(face: Spot, surface: Surface, to: vec3f) -> bool {
+    let fall = -dot(surface.normal, to);
+    let height = dot(surface.normal, surface.bulge);
+    let crossing = surface.position + surface.bulge + to * (height / max(fall, 1e-30));
+    let b = point_to_local(face.primitive, crossing);
+    return (fall <= 0.0) | (b.x < 0.0) | (b.y < 0.0) | (b.x + b.y > 1.0);
 }
 
 // The derivatives of a point by u and by v. Where the vertices' texture coordinates give none, some in the triangle's plane.
@@ -177,6 +195,17 @@ fn face_tangents(face: Spot) -> Tangents {
     let u = (face.edge_1 * b.y - face.edge_2 * a.y) * scale;
     let v = (face.edge_2 * a.x - face.edge_1 * b.x) * scale;
     return Tangents(select(face.edge_1, u, whole), select(cross(face.primitive.z, face.edge_1), v, whole));
+}
+
+// The tangents between the vertices' own, so that they do not jump from a triangle to the next; the triangle's where those are
+// none.
+fn face_frame(face: Spot, b: vec2f) -> Tangents {
+    let a = 1.0 - b.x - b.y;
+    let u = face.tangents_0.u * a + face.tangents_1.u * b.x + face.tangents_2.u * b.y;
+    let v = face.tangents_0.v * a + face.tangents_1.v * b.x + face.tangents_2.v * b.y;
+    let own = face_tangents(face);
+    let between = (largest(u) > 1e-12) & (largest(v) > 1e-12);
+    return Tangents(select(own.u, u, between), select(own.v, v, between));
 }
 
 // Of `face_uv`, where the position has the derivative d.

@@ -4,6 +4,13 @@ fn load_position(i: Instance, vertex: u32) -> vec3f {
     return bitcast<vec3f>(meshes[i.vertices + vertex].xyz);
 }
 
+fn load_tangents(i: Instance, vertex: u32) -> Tangents {
+    let row = i.tangents + 2u * vertex;
+    let u = bitcast<vec3f>(meshes[row].xyz);
+    let v = bitcast<vec3f>(meshes[row + 1u].xyz);
+    return Tangents(vector_from_mesh(i, u), vector_from_mesh(i, v));
+}
+
 fn word_of(row: vec4u, i: u32) -> u32 {
     return select(select(row.x, row.y, i == 1u), select(row.z, row.w, i == 3u), i >= 2u);
 }
@@ -32,8 +39,9 @@ fn face_of(i: Instance, hit: Hit) -> Spot {
     let edge_2 = vector_from_mesh(i, load_position(i, corners.z) - v0);
     let q = face_primitive(i, v0, edge_1, edge_2, group_word(i, hit.slot) & ~NO_SHADOW);
     let zero = vec3f(0.0);
-    var face = Spot(q, edge_1, edge_2, vec2f(0.0), vec2f(1.0, 0.0), vec2f(0.0, 1.0), zero, zero, zero, i.anchor,
-                    i.condition);
+    let none = Tangents(zero, zero);
+    var face = Spot(q, edge_1, edge_2, vec2f(0.0), vec2f(1.0, 0.0), vec2f(0.0, 1.0), zero, zero, zero, none, none, none,
+                    i.anchor, i.condition);
     if i.attributes != NOTHING {
         let row_0 = bitcast<vec4f>(meshes[i.attributes + corners.x]);
         let row_1 = bitcast<vec4f>(meshes[i.attributes + corners.y]);
@@ -45,6 +53,13 @@ fn face_of(i: Instance, hit: Hit) -> Spot {
             face.uv_0 = vec2f(bitcast<f32>(meshes[i.vertices + corners.x].w), row_0.w);
             face.uv_1 = vec2f(bitcast<f32>(meshes[i.vertices + corners.y].w), row_1.w);
             face.uv_2 = vec2f(bitcast<f32>(meshes[i.vertices + corners.z].w), row_2.w);
+        }
+    }
+    if NORMAL_MAPS == 1u {
+        if i.tangents != NOTHING {
+            face.tangents_0 = load_tangents(i, corners.x);
+            face.tangents_1 = load_tangents(i, corners.y);
+            face.tangents_2 = load_tangents(i, corners.z);
         }
     }
     return face;

@@ -22,10 +22,16 @@ fn mirrored_path(path: Path, surface: Surface, at: Arrival, material: Material) 
     return Scattered(onward, onward, false);
 }
 
-// A normal map's normal, if it faces the viewer and reflects to the surface's outer side; else the surface's own.
+// A normal map's normal, if it is usable; else the smooth one, else the surface's own.
 fn usable_normal(surface: Surface, normal: vec3f) -> vec3f {
+    let own = select(surface.normal, surface.smooth_normal, is_usable(surface, surface.smooth_normal));
+    return select(own, normal, is_usable(surface, normal));
+}
+
+// Whether a normal faces the viewer and reflects to the surface's outer side.
+fn is_usable(surface: Surface, normal: vec3f) -> bool {
     let outward = dot(reflected_direction(-surface.wo, normal), surface.normal) > 0.0;
-    return select(surface.normal, normal, outward & (dot(surface.wo, normal) > 0.0));
+    return outward & (dot(surface.wo, normal) > 0.0);
 }
 
 // Both branches at the first bounces; then the one that `random`, in [0, 1), chooses.

@@ -3,7 +3,8 @@
 struct Surface {
     position: vec3f,
     normal: vec3f,         // the primitive's own, unit length, towards the viewer: it says on which side a point lies
-    shading_normal: vec3f, // what light is reflected and refracted by: a normal map's, else the same
+    smooth_normal: vec3f,  // the same, but on a mesh between the normals of the vertices: light that is behind it lights nothing
+    shading_normal: vec3f, // what light is reflected and refracted by: a normal map's, else the smooth one
     wo: vec3f,             // unit vector to the viewer
     start: vec3f,          // where rays that leave it begin: a little above it
     bulge: vec3f,          // from there to where shadow rays begin, on a mesh that stands for a smooth surface
@@ -39,8 +40,8 @@ fn surface_at(q: Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surface {
     let start = position + normal * (epsilon * size);
     let above = vec2u(0u, select(i, NOTHING, round & inside));
     let below = vec2u(0u, select(i, NOTHING, round & !inside));
-    return Surface(position, normal, normal, -ray.direction, start, vec3f(0.0), side, above, below, vec2f(0.0), vec3f(0.0),
-                   vec3f(0.0));
+    return Surface(position, normal, normal, normal, -ray.direction, start, vec3f(0.0), side, above, below, vec2f(0.0),
+                   vec3f(0.0), vec3f(0.0));
 }
 
 // A surface of the primitive q with texture coordinates and their frame.

@@ -9,16 +9,18 @@ struct Walk {
     waiting: array<vec2u, LEVELS>,
 }
 
-fn start_walk(octant: u32) -> Walk {
-    var walk: Walk;
-    walk.octant = octant;
-    walk.depth = 1u;
-    walk.waiting[0] = vec2u(0u, 1u | (256u << octant)); // the root, as the only child
-    return walk;
+// Outside of functions, where they are not set to zero for each ray: that took software Vulkan a fifth of the time.
+var<private> items_walk: Walk;
+var<private> mesh_walk: Walk;
+
+fn start_walk(walk: ptr<private, Walk>, octant: u32) {
+    (*walk).octant = octant;
+    (*walk).depth = 1u;
+    (*walk).waiting[0] = vec2u(0u, 1u | (256u << octant)); // the root, as the only child
 }
 
 // The number, in its tree, of the next node to visit. There is one.
-fn next_node(walk: ptr<function, Walk>) -> u32 {
+fn next_node(walk: ptr<private, Walk>) -> u32 {
     let top = (*walk).depth - 1u;
     let group = (*walk).waiting[top];
     let place = firstTrailingBit(group.y >> 8u);
@@ -30,7 +32,7 @@ fn next_node(walk: ptr<function, Walk>) -> u32 {
 }
 
 // The children of a node wait that are nodes and were passed; returned are those that are leaves.
-fn children_wait(walk: ptr<function, Walk>, node: Node, passed: u32) -> u32 {
+fn children_wait(walk: ptr<private, Walk>, node: Node, passed: u32) -> u32 {
     let inner = node.scales >> 24u;
     let waiting = in_order(passed & inner, (*walk).octant);
     if waiting != 0u {
@@ -49,10 +51,10 @@ fn item_pad(origin: vec3f) -> f32 {
 fn closest_in_tree(before: Hit, ray: Ray, left: vec2u, wall: vec2u) -> Hit {
     var hit = before;
     let s = slabs(ray.origin, ray.direction, item_pad(ray.origin));
-    var walk = start_walk(octant_of(ray.direction));
-    while walk.depth > 0u {
-        let node = load_node(5u * next_node(&walk));
-        var leaves = children_wait(&walk, node, children_passed(node, s, hit.t));
+    start_walk(&items_walk, octant_of(ray.direction));
+    while items_walk.depth > 0u {
+        let node = load_node(5u * next_node(&items_walk));
+        var leaves = children_wait(&items_walk, node, children_passed(node, s, hit.t));
         while leaves != 0u {
             let items = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
@@ -117,10 +119,10 @@ fn closest_of_mesh(before: Hit, number: u32, ray: Ray, start: f32, left: vec2u) 
     let origin = point_to_mesh(i, ray.origin) + direction * start;
     let s = slabs(origin, direction, mesh_pad(i, origin));
     let shear = shear_of(direction);
-    var walk = start_walk(octant_of(direction));
-    while walk.depth > 0u {
-        let node = load_node(i.nodes + 5u * next_node(&walk));
-        var leaves = children_wait(&walk, node, children_passed(node, s, limit_from(start, hit.t)));
+    start_walk(&mesh_walk, octant_of(direction));
+    while mesh_walk.depth > 0u {
+        let node = load_node(i.nodes + 5u * next_node(&mesh_walk));
+        var leaves = children_wait(&mesh_walk, node, children_passed(node, s, limit_from(start, hit.t)));
         while leaves != 0u {
             let triangles = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
@@ -139,6 +141,22 @@ fn closest_of_mesh(before: Hit, number: u32, ray: Ray, start: f32, left: vec2u) 
     return hit;
 }
 
+// Two shadow rays from one point: software Vulkan takes longer to load a node or a triangle than to test it.
+struct Two {
+    direction: array<vec3f, 2>,
+    s: array<Slabs, 2>,
+}
+
+fn two_from(origin: vec3f, first: vec3f, second: vec3f, pad: f32) -> Two {
+    return Two(array(first, second), array(slabs(origin, first, pad), slabs(origin, second, pad)));
+}
+
+// The children of a node whose boxes any of the two passes that are not hidden.
+fn children_passed_by(node: Node, two: Two, hidden: u32, reach: f32) -> u32 {
+    return children_passed(node, two.s[0], select(reach, -1.0, (hidden & 1u) != 0u))
+        | children_passed(node, two.s[1], select(reach, -1.0, (hidden & 2u) != 0u));
+}
+
 // Bit i is set where an item of the tree hides sample i of the block from a surface, or the bit was set before.
 fn hidden_by_tree(before: u32, surface: Surface, light: Light, block: Block) -> u32 {
     let all = select((1u << block.count) - 1u, 0xffffffffu, block.count >= 32u);
@@ -148,10 +166,14 @@ fn hidden_by_tree(before: u32, surface: Surface, light: Light, block: Block) -> 
     // Most often no ray to the light comes near anything.
     let fan = fan_to_light(surface.start, to, pad);
     let some = children_in_fan(load_node(0u), fan, light.reach) != 0u;
-    for (var wanted = select(0u, all & ~bits, some); wanted != 0u; wanted &= wanted - 1u) {
-        let i = firstTrailingBit(wanted);
-        let one = Block(block.pattern, block.side, block.first + i, 1u, block.group, block.key);
-        bits |= select(0u, 1u << i, is_hidden(surface, to, light, one, pad));
+    var wanted = select(0u, all & ~bits, some);
+    while wanted != 0u {
+        let first = firstTrailingBit(wanted);
+        wanted &= wanted - 1u;
+        let second = select(firstTrailingBit(wanted), first, wanted == 0u);
+        wanted &= wanted - 1u;
+        let hidden = hidden_two(surface, to, light, block, vec2u(first, second), pad);
+        bits |= ((hidden & 1u) << first) | ((hidden >> 1u) << second);
     }
     return bits;
 }
@@ -161,78 +183,99 @@ fn fan_to_light(origin: vec3f, to: Segments, pad: f32) -> Fan {
     return fan(origin, to.towards - abs(to.u) - abs(to.v), to.towards + abs(to.u) + abs(to.v), pad);
 }
 
-// Whether an item hides the one sample of a block.
-fn is_hidden(surface: Surface, to: Segments, light: Light, one: Block, pad: f32) -> bool {
-    let direction = segment(to, block_sample(one, 0u));
-    let s = slabs(surface.start, direction, pad);
-    var hidden = false;
-    var walk = start_walk(octant_of(direction));
-    while walk.depth > 0u && !hidden {
-        let node = load_node(5u * next_node(&walk));
-        var leaves = children_wait(&walk, node, children_passed(node, s, light.reach));
-        while leaves != 0u && !hidden {
+// The vectors to two samples of a block.
+fn segments_to_two(to: Segments, block: Block, samples: vec2u) -> array<vec3f, 2> {
+    return array(segment(to, block_sample(block, samples.x)), segment(to, block_sample(block, samples.y)));
+}
+
+// Which of two samples of a block an item hides, as bits 0 and 1.
+fn hidden_two(surface: Surface, to: Segments, light: Light, block: Block, samples: vec2u, pad: f32) -> u32 {
+    let directions = segments_to_two(to, block, samples);
+    let two = two_from(surface.start, directions[0], directions[1], pad);
+    var hidden = 0u;
+    start_walk(&items_walk, octant_of(directions[0]));
+    while items_walk.depth > 0u && hidden != 3u {
+        let node = load_node(5u * next_node(&items_walk));
+        var leaves = children_wait(&items_walk, node, children_passed_by(node, two, hidden, light.reach));
+        while leaves != 0u && hidden != 3u {
             let items = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
             for (var k = 0u; k < items.y; k++) {
                 let item = load_item(items.x + k);
-                let is_near = is_passed(box_passage(item.low, item.high, s), light.reach);
-                hidden |= item_hides(item, is_near & ((item.kind & CASTS_SHADOW) != 0u), surface, light, one);
+                let passing = select(0u, 1u, is_passed(box_passage(item.low, item.high, two.s[0]), light.reach))
+                    | select(0u, 2u, is_passed(box_passage(item.low, item.high, two.s[1]), light.reach));
+                let may = select(0u, passing & ~hidden, (item.kind & CASTS_SHADOW) != 0u);
+                hidden |= hidden_by_item(item, may, surface, light, block, samples);
             }
         }
     }
     return hidden;
 }
 
-// Whether an item hides the one sample of a block, if it may.
-fn item_hides(item: Item, may: bool, surface: Surface, light: Light, one: Block) -> bool {
+// Of the two samples in `may`, those that an item hides.
+fn hidden_by_item(item: Item, may: u32, surface: Surface, light: Light, block: Block, samples: vec2u) -> u32 {
     var bits = 0u;
-    for (var once = has_kind(item, INSTANCE) & may; once; once = false) {
-        bits = select(0u, 1u, mesh_hides(item.index, surface, light, one));
+    for (var once = has_kind(item, INSTANCE) & (may != 0u); once; once = false) {
+        bits = may & hidden_by_mesh(item.index, may, surface, light, block, samples);
     }
     let i = item.index;
     let p = surface.start;
     let is_wall = i == by_itself(surface.below);
-    let other = may & (i != by_itself(surface.above));
-    for (var once = has_kind(item, RECTANGLE) & other; once; once = false) {
-        bits = shadow_bits(RECTANGLE, primitives[i], p, is_wall, light, one);
+    var other = select(may, 0u, i == by_itself(surface.above));
+    if (IN_TREE & ~(1u << INSTANCE)) == 0u {
+        other = 0u;
     }
-    for (var once = has_kind(item, TRIANGLE) & other; once; once = false) {
-        bits = shadow_bits(TRIANGLE, primitives[i], p, is_wall, light, one);
+    for (; other != 0u; other &= other - 1u) {
+        let sample = select(samples.y, samples.x, (other & 1u) != 0u);
+        let one = Block(block.pattern, block.side, block.first + sample, 1u, block.group, block.key);
+        var bit = 0u;
+        for (var once = has_kind(item, RECTANGLE); once; once = false) {
+            bit = shadow_bits(RECTANGLE, primitives[i], p, is_wall, light, one);
+        }
+        for (var once = has_kind(item, TRIANGLE); once; once = false) {
+            bit = shadow_bits(TRIANGLE, primitives[i], p, is_wall, light, one);
+        }
+        for (var once = has_kind(item, ELLIPSOID); once; once = false) {
+            bit = shadow_bits(ELLIPSOID, primitives[i], p, is_wall, light, one);
+        }
+        for (var once = has_kind(item, DISK); once; once = false) {
+            bit = shadow_bits(DISK, primitives[i], p, is_wall, light, one);
+        }
+        bits |= select(0u, other & (~other + 1u), bit != 0u);
     }
-    for (var once = has_kind(item, ELLIPSOID) & other; once; once = false) {
-        bits = shadow_bits(ELLIPSOID, primitives[i], p, is_wall, light, one);
-    }
-    for (var once = has_kind(item, DISK) & other; once; once = false) {
-        bits = shadow_bits(DISK, primitives[i], p, is_wall, light, one);
-    }
-    return bits != 0u;
+    return bits;
 }
 
-// Whether a triangle of instance `number` hides the one sample of a block; not the triangle that the surface is of.
-fn mesh_hides(number: u32, surface: Surface, light: Light, one: Block) -> bool {
+// Of the two samples in `may`, those that a triangle of instance `number` hides; not the triangle that the surface is of.
+fn hidden_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block: Block, samples: vec2u) -> u32 {
     let i = load_instance(number);
     let origin = point_to_mesh(i, surface.start);
     let to = segments_to_light(light, surface.start);
     let to_mesh = Segments(vector_to_mesh(i, to.towards), vector_to_mesh(i, to.u), vector_to_mesh(i, to.v));
-    let direction = segment(to_mesh, block_sample(one, 0u));
-    let s = slabs(origin, direction, mesh_pad(i, origin));
-    let shear = shear_of(direction);
-    var hidden = false;
-    var walk = start_walk(octant_of(direction));
-    while walk.depth > 0u && !hidden {
-        let node = load_node(i.nodes + 5u * next_node(&walk));
-        var leaves = children_wait(&walk, node, children_passed(node, s, light.reach));
-        while leaves != 0u && !hidden {
+    let directions = segments_to_two(to_mesh, block, samples);
+    let two = two_from(origin, directions[0], directions[1], mesh_pad(i, origin));
+    let first_shear = shear_of(directions[0]);
+    let second_shear = shear_of(directions[1]);
+    var hidden = 3u & ~may;
+    start_walk(&mesh_walk, octant_of(directions[0]));
+    while mesh_walk.depth > 0u && hidden != 3u {
+        let node = load_node(i.nodes + 5u * next_node(&mesh_walk));
+        var leaves = children_wait(&mesh_walk, node, children_passed_by(node, two, hidden, light.reach));
+        while leaves != 0u && hidden != 3u {
             let triangles = leaf_items(node, firstTrailingBit(leaves));
             leaves &= leaves - 1u;
             for (var k = 0u; k < triangles.y; k++) {
                 let slot = triangles.x + k;
                 let corners = meshes[i.triangles + slot];
-                let found = triangle_crossing(load_position(i, corners.x), load_position(i, corners.y),
-                                              load_position(i, corners.z), origin, shear, s);
-                let own = (surface.above.x == number + 1u) & (surface.above.y == corners.w);
-                let crosses = found.met & (found.t > 0.0) & (found.t < light.reach);
-                hidden |= crosses & !own & triangle_casts(i, slot);
+                let v0 = load_position(i, corners.x);
+                let v1 = load_position(i, corners.y);
+                let v2 = load_position(i, corners.z);
+                let first = triangle_crossing(v0, v1, v2, origin, first_shear, two.s[0]);
+                let second = triangle_crossing(v0, v1, v2, origin, second_shear, two.s[1]);
+                let crosses = select(0u, 1u, first.met & (first.t > 0.0) & (first.t < light.reach))
+                    | select(0u, 2u, second.met & (second.t > 0.0) & (second.t < light.reach));
+                let own = all(surface.above == vec2u(number + 1u, corners.w));
+                hidden |= select(0u, crosses, !own & triangle_casts(i, slot));
             }
         }
     }

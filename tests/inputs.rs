@@ -10,6 +10,7 @@ use wgray::cpu::light::Segments;
 use wgray::cpu::mesh::{Spot, face_primitive, shear_of};
 use wgray::cpu::path::Path;
 use wgray::cpu::phong::Lobes;
+use wgray::cpu::primitive::Tangents;
 use wgray::cpu::ray::{Hit, Ray};
 use wgray::cpu::shadow::{Block, cone_to_light};
 use wgray::cpu::slab::{fan, slabs};
@@ -196,6 +197,14 @@ impl Face {
         let bent = || (normal + vector(random) * 0.3).normalize().as_vec3();
         let has_normals = !random.once_in(4);
         let [normal_0, normal_1, normal_2] = [(); 3].map(|()| if has_normals { bent() } else { Vec3::ZERO });
+        let has_tangents = random.once_in(2);
+        let [tangents_0, tangents_1, tangents_2] = [(); 3].map(|()| match has_tangents {
+            true => Tangents {
+                u: vector(random).as_vec3(),
+                v: vector(random).as_vec3(),
+            },
+            false => Tangents::default(),
+        });
         let uv = || Vec2::new(random.unit() as f32, random.unit() as f32);
         let uv_0 = uv();
         Spot {
@@ -208,6 +217,9 @@ impl Face {
             normal_0,
             normal_1,
             normal_2,
+            tangents_0,
+            tangents_1,
+            tangents_2,
             anchor: i.anchor,
             condition: i.condition,
         }
@@ -464,6 +476,7 @@ impl Situation {
         Surface {
             position,
             normal,
+            smooth_normal: random.pick(&[normal, vector(random).normalize().as_vec3()]),
             shading_normal: random.pick(&[normal, vector(random).normalize().as_vec3()]),
             wo,
             start: position + normal * 1e-5,

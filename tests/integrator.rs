@@ -34,7 +34,7 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
     for (var i = 0u; i < light_counts().y; i++) {
         let light = load_light(i);
         let block = Block(RANDOM, 1u, 0u, 1u, sample, sample_key(pixel, camera.seed, 1u + light.number));
-        let seen = (hidden_samples(surface, light, block) & 1u) == 0u;
+        let seen = (hidden_samples(surface, light, block, 0u) & 1u) == 0u;
         let to = segment(segments_to_light(light, surface.position), sample_square(RANDOM, 1u, 0u, sample, block.key));
         sum += light.color * select(0.0, abs(dot(normalize(to), surface.normal)), seen);
     }
@@ -68,7 +68,7 @@ fn radiance(scene: &Packed, ray: Ray, pixel: UVec2, sample: u32) -> Vec3 {
             group: sample,
             key,
         };
-        let seen = hidden_samples(scene, &surface, light, block) & 1 == 0;
+        let seen = hidden_samples(scene, &surface, light, block, 0) & 1 == 0;
         let at = sample_square(RANDOM, 1, 0, sample, key);
         let to = segment(segments_to_light(light, surface.position), at);
         let cosine = dot(normalize(to), surface.normal).abs();

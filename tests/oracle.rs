@@ -98,6 +98,8 @@ pub struct Meeting {
     pub shading: DVec3,
     /// From the surface up to the smooth one that a mesh stands for, as seen from outside and from inside.
     bulges: [DVec3; 2],
+    /// Of a mesh's triangle.
+    corners: Option<[DVec3; 3]>,
     solid: usize,
 }
 
@@ -232,6 +234,7 @@ impl<'a> Oracle<'a> {
             uv,
             shading: normal,
             bulges: [DVec3::ZERO; 2],
+            corners: None,
             solid: i,
         })
     }
@@ -256,7 +259,7 @@ impl<'a> Oracle<'a> {
         match &self.scene.materials[material] {
             MaterialDescription::Phong(phong) => {
                 let above = point + offset + meeting.bulges[usize::from(!facing)];
-                self.direct(phong, &meeting, [normal, shading], point, above, -direction)
+                self.direct(phong, &meeting, shading, point, above, -direction)
             }
             _ if bounces == render.max_depth => render.background,
             MaterialDescription::Mirror(mirror) => {
@@ -296,7 +299,7 @@ impl<'a> Oracle<'a> {
         &self,
         phong: &PhongDescription,
         meeting: &Meeting,
-        [normal, shading]: [DVec3; 2],
+        shading: DVec3,
         point: DVec3,
         above: DVec3,
         viewer: DVec3,
@@ -311,11 +314,12 @@ impl<'a> Oracle<'a> {
         for light in &self.scene.lights {
             let samples = self.samples(light, point);
             for (to_light, distance) in &samples {
-                if normal.dot(*to_light) <= 0.0 {
+                // A mesh is lit as the smooth surface that it stands for.
+                if shading.dot(*to_light) <= 0.0 {
                     continue;
                 }
                 let reflected = self.reflected(diffuse, specular, phong.shininess, shading, viewer, *to_light);
-                if self.flaw == Flaw::NoShadows || !self.hidden(above, *to_light, *distance) {
+                if self.flaw == Flaw::NoShadows || !self.hidden(above, *to_light, *distance, meeting.corners) {
                     sum += light_color(light) * reflected / samples.len() as f64;
                 }
             }
@@ -398,8 +402,8 @@ impl<'a> Oracle<'a> {
         }
     }
 
-    /// Whether a shape, not a light, is between a point and a light.
-    fn hidden(&self, from: DVec3, direction: DVec3, distance: f64) -> bool {
+    /// Whether a shape, not a light, is between a point and a light; not the triangle with these corners.
+    fn hidden(&self, from: DVec3, direction: DVec3, distance: f64, own: Option<[DVec3; 3]>) -> bool {
         let end = distance * (1.0 - self.scene.render.shadow_epsilon.max(1e-5));
         let transparent = self.scene.render.shadows == Shadows::Transparent;
         let glass = |name: &String| matches!(self.scene.materials[name], MaterialDescription::Glass(_));
@@ -412,7 +416,7 @@ impl<'a> Oracle<'a> {
         let shapes = self.solids.iter().filter(blocks);
         shapes
             .flat_map(|solid| crossings(&solid.form, from, direction))
-            .any(|(t, _)| t > 0.0 && t < end)
+            .any(|(t, facet)| t > 0.0 && t < end && (own.is_none() || own != facet.map(|facet| facet.corners)))
     }
 }
 
@@ -606,6 +610,7 @@ impl Facet {
             uv,
             shading,
             bulges,
+            corners: Some(self.corners),
             solid: 0,
         }
     }

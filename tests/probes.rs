@@ -20,18 +20,20 @@ use wgray::cpu::math::{
     atan2, cross, dot, exp2, floor, log2, max, min, normalize, positive_zero, power, power_whole, sine,
 };
 use wgray::cpu::mesh::{
-    Crossing, Shear, Spot, face_arrival, face_bulge, face_first_hit, face_footprint, face_normal,
-    face_normal_derivative, face_primitive, face_surface, face_tangents, face_uv, face_uv_derivative, highest, lift,
-    lowest, mesh_pad, normal_from_mesh, permuted, point_to_mesh, shear_of, sheared, spot_by_itself, triangle_crossing,
-    vector_from_mesh, vector_to_mesh,
+    Crossing, Shear, Spot, face_arrival, face_bulge, face_first_hit, face_footprint, face_frame, face_lets_pass,
+    face_normal, face_normal_derivative, face_primitive, face_surface, face_tangents, face_uv, face_uv_derivative,
+    highest, lift, lowest, mesh_pad, normal_from_mesh, permuted, point_to_mesh, shear_of, sheared, spot_by_itself,
+    triangle_crossing, turned_to, vector_from_mesh, vector_to_mesh,
 };
 use wgray::cpu::node::{
     children_in_fan, children_passed, far_side, four_in_fan, four_passed, in_order, larger, leaf_items, octant_of,
     passed_bits, smaller, step_length, steps,
 };
 use wgray::cpu::normal_map::mapped_normal;
-use wgray::cpu::path::{Path, Scattered, glass_path, mirrored_path, reflected_path, refracted_path, usable_normal};
-use wgray::cpu::phong::{Lobes, phong_block, phong_lobes, phong_power};
+use wgray::cpu::path::{
+    Path, Scattered, glass_path, is_usable, mirrored_path, reflected_path, refracted_path, usable_normal,
+};
+use wgray::cpu::phong::{Lobes, is_lit, phong_block, phong_lobes, phong_power, unlit_samples};
 use wgray::cpu::plane::{intersect_plane, plane_blocks};
 use wgray::cpu::primitive::{
     Tangents, blocks, intersect, is_centered, is_round, local_tangents, primitive_gradient, primitive_normal,
@@ -176,6 +178,8 @@ probes! {
     may_block(sphere: &Sphere, cone: &Cone) -> bool;
     phong_lobes(surface: &Surface, material: &Material, to: Vec3, exponent_bits: u32) -> Lobes;
     phong_power(x: f32, material: &Material, exponent_bits: u32) -> f32;
+    is_lit(surface: &Surface, to: Vec3) -> bool;
+    unlit_samples(spot: &Spot, surface: &Surface, to: Segments, block: Block) -> u32;
     phong_block(surface: &Surface, material: &Material, to: Segments, block: Block, hidden: u32, exponent_bits: u32,
                 sum: Lobes) -> Lobes;
     camera_differential(camera: &Camera, at: Vec2, spacing: f32) -> Differential;
@@ -194,6 +198,7 @@ probes! {
     fresnel(cosine_i: f32, cosine_t: f32, eta: f32) -> f32;
     mirrored_path(path: Path, surface: Surface, at: Arrival, material: &Material) -> Scattered;
     usable_normal(surface: Surface, normal: Vec3) -> Vec3;
+    is_usable(surface: Surface, normal: Vec3) -> bool;
     glass_path(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Scattered;
     reflected_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3) -> Path;
     refracted_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3, eta: f32, cosine_i: f32,
@@ -258,12 +263,15 @@ probes! {
     mesh_pad(i: &Instance, origin: Vec3) -> f32;
     spot_by_itself(q: &Primitive) -> Spot;
     face_primitive(i: &Instance, v0: Vec3, edge_1: Vec3, edge_2: Vec3, material: u32) -> Primitive;
+    face_lets_pass(face: &Spot, surface: &Surface, to: Vec3) -> bool;
+    turned_to(v: Vec3, side: Vec3) -> Vec3;
     face_surface(face: &Spot, place: UVec2, b: Vec2, d: Vec3, epsilon: f32) -> Surface;
     face_uv(face: &Spot, b: Vec2) -> Vec2;
     face_normal(face: &Spot, b: Vec2) -> Vec3;
     face_bulge(face: &Spot, b: Vec2, side: f32) -> Vec3;
     lift(n: Vec3, way: Vec3, up: Vec3) -> Vec3;
     face_tangents(face: &Spot) -> Tangents;
+    face_frame(face: &Spot, b: Vec2) -> Tangents;
     face_uv_derivative(face: &Spot, d: Vec3) -> Vec2;
     face_normal_derivative(face: &Spot, b: Vec2, d: Vec3) -> Vec3;
     face_arrival(face: &Spot, b: Vec2, differential: Differential, ray: Ray, t: f32, surface: Surface) -> Arrival;

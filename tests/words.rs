@@ -91,7 +91,7 @@ macro_rules! records {
 records! {
     Ray { origin, direction }
     Hit { t, instance, primitive, slot, barycentric }
-    Surface { position, normal, shading_normal, wo, start, bulge, side, above, below, uv, du, dv }
+    Surface { position, normal, smooth_normal, shading_normal, wo, start, bulge, side, above, below, uv, du, dv }
     Derivative { position, direction }
     Differential { x, y }
     Arrival { x, y, normal_x, normal_y }
@@ -109,7 +109,8 @@ records! {
     Shear { axis, slope, scale }
     Crossing { met, t, barycentric }
     Spot {
-        primitive, edge_1, edge_2, uv_0, uv_1, uv_2, normal_0, normal_1, normal_2, anchor, condition,
+        primitive, edge_1, edge_2, uv_0, uv_1, uv_2, normal_0, normal_1, normal_2, tangents_0, tangents_1,
+        tangents_2, anchor, condition,
     }
 }
 

@@ -89,14 +89,14 @@ fn radiance_from(spot: Spot, hit: Hit, path: Path, pixel: vec2u, sample: u32) ->
     if (LIGHTS & 1u) != 0u {
         for (var i = 0u; i < lights.x; i++) {
             let light = load_light(i);
-            let lobes = lobes_of_light(surface, material, light, LIGHT_PATTERN, LIGHT_SIDE, LIGHT_SAMPLES, pixel, sample);
+            let lobes = lobes_of_light(spot, surface, material, light, LIGHT_PATTERN, LIGHT_SIDE, LIGHT_SAMPLES, pixel, sample);
             sum += phong_radiance(material, light, lobes, environment.light_weight);
         }
     }
     if (LIGHTS & 2u) != 0u {
         for (var i = lights.x; i < lights.y; i++) {
             let light = load_light(i);
-            let lobes = lobes_of_light(surface, material, light, GRID, 1u, 1u, pixel, sample);
+            let lobes = lobes_of_light(spot, surface, material, light, GRID, 1u, 1u, pixel, sample);
             sum += phong_radiance(material, light, lobes, 1.0);
         }
     }
@@ -104,14 +104,18 @@ fn radiance_from(spot: Spot, hit: Hit, path: Path, pixel: vec2u, sample: u32) ->
 }
 
 // Phong's lobes, summed over all samples of a light.
-fn lobes_of_light(surface: Surface, material: Material, light: Light, pattern: u32, side: u32, count: u32,
+fn lobes_of_light(spot: Spot, surface: Surface, material: Material, light: Light, pattern: u32, side: u32, count: u32,
                   pixel: vec2u, sample: u32) -> Lobes {
     let to = segments_to_light(light, surface.position);
     let key = sample_key(pixel, camera.seed, 1u + light.number);
     var lobes = Lobes(0.0, 0.0);
     for (var first = 0u; first < count; first += BLOCK) {
         let block = Block(pattern, side, first, select(BLOCK, count - first, count - first < BLOCK), sample, key);
-        let hidden = hidden_samples(surface, light, block);
+        var unlit = 0u;
+        if IN_TREE != 0u {
+            unlit = unlit_samples(spot, surface, to, block);
+        }
+        let hidden = hidden_samples(surface, light, block, unlit);
         lobes = phong_block(surface, material, to, block, hidden, EXPONENT_BITS, lobes);
     }
     return lobes;

@@ -11,7 +11,7 @@ use wgray::dev::{Diagnostic, Listener, Measured, Report, Session, Settings, Sour
 use wgray::error::RenderError;
 use wgray::gpu::Choice;
 use wgray::image::Output;
-use wgray::scene::{Description, Overrides, SceneError};
+use wgray::scene::{Description, Overrides, Scene, SceneError};
 
 use super::Usage;
 use super::outputs::keep_inputs;
@@ -83,7 +83,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.no_page && args.out.is_none() {
         return Err(Usage("--no-page: --out FILE.png must say where the picture goes".to_string()).into());
     }
-    let out = args.out.as_deref().map(|out| checked(out, &sources)).transpose()?;
+    // Until the session has read the scene, its meshes are kept, and read once.
+    let scene = args
+        .out
+        .as_ref()
+        .and_then(|_| Scene::load_with(&sources.scene, &sources.overrides).ok());
+    let out = (args.out.as_deref()).map(|out| checked(out, &sources, scene.as_ref()));
+    let out = out.transpose()?;
     let listener = if args.no_page {
         None
     } else {
@@ -103,6 +109,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         StartError::NoScene(path, error) => SceneError::Read { path, error }.into(),
         error => anyhow::Error::from(error),
     })?;
+    drop(scene);
     terminal.line("", &what);
     let Some(listener) = listener else {
         Terminal::new().line("", &format!("{}: the picture", args.out.unwrap_or_default().display()));
@@ -123,7 +130,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 /// The file that --out means, behind its links: no file that is watched, nor anything but a PNG file.
-fn checked(out: &Path, sources: &Sources) -> anyhow::Result<PathBuf> {
+fn checked(out: &Path, sources: &Sources, loaded: Option<&Scene>) -> anyhow::Result<PathBuf> {
     let is_png = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
     if !is_png(out) {
         return Err(Usage(format!("--out: {}: must end in .png", out.display())).into());
@@ -136,6 +143,7 @@ fn checked(out: &Path, sources: &Sources) -> anyhow::Result<PathBuf> {
     let described = Description::parse(&text, &sources.scene.display().to_string()).ok();
     let folder = sources.scene.parent().unwrap_or(Path::new(""));
     let named = described.iter().flat_map(|described| described.files(folder));
+    let named = named.chain(loaded.iter().flat_map(|scene| scene.files.iter().cloned()));
     let scene = std::iter::once(sources.scene.clone());
     let inputs: Vec<PathBuf> = scene.chain(named).chain(sources.shader_files()).collect();
     keep_inputs("--out", &output, &inputs, "choose another name")?;

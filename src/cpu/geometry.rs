@@ -10,6 +10,7 @@ use super::mesh::{
     Spot, face_arrival, face_first_hit, face_footprint, face_primitive, face_surface, normal_from_mesh, spot_by_itself,
     vector_from_mesh,
 };
+use super::primitive::Tangents;
 use super::ray::{Hit, Ray, by_itself};
 use super::shadow::Block;
 use super::surface::{Surface, first_hit, surface_at, with_coordinates};
@@ -25,12 +26,12 @@ pub fn closest_hit(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
     closest_in_tree(scene, hit, ray, left, wall)
 }
 
-pub fn hidden_samples(scene: &Packed, surface: &Surface, light: &Light, block: Block) -> u32 {
+pub fn hidden_samples(scene: &Packed, surface: &Surface, light: &Light, block: Block, unlit: u32) -> u32 {
     let bits = hidden_by_primitives(scene, surface, light, block);
     if scene.specialization.in_tree == 0 {
         return bits;
     }
-    hidden_by_tree(scene, bits, surface, light, block)
+    hidden_by_tree(scene, bits | unlit, surface, light, block)
 }
 
 pub fn is_on_mesh(hit: Hit) -> bool {
@@ -70,6 +71,9 @@ fn face_of(scene: &Packed, i: &Instance, hit: Hit) -> Spot {
         normal_0: Vec3::ZERO,
         normal_1: Vec3::ZERO,
         normal_2: Vec3::ZERO,
+        tangents_0: Tangents::default(),
+        tangents_1: Tangents::default(),
+        tangents_2: Tangents::default(),
         anchor: i.anchor,
         condition: i.condition,
     };
@@ -83,6 +87,15 @@ fn face_of(scene: &Packed, i: &Instance, hit: Hit) -> Spot {
             face.uv_1 = Vec2::new(p1.w, n1.w);
             face.uv_2 = Vec2::new(p2.w, n2.w);
         }
+    }
+    if i.tangents != NOTHING {
+        let [t0, t1, t2] = corners.map(|vertex| {
+            let [u, v] = mesh.tangents[vertex].map(|row| vector_from_mesh(i, row.xyz()));
+            Tangents { u, v }
+        });
+        face.tangents_0 = t0;
+        face.tangents_1 = t1;
+        face.tangents_2 = t2;
     }
     face
 }

@@ -6,7 +6,7 @@ use super::differential::{Arrival, Differential, transferred};
 use super::footprint::Footprint;
 use super::math::{cross, dot, max, min, normalize, positive_zero};
 use super::primitive::Tangents;
-use super::ray::{Hit, Ray, vector_to_local};
+use super::ray::{Hit, Ray, point_to_local, vector_to_local};
 use super::slab::{Slabs, box_passage, is_passed};
 use super::surface::{Surface, largest, with_positive_zeros};
 use crate::pack::{FAR, FirstHit, Instance, PAD, Primitive, TRIANGLE};
@@ -121,6 +121,9 @@ pub struct Spot {
     pub normal_0: Vec3,
     pub normal_1: Vec3,
     pub normal_2: Vec3,
+    pub tangents_0: Tangents,
+    pub tangents_1: Tangents,
+    pub tangents_2: Tangents,
     pub anchor: Vec3,
     pub condition: f32,
 }
@@ -136,6 +139,9 @@ pub fn spot_by_itself(q: &Primitive) -> Spot {
         normal_0: Vec3::ZERO,
         normal_1: Vec3::ZERO,
         normal_2: Vec3::ZERO,
+        tangents_0: Tangents::default(),
+        tangents_1: Tangents::default(),
+        tangents_2: Tangents::default(),
         anchor: Vec3::ZERO,
         condition: 0.0,
     }
@@ -179,12 +185,13 @@ pub fn face_surface(face: &Spot, place: UVec2, b: Vec2, d: Vec3, epsilon: f32) -
     let size =
         max(max(largest(position), largest(position - face.anchor)), 0.25 * edge) * max(1.0, 0.125 * face.condition);
     let start = position + (normal - d) * (epsilon * size);
-    let tangents = face_tangents(face);
-    let shading_normal = face_normal(face, b) * side;
+    let tangents = face_frame(face, b);
+    let smooth_normal = face_normal(face, b) * side;
     Surface {
         position,
         normal,
-        shading_normal,
+        smooth_normal,
+        shading_normal: smooth_normal,
         wo: -d,
         start,
         bulge: face_bulge(face, b, side),
@@ -205,21 +212,36 @@ pub fn face_normal(face: &Spot, b: Vec2) -> Vec3 {
     let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;
     let length2 = dot(n, n);
     let unit = n / max(length2, 1e-12).sqrt();
-    let outward = unit * if dot(unit, face.primitive.z) < 0.0 { -1.0 } else { 1.0 };
-    if length2 > 1e-12 { outward } else { face.primitive.z }
+    if length2 > 1e-12 {
+        turned_to(unit, face.primitive.z)
+    } else {
+        face.primitive.z
+    }
+}
+
+pub fn turned_to(v: Vec3, side: Vec3) -> Vec3 {
+    v * if dot(v, side) < 0.0 { -1.0 } else { 1.0 }
 }
 
 pub fn face_bulge(face: &Spot, b: Vec2, side: f32) -> Vec3 {
     let p = face.edge_1 * b.x + face.edge_2 * b.y;
     let up = face.primitive.z * side;
-    let lift_0 = lift(face.normal_0 * side, p, up);
-    let lift_1 = lift(face.normal_1 * side, p - face.edge_1, up);
-    let lift_2 = lift(face.normal_2 * side, p - face.edge_2, up);
+    let lift_0 = lift(turned_to(face.normal_0, up), p, up);
+    let lift_1 = lift(turned_to(face.normal_1, up), p - face.edge_1, up);
+    let lift_2 = lift(turned_to(face.normal_2, up), p - face.edge_2, up);
     lift_0 * (1.0 - b.x - b.y) + lift_1 * b.x + lift_2 * b.y
 }
 
 pub fn lift(n: Vec3, way: Vec3, up: Vec3) -> Vec3 {
     n * if dot(n, up) > 0.8 { max(-dot(n, way), 0.0) } else { 0.0 }
+}
+
+pub fn face_lets_pass(face: &Spot, surface: &Surface, to: Vec3) -> bool {
+    let fall = -dot(surface.normal, to);
+    let height = dot(surface.normal, surface.bulge);
+    let crossing = surface.position + surface.bulge + to * (height / max(fall, 1e-30));
+    let b = point_to_local(&face.primitive, crossing);
+    (fall <= 0.0) | (b.x < 0.0) | (b.y < 0.0) | (b.x + b.y > 1.0)
 }
 
 pub fn face_tangents(face: &Spot) -> Tangents {
@@ -234,6 +256,17 @@ pub fn face_tangents(face: &Spot) -> Tangents {
         u: if whole { u } else { face.edge_1 },
         v: if whole { v } else { cross(face.primitive.z, face.edge_1) },
     }
+}
+
+pub fn face_frame(face: &Spot, b: Vec2) -> Tangents {
+    let a = 1.0 - b.x - b.y;
+    let u = face.tangents_0.u * a + face.tangents_1.u * b.x + face.tangents_2.u * b.y;
+    let v = face.tangents_0.v * a + face.tangents_1.v * b.x + face.tangents_2.v * b.y;
+    let between = (largest(u) > 1e-12) & (largest(v) > 1e-12);
+    if between {
+        return Tangents { u, v };
+    }
+    face_tangents(face)
 }
 
 pub fn face_uv_derivative(face: &Spot, d: Vec3) -> Vec2 {

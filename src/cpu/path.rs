@@ -37,12 +37,18 @@ pub fn mirrored_path(path: Path, surface: Surface, at: Arrival, material: &Mater
 }
 
 pub fn usable_normal(surface: Surface, normal: Vec3) -> Vec3 {
-    let outward = dot(reflected_direction(-surface.wo, normal), surface.normal) > 0.0;
-    if outward & (dot(surface.wo, normal) > 0.0) {
+    if is_usable(surface, normal) {
         normal
+    } else if is_usable(surface, surface.smooth_normal) {
+        surface.smooth_normal
     } else {
         surface.normal
     }
+}
+
+pub fn is_usable(surface: Surface, normal: Vec3) -> bool {
+    let outward = dot(reflected_direction(-surface.wo, normal), surface.normal) > 0.0;
+    outward & (dot(surface.wo, normal) > 0.0)
 }
 
 pub fn glass_path(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Scattered {
@@ -124,5 +130,39 @@ pub fn refracted_path(
         branch: path.branch,
         left: surface.below,
         wall: surface.above,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cpu::math::normalize;
+    use crate::pack::NOWHERE;
+
+    #[test]
+    fn what_cannot_be_reflected_by_falls_back_to_the_smooth_normal() {
+        let zero = Vec3::ZERO;
+        let smooth_normal = normalize(Vec3::new(0.1, 0.0, 1.0));
+        let surface = |x: f32| Surface {
+            position: zero,
+            normal: Vec3::Z,
+            smooth_normal,
+            shading_normal: smooth_normal,
+            wo: normalize(Vec3::new(x, 0.0, 1.0)),
+            start: zero,
+            bulge: zero,
+            side: 1.0,
+            above: NOWHERE,
+            below: NOWHERE,
+            uv: zero.truncate(),
+            du: zero,
+            dv: zero,
+        };
+        let leaning = normalize(Vec3::new(1.0, 0.0, 1.0));
+        // Seen from above, what leans by 45 degrees reflects along the triangle's plane or below; from its side it is usable.
+        assert_eq!(usable_normal(surface(-0.1), leaning), smooth_normal);
+        assert_eq!(usable_normal(surface(0.5), leaning), leaning);
+        // Grazing, the smooth one would reflect into the triangle too.
+        assert_eq!(usable_normal(surface(-8.0), leaning), Vec3::Z);
     }
 }

@@ -2,9 +2,12 @@
 
 use glam::Vec3;
 
-use super::light::{Segments, segment};
+use super::light::Segments;
+use super::lobes::{lit_bits, lobes_of_all};
 use super::math::{dot, max, power, power_whole};
-use super::shadow::{Block, block_sample};
+use super::mesh::{Spot, face_lets_pass};
+use super::samples::{LEVEL, Samples};
+use super::shadow::Block;
 use super::surface::Surface;
 use crate::pack::Material;
 
@@ -21,11 +24,32 @@ pub fn phong_lobes(surface: &Surface, material: &Material, to: Vec3, exponent_bi
     let n_v = dot(surface.shading_normal, surface.wo);
     let r_v = (2.0 * n_l * n_v - dot(surface.wo, to)) * inverse_length;
     let r_v_power = phong_power(max(r_v, 0.0), material, exponent_bits);
-    let lit = (n_l > 0.0) & (dot(surface.normal, to) > 0.0);
+    let lit = is_lit(surface, to);
     Lobes {
         diffuse: if lit { n_l * inverse_length } else { 0.0 },
         specular: if lit { r_v_power } else { 0.0 },
     }
+}
+
+#[inline]
+pub fn is_lit(surface: &Surface, to: Vec3) -> bool {
+    (dot(surface.shading_normal, to) > 0.0) & (dot(surface.smooth_normal, to) > 0.0)
+}
+
+pub fn unlit_samples(spot: &Spot, surface: &Surface, to: Segments, block: Block) -> u32 {
+    let to = Samples::of(block).segments(*LEVEL, to);
+    let lit = lit_bits(*LEVEL, surface, &to);
+    let mut bits = to.all() & !lit;
+    if surface.smooth_normal != surface.normal {
+        for i in (0..to.count).filter(|i| (lit >> i) & 1 == 1) {
+            bits |= if face_lets_pass(spot, surface, to.get(i)) {
+                0
+            } else {
+                1 << i
+            };
+        }
+    }
+    bits
 }
 
 #[inline]
@@ -45,12 +69,13 @@ pub fn phong_block(
     exponent_bits: u32,
     sum: Lobes,
 ) -> Lobes {
+    let to = Samples::of(block).segments(*LEVEL, to);
+    let all = lobes_of_all(*LEVEL, surface, material, &to, exponent_bits);
     let mut lobes = sum;
-    for i in 0..block.count {
-        let sample = phong_lobes(surface, material, segment(to, block_sample(block, i)), exponent_bits);
+    for (i, (diffuse, specular)) in all[0].iter().zip(&all[1]).enumerate().take(to.count) {
         let visible = (hidden >> i) & 1 == 0;
-        lobes.diffuse += if visible { sample.diffuse } else { 0.0 };
-        lobes.specular += if visible { sample.specular } else { 0.0 };
+        lobes.diffuse += if visible { *diffuse } else { 0.0 };
+        lobes.specular += if visible { *specular } else { 0.0 };
     }
     lobes
 }

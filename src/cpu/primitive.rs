@@ -90,7 +90,7 @@ pub fn uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2 {
     Vec2::new(d.x, d.y)
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tangents {
     pub u: Vec3,
     pub v: Vec3,

@@ -3,10 +3,11 @@
 use glam::{UVec2, Vec2, Vec3};
 
 use super::ellipsoid::ellipsoid_level;
-use super::light::{Segments, segment, segments_to_light, segments_to_local};
+use super::light::{Segments, segments_to_light, segments_to_local};
 use super::math::dot;
 use super::primitive::blocks;
 use super::ray::vector_to_local;
+use super::samples::{LEVEL, Samples};
 use super::sampling::sample_square;
 use crate::pack::{Light, Primitive, Sphere};
 
@@ -25,11 +26,10 @@ pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light,
     let from_anchor = vector_to_local(q, p - q.anchor);
     let o = from_anchor - q.middle;
     let start = if wall { -1e-30 } else { ellipsoid_level(q, from_anchor) };
-    let to = segments_to_local(q, segments_to_light(light, p));
+    let to = Samples::of(block).segments(*LEVEL, segments_to_local(q, segments_to_light(light, p)));
     let mut bits = 0;
-    for i in 0..block.count {
-        let d = segment(to, block_sample(block, i));
-        bits |= if blocks(kind, o, d, start, light.reach) {
+    for i in 0..to.count {
+        bits |= if blocks(kind, o, to.get(i), start, light.reach) {
             1 << i
         } else {
             0

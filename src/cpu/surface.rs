@@ -12,6 +12,7 @@ use crate::pack::{FirstHit, NOTHING, Primitive};
 pub struct Surface {
     pub position: Vec3,
     pub normal: Vec3,
+    pub smooth_normal: Vec3,
     pub shading_normal: Vec3,
     pub wo: Vec3,
     pub start: Vec3,
@@ -49,6 +50,7 @@ pub fn surface_at(q: &Primitive, i: u32, ray: Ray, t: f32, epsilon: f32) -> Surf
     Surface {
         position,
         normal,
+        smooth_normal: normal,
         shading_normal: normal,
         wo: -ray.direction,
         start: position + normal * (epsilon * size),

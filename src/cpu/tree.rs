@@ -1,29 +1,24 @@
 //! The trees: what `shaders/tree.wgsl` finds, by walks of their own (`walk`).
 
-use std::sync::LazyLock;
-
 use bytemuck::cast_slice;
-use fearless_simd::Level;
-use glam::{UVec2, Vec2, Vec3, Vec4Swizzles as _};
+use glam::{UVec2, Vec3, Vec4Swizzles as _};
 
 use super::geometry::triangle_casts;
-use super::light::{Segments, segment, segments_to_light};
+use super::light::{Segments, segments_to_light};
 use super::math::max;
 use super::mesh::{Crossing, mesh_pad, point_to_mesh, shear_of, triangle_crossing, vector_to_mesh};
 use super::primitive::intersect;
 use super::ray::{Hit, Ray, by_itself, nearer_hit, no_hit};
-use super::shadow::{Block, block_sample, shadow_bits};
+use super::samples::{LEVEL, Samples};
+use super::shadow::{Block, shadow_bits};
 use super::slab::{Slabs, box_passage, is_passed, slabs};
 use super::surface::{Surface, largest};
 use super::walk::{self, Line, Nearest};
-use crate::pack::tree::Node;
+use crate::pack::tree::{Aabb, Node};
 use crate::pack::{
-    BLOCK, CASTS_SHADOW, DISK, ELLIPSOID, FAR, INSTANCE, Instance, Item, Light, NOTHING, Packed, PackedMesh, RECTANGLE,
+    CASTS_SHADOW, DISK, ELLIPSOID, FAR, INSTANCE, Instance, Item, Light, NOTHING, Packed, PackedMesh, RECTANGLE,
     SOME_SHADOWS, TRIANGLE,
 };
-
-/// The instructions that this processor has for several numbers at once.
-static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);
 
 fn item_pad(scene: &Packed, origin: Vec3) -> f32 {
     scene.counts.room.x * (largest(origin) + scene.counts.room.y)
@@ -115,23 +110,10 @@ fn corners(mesh: &PackedMesh, slot: usize) -> [Vec3; 3] {
 /// The shadow rays from a surface to a block of a light's samples.
 struct Rays<'a> {
     surface: &'a Surface,
-    to: Segments,
-    reach: f32,
-    /// The samples on the unit square.
-    samples: [Vec2; BLOCK as usize],
     light: &'a Light,
     block: Block,
-}
-
-impl Rays<'_> {
-    /// The vectors to those samples that are wanted, by vectors to the light in the world or in a mesh's space.
-    fn directions(&self, to: Segments, wanted: u32) -> [Vec3; BLOCK as usize] {
-        let mut directions = [Vec3::ZERO; BLOCK as usize];
-        for i in bits_of(wanted) {
-            directions[i as usize] = segment(to, self.samples[i as usize]);
-        }
-        directions
-    }
+    to: Segments,
+    samples: Samples,
 }
 
 /// The numbers of the bits that are set.
@@ -147,47 +129,36 @@ fn bits_of(mut bits: u32) -> impl Iterator<Item = u32> {
 pub fn hidden_by_tree(scene: &Packed, before: u32, surface: &Surface, light: &Light, block: Block) -> u32 {
     let all = u32::MAX >> (32 - block.count);
     let wanted = all & !before;
-    let mut rays = Rays {
+    if wanted == 0 {
+        return all;
+    }
+    let rays = Rays {
         surface,
-        to: segments_to_light(light, surface.start),
-        reach: light.reach,
-        samples: [Vec2::ZERO; BLOCK as usize],
         light,
         block,
+        to: segments_to_light(light, surface.start),
+        samples: Samples::of(block),
     };
-    for i in bits_of(wanted) {
-        rays.samples[i as usize] = block_sample(block, i);
-    }
-    let directions = rays.directions(rays.to, wanted);
-    let pad = item_pad(scene, surface.start);
     let segments = walk::Segments {
         o: surface.start,
-        pad,
-        directions: &directions[..block.count as usize],
+        pad: item_pad(scene, surface.start),
+        directions: &rays.samples.segments(*LEVEL, rays.to),
         reach: light.reach,
         skip: NOTHING,
     };
-    let nodes: &[Node] = cast_slice(&scene.nodes);
-    let hidden = walk::hidden_leaves(*LEVEL, nodes, &segments, wanted, |items, passing| {
-        let casting = scene.items[items].iter().filter(|item| item.kind & CASTS_SHADOW != 0);
-        casting.fold(0, |hidden, item| {
-            let passing = passing & !hidden;
-            let passing = bits_of(passing).filter(|i| {
-                let s = slabs(surface.start, directions[*i as usize], pad);
-                is_passed(box_passage(item.low, item.high, s), light.reach)
-            });
-            let passing = passing.fold(0, |bits, i| bits | 1 << i);
-            hidden | hidden_by_item(scene, item, passing, &rays)
-        })
-    });
-    (before & all) | hidden
+    let bounds = |i: usize| {
+        let Item { low, high, kind, .. } = scene.items[i];
+        (kind & CASTS_SHADOW != 0).then_some(Aabb { low, high })
+    };
+    let visit = |i: usize, passing| hidden_by_item(scene, &scene.items[i], passing, &rays);
+    (before & all) | walk::hidden_items(*LEVEL, cast_slice(&scene.nodes), &segments, wanted, bounds, visit)
 }
 
 /// Of the samples in `wanted`, those that an item hides.
 fn hidden_by_item(scene: &Packed, item: &Item, wanted: u32, rays: &Rays) -> u32 {
     let i = item.index;
     let kind = item.kind & 0xff;
-    if wanted == 0 || (kind != INSTANCE && i == by_itself(rays.surface.above)) {
+    if kind != INSTANCE && i == by_itself(rays.surface.above) {
         return 0;
     }
     let is_wall = i == by_itself(rays.surface.below);
@@ -215,13 +186,12 @@ fn hidden_by_mesh(scene: &Packed, number: u32, wanted: u32, rays: &Rays) -> u32 
         u: vector_to_mesh(i, rays.to.u),
         v: vector_to_mesh(i, rays.to.v),
     };
-    let pad = mesh_pad(i, origin);
     let own = rays.surface.above;
     let segments = walk::Segments {
         o: origin,
-        pad,
-        directions: &rays.directions(to, wanted)[..rays.block.count as usize],
-        reach: rays.reach,
+        pad: mesh_pad(i, origin),
+        directions: &rays.samples.segments(*LEVEL, to),
+        reach: rays.light.reach,
         skip: if own.x == number + 1 { own.y } else { NOTHING },
     };
     if i.shadows == SOME_SHADOWS {
@@ -232,22 +202,28 @@ fn hidden_by_mesh(scene: &Packed, number: u32, wanted: u32, rays: &Rays) -> u32 
 
 /// [`walk::hidden`] where some groups of a mesh cast no shadow.
 fn hidden_by_groups(scene: &Packed, i: &Instance, mesh: &PackedMesh, segments: &walk::Segments, wanted: u32) -> u32 {
-    walk::hidden_leaves(*LEVEL, cast_slice(&mesh.nodes), segments, wanted, |slots, passing| {
-        let mut hidden = 0;
-        for slot in slots {
-            if mesh.triangles[slot].w == segments.skip || !triangle_casts(scene, i, slot as u32) {
-                continue;
-            }
+    let bounds = |slot: usize| {
+        let casts = mesh.triangles[slot].w != segments.skip && triangle_casts(scene, i, slot as u32);
+        casts.then(|| Aabb::around(&corners(mesh, slot)))
+    };
+    walk::hidden_items(
+        *LEVEL,
+        cast_slice(&mesh.nodes),
+        segments,
+        wanted,
+        bounds,
+        |slot, passing| {
             let [v0, v1, v2] = corners(mesh, slot);
-            for sample in bits_of(passing & !hidden) {
-                let d = segments.directions[sample as usize];
+            let mut hidden = 0;
+            for sample in bits_of(passing) {
+                let d = segments.directions.get(sample as usize);
                 let s = slabs(segments.o, d, segments.pad);
                 let found = triangle_crossing(v0, v1, v2, segments.o, shear_of(d), s);
                 if found.met & (found.t > 0.0) & (found.t < segments.reach) {
                     hidden |= 1 << sample;
                 }
             }
-        }
-        hidden
-    })
+            hidden
+        },
+    )
 }

@@ -1,5 +1,6 @@
 //! The files that a session renders: read as they are now, whatever happened to them.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -26,8 +27,6 @@ pub struct Sources {
 pub struct Loaded {
     /// The camera as the file describes it.
     pub camera: CameraDescription,
-    /// Names of the materials, in the order of their numbers.
-    pub materials: Vec<String>,
     /// The scene.
     pub scene: Scene,
     /// What the backends read.
@@ -120,15 +119,22 @@ impl Sources {
         if let Ok(described) = &described {
             files.extend(self.assets(described).map(|path| (path.clone(), self.stamp(&path))));
         }
-        let scene = Scene::load_with(&self.scene, &self.overrides).and_then(|scene| Ok((scene, described?)));
+        let mut named = BTreeSet::new();
+        let scene = Scene::load_and_list(&self.scene, &self.overrides, &mut named);
+        // What the files themselves name is known now.
+        for path in named {
+            if files.iter().all(|(known, _)| *known != path) {
+                let stamp = self.stamp(&path);
+                files.push((path, stamp));
+            }
+        }
+        let scene = scene.and_then(|scene| Ok((scene, described?)));
         let scene = scene
             .map_err(|error| Diagnostic::scene(&error, &text))
             .map(|(scene, described)| {
                 let packed = pack(&scene);
-                let materials = described.materials.into_keys().collect();
                 Arc::new(Loaded {
                     camera: described.camera,
-                    materials,
                     scene,
                     packed,
                 })

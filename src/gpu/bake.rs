@@ -137,13 +137,14 @@ pub fn node_rows(packed: &Packed) -> Vec<UVec4> {
     out
 }
 
-/// The rows of a scene's meshes: of each the triangles, the vertices, their attributes, and the triangles' groups.
+/// The rows of a scene's meshes: of each the triangles, the vertices, their attributes and tangents, and the triangles' groups.
 pub fn mesh_rows(packed: &Packed) -> Vec<UVec4> {
     let mut out = Vec::new();
     for mesh in &packed.meshes {
         out.extend(&mesh.triangles);
         out.extend(cast_slice::<_, UVec4>(&mesh.vertices));
         out.extend(cast_slice::<_, UVec4>(&mesh.attributes));
+        out.extend(cast_slice::<_, UVec4>(&mesh.tangents));
         out.extend(in_rows(&mesh.groups));
     }
     out
@@ -160,7 +161,7 @@ pub fn node_rows_count(packed: &Packed) -> usize {
 /// How many rows [`mesh_rows`] has.
 pub fn mesh_rows_count(packed: &Packed) -> usize {
     let rows = packed.meshes.iter().map(|mesh| {
-        let of_vertices = mesh.vertices.len() + mesh.attributes.len();
+        let of_vertices = mesh.vertices.len() + mesh.attributes.len() + 2 * mesh.tangents.len();
         mesh.triangles.len() + of_vertices + mesh.groups.len().div_ceil(4)
     });
     rows.sum()

@@ -40,6 +40,11 @@ impl Draft {
     }
 }
 
+/// A number of things for a note: as one thing is told, or as several are.
+pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { several })
+}
+
 /// A polygon's triangles: a fan from its first vertex.
 #[derive(Default)]
 pub(super) struct Fan {

@@ -4,7 +4,7 @@ use glam::{DVec3, DVec4, Vec3};
 use rayon::prelude::*;
 use robust::{Coord, orient2d};
 
-use super::draft::Draft;
+use super::draft::{Draft, counted};
 use super::error::{Fault, Place};
 use super::neighbours::Neighbours;
 use super::{MOST, Mesh, Normals};
@@ -38,22 +38,29 @@ pub(super) fn finish(draft: Draft, normals: Option<Normals>) -> Result<Mesh, Fau
         return Err(Place::File.fault(format!("has no triangles but {dropped} without an area")));
     }
     if dropped > 0 {
-        mesh.notes.push(format!("{dropped} degenerate triangles dropped"));
+        let (one, several) = ("degenerate triangle dropped", "degenerate triangles dropped");
+        mesh.notes.push(counted(dropped, one, several));
     }
 
     // For a million triangles this and the edges take 0.05 s, a third of the load of a binary PLY file.
-    let neighbours = Neighbours::of(&mesh.positions, &mesh.triangles);
-    let edges = neighbours.edges(&mesh.triangles);
+    let mut neighbours = Neighbours::of(&mesh.positions, &mesh.triangles);
+    let edges = neighbours.edges(&mesh.triangles, &mesh.group_of);
+    if !edges.repeated.is_empty() {
+        drop_repeated(&mut mesh, &edges.repeated);
+        neighbours = Neighbours::of(&mesh.positions, &mesh.triangles);
+    }
     if edges.crowded > 0 {
-        let count = edges.crowded;
-        mesh.notes.push(format!(
-            "{count} edges belong to more than two triangles (non-manifold)"
+        mesh.notes.push(counted(
+            edges.crowded,
+            "edge belongs to more than two triangles (non-manifold)",
+            "edges belong to more than two triangles (non-manifold)",
         ));
     }
     if edges.turned > 0 {
-        let count = edges.turned;
-        mesh.notes.push(format!(
-            "{count} edges are passed in the same direction by both triangles (windings differ)"
+        mesh.notes.push(counted(
+            edges.turned,
+            "edge is passed in the same direction by both triangles (windings differ)",
+            "edges are passed in the same direction by both triangles (windings differ)",
         ));
     }
     match normals {
@@ -65,8 +72,10 @@ pub(super) fn finish(draft: Draft, normals: Option<Normals>) -> Result<Mesh, Fau
         Some(Normals::File) | None => {
             let missing = mesh.normals.iter().filter(|normal| **normal == Vec3::ZERO).count();
             if missing > 0 {
-                mesh.notes.push(format!(
-                    "{missing} vertices have no normal, or one that is zero or not finite; they get those of their triangles"
+                mesh.notes.push(counted(
+                    missing,
+                    "vertex has no normal, or one that is zero or not finite; it gets that of its triangles",
+                    "vertices have no normal, or one that is zero or not finite; they get those of their triangles",
                 ));
             }
         }
@@ -159,6 +168,19 @@ fn drop_degenerate(mesh: &mut Mesh) {
         keep(&mut mesh.triangles, &marks);
         keep(&mut mesh.group_of, &marks);
     }
+}
+
+/// Drops triangles that are there again: nothing is seen of them, and no box of a tree keeps them apart.
+fn drop_repeated(mesh: &mut Mesh, repeated: &[u32]) {
+    let mut marks = vec![true; mesh.triangles.len()];
+    for triangle in repeated {
+        marks[*triangle as usize] = false;
+    }
+    keep(&mut mesh.triangles, &marks);
+    keep(&mut mesh.group_of, &marks);
+    drop_unused(mesh);
+    let (one, several) = ("duplicate triangle dropped", "duplicate triangles dropped");
+    mesh.notes.push(counted(repeated.len(), one, several));
 }
 
 /// Normals of the vertices by the triangles around, weighted by their angles: Thürmer and Wüthrich, "Computing Vertex

@@ -11,6 +11,7 @@ mod neighbours;
 mod obj;
 mod ply;
 mod stl;
+mod tangents;
 mod words;
 
 use std::fs;
@@ -24,6 +25,7 @@ use serde::{Deserialize, Serialize};
 use self::cache::Cache;
 pub use self::error::MeshError;
 use self::error::{Fault, Place, shown};
+pub(crate) use self::tangents::VertexTangents;
 use crate::pack::PackedMesh;
 use crate::pack::tree::Aabb;
 
@@ -55,13 +57,15 @@ pub struct Mesh {
     pub groups: Vec<Group>,
     /// Each triangle's group; empty if there is one group alone.
     pub group_of: Vec<u32>,
-    /// The materials that come with the file, for groups to name. What a mesh looks like is the scene's to say; nothing else
-    /// takes them from here.
-    pub library: Vec<MtlMaterial>,
+    /// The files of materials that come with the file, for groups to name. They are what the groups look like where a scene
+    /// says nothing else.
+    pub libraries: Vec<Library>,
     /// What is odd about the file, and how it was dealt with, for a user to read: `12 degenerate triangles dropped`.
     pub notes: Vec<String>,
     /// The mesh as it is rendered, once that was asked for.
     packed: Cache<PackedMesh>,
+    /// The same with tangents for normal maps, once that was asked for.
+    packed_with_tangents: Cache<PackedMesh>,
     /// The box around its vertices, once that was asked for.
     bounds: Cache<Aabb>,
 }
@@ -76,12 +80,26 @@ pub struct Group {
     pub material: Option<String>,
 }
 
+/// A file of materials that an OBJ file names: an MTL file.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Library {
+    /// The file, in the folder of the mesh, whether or not it can be read.
+    pub file: PathBuf,
+    /// Its materials, in their order.
+    pub materials: Vec<MtlMaterial>,
+    /// Why it is not read, if it is not.
+    pub problem: Option<String>,
+}
+
 /// A material of an MTL file, as the file has it: what is not there is None.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct MtlMaterial {
     /// Its name: `newmtl`.
     pub name: String,
+    /// The line of its name, counted from 1.
+    pub line: usize,
     /// The diffuse reflectance: `Kd`.
     pub diffuse: Option<[f64; 3]>,
     /// The specular reflectance: `Ks`.
@@ -98,6 +116,8 @@ pub struct MtlMaterial {
     pub illumination: Option<u8>,
     /// The file of the diffuse reflectance, without options: `map_Kd`.
     pub diffuse_map: Option<String>,
+    /// What is not here of its look, by keywords: other maps, and options of `map_Kd`.
+    pub others: Vec<&'static str>,
 }
 
 /// Which normals a mesh has: what its surface looks like under light, not where it is.
@@ -127,7 +147,7 @@ impl Mesh {
     /// - STL files have a vertex for each different position, and a group for each `solid`. Normals of facets are looked at
     ///   for [`Normals::File`] alone, and then tell vertices apart.
     ///
-    /// What is odd but no error is in [`Mesh::notes`], and is told as a warning by `tracing`, with the file.
+    /// What is odd but no error is in [`Mesh::notes`].
     pub fn load(path: &Path, normals: Option<Normals>) -> Result<Mesh, MeshError> {
         let _span = tracing::debug_span!("mesh", path = %path.display()).entered();
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
@@ -156,9 +176,6 @@ impl Mesh {
         for names in libraries {
             mesh.load_libraries(path, &names);
         }
-        for note in &mesh.notes {
-            tracing::warn!("{}: {note}", path.display());
-        }
         Ok(mesh)
     }
 
@@ -168,7 +185,7 @@ impl Mesh {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),
         };
-        if folder.join(names).exists() {
+        if file_beside(folder, names).is_file() {
             self.load_library(folder, names);
         } else {
             let names = names.split(' ').take(obj::MOST_LIBRARIES);
@@ -178,13 +195,18 @@ impl Mesh {
 
     /// Reads a file of materials. There is a note if that cannot be done.
     fn load_library(&mut self, folder: &Path, name: &str) {
-        match library(folder, name) {
+        let mut library = Library {
+            file: file_beside(folder, name),
+            ..Library::default()
+        };
+        match read_library(folder, &library.file) {
             Ok(bytes) => {
                 let (materials, problems) = mtl::read(&bytes);
-                self.library.extend(materials);
+                library.materials = materials;
                 if let Some(problem) = problems.first() {
                     let others = match problems.len() - 1 {
                         0 => String::new(),
+                        1 => "; 1 more line cannot be read".to_owned(),
                         count => format!("; {count} more lines cannot be read"),
                     };
                     self.notes.push(format!("{name}:{problem}{others}"));
@@ -194,15 +216,24 @@ impl Mesh {
                 let name = shown(name.as_bytes());
                 self.notes
                     .push(format!("the file of materials {name} is not read: {why}"));
+                library.problem = Some(why);
             }
         }
+        self.libraries.push(library);
     }
 }
 
 impl Mesh {
-    /// The mesh as it is rendered, with its tree. It is built when that is first asked for.
-    pub(crate) fn packed(&self) -> Arc<PackedMesh> {
-        self.packed.get_or_init(|| PackedMesh::of(self))
+    /// The mesh as it is rendered, with its tree; and with tangents, if it may have any, for normal maps. It is built when
+    /// that is first asked for.
+    pub(crate) fn packed(&self, with_tangents: bool) -> Arc<PackedMesh> {
+        let tangents = || VertexTangents::of(self).unwrap_or_default();
+        match with_tangents && !self.uvs.is_empty() && !self.normals.is_empty() {
+            true => self
+                .packed_with_tangents
+                .get_or_init(|| PackedMesh::of(self, Some(tangents()))),
+            false => self.packed.get_or_init(|| PackedMesh::of(self, None)),
+        }
     }
 
     /// The corners of its box, in the file's coordinates.
@@ -253,9 +284,9 @@ fn read_file(path: &Path, largest: u64) -> io::Result<Option<Vec<u8>>> {
 }
 
 /// The bytes of a file of materials; or why there are none.
-fn library(folder: &Path, name: &str) -> Result<Vec<u8>, String> {
+fn read_library(folder: &Path, file: &Path) -> Result<Vec<u8>, String> {
     let told = |error: io::Error| error.to_string();
-    let path: PathBuf = folder.join(name).canonicalize().map_err(told)?;
+    let path = file.canonicalize().map_err(told)?;
     if !path.starts_with(folder.canonicalize().map_err(told)?) {
         return Err("it must be in the folder of the mesh".to_string());
     }
@@ -263,4 +294,14 @@ fn library(folder: &Path, name: &str) -> Result<Vec<u8>, String> {
         Some(bytes) => Ok(bytes),
         None => Err(format!("it must not be larger than {} MiB", LARGEST_LIBRARY >> 20)),
     }
+}
+
+/// A file that another one in a folder names. Where there is none, as by a path on somebody else's machine, the file of that name
+/// in the folder itself, if it is there.
+pub(crate) fn file_beside(folder: &Path, name: &str) -> PathBuf {
+    let slashes = name.replace('\\', "/"); // written on Windows
+    let last = slashes.rsplit('/').next().unwrap_or(&slashes);
+    let tried = [name, &slashes, last].map(|name| folder.join(name));
+    let [_, plain, _] = &tried;
+    tried.iter().find(|path| path.is_file()).unwrap_or(plain).clone()
 }

@@ -1,5 +1,5 @@
-//! The materials that an OBJ file names: MTL files. What a mesh looks like is the scene's to say, so a line that cannot be
-//! read is told and left out.
+//! The materials that an OBJ file names: MTL files, as of Wavefront's "Advanced Visualizer Manual", 1995. A line that cannot
+//! be read is told and left out. Keywords may have any case, as those of many exporters have.
 
 use super::MtlMaterial;
 use super::words::{Words, number};
@@ -10,13 +10,15 @@ pub(super) fn read(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
     let mut materials: Vec<MtlMaterial> = Vec::new();
     let mut problems = Vec::new();
     while let Some(keyword) = words.anywhere() {
-        if keyword == b"newmtl" {
+        let line = words.line();
+        if keyword.eq_ignore_ascii_case(b"newmtl") {
             materials.push(MtlMaterial {
                 name: words.name(),
+                line,
                 ..MtlMaterial::default()
             });
         } else if let Some(material) = materials.last_mut()
-            && let Err(fault) = set(material, keyword, &mut words)
+            && let Err(fault) = set(material, &keyword.to_ascii_lowercase(), &mut words)
         {
             problems.push(fault);
         }
@@ -50,24 +52,59 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<
         }
     };
     match keyword {
-        b"Kd" => material.diffuse = Some(color(words)?),
-        b"Ks" => material.specular = Some(color(words)?),
-        b"Ke" => material.emission = Some(color(words)?),
-        b"Ns" => material.shininess = Some(finite(words)?),
-        b"Ni" => material.index_of_refraction = Some(finite(words)?),
+        b"kd" => material.diffuse = Some(color(words)?),
+        b"ks" => material.specular = Some(color(words)?),
+        b"ke" => material.emission = Some(color(words)?),
+        b"ns" => material.shininess = Some(finite(words)?),
+        b"ni" => material.index_of_refraction = Some(finite(words)?),
         b"d" => material.opacity = Some(finite(words)?),
-        b"Tr" => material.opacity = Some(1.0 - finite(words)?),
+        b"tr" => material.opacity = Some(1.0 - finite(words)?),
         b"illum" => material.illumination = Some(finite(words)?.clamp(0.0, 255.0) as u8),
-        b"map_Kd" => material.diffuse_map = Some(map_file(&words.name())).filter(|file| !file.is_empty()),
-        _ => {}
+        b"map_kd" => {
+            let (file, has_options) = map_file(&words.name());
+            if has_options {
+                left_out(material, "the options of map_Kd");
+            }
+            material.diffuse_map = Some(file).filter(|file| !file.is_empty());
+        }
+        _ => {
+            if let Some((_, told)) = OTHERS.iter().find(|(known, _)| known.as_bytes() == keyword) {
+                left_out(material, told);
+            }
+        }
     }
     Ok(())
 }
 
-/// The file of a map, behind its options.
-fn map_file(line: &str) -> String {
+/// Maps that are not read, in lower case, and what they are called. That of the ambient light is mostly `map_Kd` again.
+const OTHERS: [(&str, &str); 13] = [
+    ("bump", "bump"),
+    ("decal", "decal"),
+    ("disp", "disp"),
+    ("map_bump", "map_Bump"),
+    ("map_d", "map_d"),
+    ("map_ke", "map_Ke"),
+    ("map_ks", "map_Ks"),
+    ("map_ns", "map_Ns"),
+    ("map_pm", "map_Pm"),
+    ("map_pr", "map_Pr"),
+    ("map_tr", "map_Tr"),
+    ("norm", "norm"),
+    ("refl", "refl"),
+];
+
+fn left_out(material: &mut MtlMaterial, what: &'static str) {
+    if !material.others.contains(&what) {
+        material.others.push(what);
+    }
+}
+
+/// The file of a map, behind its options, and whether there are options.
+fn map_file(line: &str) -> (String, bool) {
     let mut words = line.split(' ').peekable();
+    let mut has_options = false;
     while let Some(option) = words.next_if(|word| word.starts_with('-')) {
+        has_options = true;
         let numbers = match option {
             "-o" | "-s" | "-t" => 3,
             "-mm" => 2,
@@ -80,7 +117,8 @@ fn map_file(line: &str) -> String {
             }
         }
     }
-    words.collect::<Vec<_>>().join(" ")
+    let file = words.collect::<Vec<_>>().join(" ");
+    (file.trim_matches('"').to_owned(), has_options)
 }
 
 #[cfg(test)]
@@ -90,11 +128,13 @@ mod tests {
     #[test]
     fn materials_have_their_values() {
         let text = "# two\nKd 9 9 9\nnewmtl dark red\nKd 0.5 0.1 0.2\nKs 0.25\nNs 10\nKe 1 2 3\nd 0.5\nNi 1.5\nillum 2\n\
-                    map_Kd -s 2 2 -clamp on my wood.png\nmap_Bump b.png\n\nnewmtl glass\r\nTr 0.75\r\n";
+                    map_Kd -s 2 2 -clamp on my wood.png\nmap_Bump b.png\nMAP_BUMP b.png\nmap_Ka a.png\n\nNewMtl glass\r\ntr 0.75\r\n\
+                    map_kd \"a.png\"\r\n";
         let (materials, problems) = read(text.as_bytes());
         assert_eq!(problems, Vec::<String>::new());
         let red = MtlMaterial {
             name: "dark red".to_string(),
+            line: 3,
             diffuse: Some([0.5, 0.1, 0.2]),
             specular: Some([0.25; 3]),
             shininess: Some(10.0),
@@ -103,9 +143,12 @@ mod tests {
             index_of_refraction: Some(1.5),
             illumination: Some(2),
             diffuse_map: Some("my wood.png".to_string()),
+            others: vec!["the options of map_Kd", "map_Bump"],
         };
         let glass = MtlMaterial {
             name: "glass".to_string(),
+            line: 16,
+            diffuse_map: Some("a.png".to_string()),
             opacity: Some(0.25),
             ..MtlMaterial::default()
         };

@@ -51,59 +51,113 @@ impl Neighbours {
         &self.around[self.starts[point] as usize..self.starts[point + 1] as usize]
     }
 
-    /// Counts edges that the triangles do not make a surface around.
-    pub fn edges(&self, triangles: &[[u32; 3]]) -> Edges {
+    /// Finds edges that the triangles do not make a surface around, and triangles that are there again. For each triangle
+    /// there is a group, or all are of one.
+    pub fn edges(&self, triangles: &[[u32; 3]], group_of: &[u32]) -> Edges {
         (0..self.count())
             .into_par_iter()
             .with_min_len(1024)
             .fold(
                 || (Edges::default(), Vec::new()),
-                |(edges, mut others), point| {
-                    others.clear();
-                    for triangle in self.around(point) {
-                        let corners = triangles[*triangle as usize].map(|vertex| self.points[vertex as usize]);
-                        for k in 0..3 {
-                            let (from, to) = (corners[k] as usize, corners[(k + 1) % 3] as usize);
-                            // Each edge is counted at its lower point.
-                            if from == point && to > point {
-                                others.push((to, true));
-                            } else if to == point && from > point {
-                                others.push((from, false));
-                            }
+                |(mut edges, mut others), point| {
+                    let (mut crowded, mut turned) = self.odd(triangles, point, &[], &mut others);
+                    // Triangles that are there again are odd at each of their edges, and are told for themselves.
+                    if crowded + turned > 0 {
+                        let repeated = self.repeated(triangles, group_of, point);
+                        if !repeated.is_empty() {
+                            (crowded, turned) = self.odd(triangles, point, &repeated, &mut others);
+                            // Each triangle is told of at its lowest point.
+                            let lowest = |triangle: &u32| self.points_of(triangles, *triangle).iter().min().copied();
+                            edges
+                                .repeated
+                                .extend(repeated.iter().filter(|t| lowest(t) == Some(point as u32)));
                         }
                     }
-                    others.sort_unstable();
-                    let edges = others
-                        .chunk_by(|a, b| a.0 == b.0)
-                        .fold(edges, |edges, edge| match edge {
-                            [a, b] if a.1 == b.1 => Edges {
-                                turned: edges.turned + 1,
-                                ..edges
-                            },
-                            [_, _, _, ..] => Edges {
-                                crowded: edges.crowded + 1,
-                                ..edges
-                            },
-                            _ => edges,
-                        });
+                    edges.crowded += crowded;
+                    edges.turned += turned;
                     (edges, others)
                 },
             )
             .map(|(edges, _)| edges)
-            .reduce(Edges::default, |a, b| Edges {
-                crowded: a.crowded + b.crowded,
-                turned: a.turned + b.turned,
+            .reduce(Edges::default, |mut a, b| {
+                a.crowded += b.crowded;
+                a.turned += b.turned;
+                a.repeated.extend(b.repeated);
+                a
             })
+    }
+
+    /// The numbers of crowded and of turned edges whose lower point this is, without some triangles, which are in order.
+    #[inline]
+    fn odd(
+        &self,
+        triangles: &[[u32; 3]],
+        point: usize,
+        without: &[u32],
+        others: &mut Vec<(u32, bool)>,
+    ) -> (usize, usize) {
+        others.clear();
+        for triangle in self.around(point) {
+            if !without.is_empty() && without.binary_search(triangle).is_ok() {
+                continue;
+            }
+            let corners = self.points_of(triangles, *triangle);
+            for k in 0..3 {
+                let (from, to) = (corners[k], corners[(k + 1) % 3]);
+                if from as usize == point && to as usize > point {
+                    others.push((to, true));
+                } else if to as usize == point && from as usize > point {
+                    others.push((from, false));
+                }
+            }
+        }
+        others.sort_unstable();
+        let edges = others.chunk_by(|a, b| a.0 == b.0);
+        edges.fold((0, 0), |(crowded, turned), edge| match edge {
+            [a, b] if a.1 == b.1 => (crowded, turned + 1),
+            [_, _, _, ..] => (crowded + 1, turned),
+            _ => (crowded, turned),
+        })
+    }
+
+    /// The triangles around a point, in their order, that have the points of another one with a lower number, in the same
+    /// direction, and are of its group.
+    fn repeated(&self, triangles: &[[u32; 3]], group_of: &[u32], point: usize) -> Vec<u32> {
+        let mut all: Vec<_> = (self.around(point).iter())
+            .map(|triangle| {
+                let [a, b, c] = self.points_of(triangles, *triangle);
+                let others = match point as u32 {
+                    p if p == a => [b, c],
+                    p if p == b => [c, a],
+                    _ => [a, b],
+                };
+                let group = group_of.get(*triangle as usize).copied().unwrap_or(0);
+                (others, group, *triangle)
+            })
+            .collect();
+        all.sort_unstable();
+        let pairs = all.windows(2);
+        let pairs = pairs.filter(|pair| (pair[0].0, pair[0].1) == (pair[1].0, pair[1].1));
+        let mut repeated: Vec<u32> = pairs.map(|pair| pair[1].2).collect();
+        repeated.sort_unstable();
+        repeated
+    }
+
+    fn points_of(&self, triangles: &[[u32; 3]], triangle: u32) -> [u32; 3] {
+        triangles[triangle as usize].map(|vertex| self.points[vertex as usize])
     }
 }
 
-/// Numbers of edges.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// What is odd about edges.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Edges {
-    /// They belong to more than two triangles.
+    /// The number of those that belong to more than two triangles.
     pub crowded: usize,
-    /// Both of their triangles pass them in the same direction.
+    /// The number of those that both of their triangles pass in the same direction.
     pub turned: usize,
+    /// The triangles, in no order, that have the points of another one with a lower number, in the same direction, and are
+    /// of its group. They are not counted with their edges.
+    pub repeated: Vec<u32>,
 }
 
 /// A number for each vertex, the same one where positions are, and how many there are.
@@ -155,14 +209,30 @@ mod tests {
         assert_eq!(neighbours.around(0), [0, 1]);
         assert_eq!(neighbours.around(1), [0]);
         assert_eq!(neighbours.around(3), [1]);
-        assert_eq!(neighbours.edges(&triangles), Edges::default());
+        assert_eq!(neighbours.edges(&triangles, &[]), Edges::default());
+    }
+
+    fn odd(triangles: &[[u32; 3]], groups: &[u32]) -> (usize, usize, Vec<u32>) {
+        let mut edges = Neighbours::of(&square(), triangles).edges(triangles, groups);
+        edges.repeated.sort_unstable();
+        (edges.crowded, edges.turned, edges.repeated)
+    }
+
+    #[test]
+    fn repeated_triangles_are_found() {
+        // Vertex 4 is where vertex 0 is.
+        let triangles = [[0, 1, 2], [0, 2, 3], [1, 2, 4], [2, 0, 1], [3, 0, 2]];
+        assert_eq!(odd(&triangles, &[]), (0, 0, vec![2, 3, 4]));
+        // Of another group is another one: three triangles at two edges, three of one group and one more at the third.
+        assert_eq!(odd(&triangles, &[0, 1, 1, 0, 1]), (1, 2, vec![3, 4]));
+        // And so is one that looks the other way.
+        assert_eq!(odd(&[[0, 1, 2], [2, 1, 0], [1, 2, 0]], &[]), (0, 0, vec![2]));
     }
 
     #[test]
     fn edges_are_counted() {
-        let edges = |triangles: &[[u32; 3]]| Neighbours::of(&square(), triangles).edges(triangles);
-        assert_eq!(edges(&[[0, 1, 2], [4, 3, 2]]), Edges { crowded: 0, turned: 1 });
-        assert_eq!(edges(&[[0, 1, 2], [4, 2, 3], [2, 0, 1]]).crowded, 1);
-        assert_eq!(edges(&[[0, 1, 2], [0, 1, 2]]), Edges { crowded: 0, turned: 3 });
+        assert_eq!(odd(&[[0, 1, 2], [4, 3, 2]], &[]), (0, 1, vec![]));
+        assert_eq!(odd(&[[0, 1, 2], [4, 2, 3], [2, 1, 0]], &[]), (1, 0, vec![]));
+        assert_eq!(odd(&[[0, 1, 2], [0, 1, 2]], &[0, 1]), (0, 3, vec![]));
     }
 }

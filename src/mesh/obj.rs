@@ -9,7 +9,7 @@ use std::hash::BuildHasher;
 use glam::{DVec3, Vec2, Vec3};
 use hashbrown::{DefaultHashBuilder, HashTable};
 
-use super::draft::{Draft, Fan, coordinate, texture_coordinate, unit};
+use super::draft::{Draft, Fan, coordinate, counted, texture_coordinate, unit};
 use super::error::{Fault, shown};
 use super::words::Words;
 use super::{Group, MOST};
@@ -101,7 +101,7 @@ impl Reader {
             }
             b"mtllib" => {
                 let names = words.name();
-                if !self.libraries.contains(&names) {
+                if !names.is_empty() && !self.libraries.contains(&names) {
                     if self.libraries.len() >= MOST_LIBRARIES {
                         return Err(words.fault(format!("there must be at most {MOST_LIBRARIES} files of materials")));
                     }
@@ -178,7 +178,8 @@ impl Reader {
 
     fn finish(self) -> Obj {
         for (keyword, count) in &self.unknown {
-            tracing::debug!("{count} lines with the keyword {keyword} are not looked at");
+            let several = counted(*count, "line is", "lines are");
+            tracing::debug!("{several} not looked at, with the keyword {keyword}");
         }
         let corners = &self.vertices.corners;
         let mut draft = self.draft;
@@ -188,8 +189,10 @@ impl Reader {
             let uv = |i: u32| self.uvs.get(i as usize).copied().unwrap_or_default();
             draft.uvs = corners.iter().map(|[_, t, _]| uv(*t)).collect();
             if missing > 0 {
-                draft.notes.push(format!(
-                    "{missing} vertices have no texture coordinates, as others have; they get (0, 0)"
+                draft.notes.push(counted(
+                    missing,
+                    "vertex has no texture coordinates, as others have; it gets (0, 0)",
+                    "vertices have no texture coordinates, as others have; they get (0, 0)",
                 ));
             }
         }

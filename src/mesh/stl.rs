@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use hashbrown::{DefaultHashBuilder, HashTable};
 
 use super::Group;
-use super::draft::{Draft, coordinate, unit};
+use super::draft::{Draft, coordinate, counted, unit};
 use super::error::{Fault, Place, shown};
 use super::words::Words;
 
@@ -36,8 +36,11 @@ pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
             binary(&bytes[HEADER..size as usize], &mut facets)?;
             let more = bytes.len() as u64 - size;
             if more > 0 {
-                let note = format!("{more} bytes behind the last triangle are not looked at");
-                facets.draft.notes.push(note);
+                facets.draft.notes.push(counted(
+                    more as usize,
+                    "byte behind the last triangle is not looked at",
+                    "bytes behind the last triangle are not looked at",
+                ));
             }
         }
         _ if is_text => text(bytes, &mut facets)?,

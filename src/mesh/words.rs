@@ -3,17 +3,26 @@
 use super::error::{Fault, Place, shown};
 
 /// A text as words between blanks. `#` in front of a word makes the rest of the line a comment; a backslash at the end of a
-/// line joins it with the next one.
+/// line joins it with the next one, and is nothing at the end of the text.
 pub(super) struct Words<'a> {
     bytes: &'a [u8],
     at: usize,
     line: usize,
+    /// The last byte of a line.
+    end: u8,
 }
 
 impl<'a> Words<'a> {
     pub fn new(bytes: &'a [u8]) -> Words<'a> {
         let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 }; // the mark of UTF-8
-        Words { bytes, at, line: 1 }
+        // A text without line feeds has lines as on old Macs, if it has any.
+        let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
+        Words {
+            bytes,
+            at,
+            line: 1,
+            end,
+        }
     }
 
     /// The next word of the line, if there is another one.
@@ -27,10 +36,18 @@ impl<'a> Words<'a> {
     fn find_word(&mut self) -> bool {
         loop {
             match self.bytes.get(self.at) {
-                None | Some(b'\n' | b'#') => return false,
-                Some(byte) if *byte <= b' ' => self.at += 1,
+                None | Some(b'#') => return false,
+                Some(byte) if *byte <= b' ' => {
+                    if *byte == self.end {
+                        return false;
+                    }
+                    self.at += 1;
+                }
                 Some(b'\\') => match self.joined(self.at) {
-                    Some(next) => (self.at, self.line) = (next, self.line + 1),
+                    Some(next) => {
+                        self.line += usize::from(self.bytes[next - 1] == self.end);
+                        self.at = next;
+                    }
                     None => return true,
                 },
                 Some(_) => return true,
@@ -52,7 +69,8 @@ impl<'a> Words<'a> {
     /// Where the next line begins, if the backslash here is the last of its line.
     fn joined(&self, backslash: usize) -> Option<usize> {
         match self.bytes[backslash + 1..] {
-            [b'\n', ..] => Some(backslash + 2),
+            [] => Some(backslash + 1),
+            [byte, ..] if byte == self.end => Some(backslash + 2),
             [b'\r', b'\n', ..] => Some(backslash + 3),
             _ => None,
         }
@@ -101,7 +119,7 @@ impl<'a> Words<'a> {
     /// Goes to the next line, whatever this one ends with.
     pub fn skip_line(&mut self) -> bool {
         let rest = &self.bytes[self.at..];
-        match rest.iter().position(|byte| *byte == b'\n') {
+        match rest.iter().position(|byte| *byte == self.end) {
             Some(end) => {
                 self.at += end + 1;
                 self.line += 1;
@@ -135,6 +153,11 @@ impl<'a> Words<'a> {
 
     pub fn place(&self) -> Place {
         Place::Line(self.line)
+    }
+
+    /// The line, counted from 1.
+    pub fn line(&self) -> usize {
+        self.line
     }
 
     pub fn fault(&self, message: impl Into<String>) -> Fault {
@@ -181,12 +204,16 @@ mod tests {
         assert_eq!(lines("a  b\t\r\n\n c"), [line(1, "a b"), line(3, "c")]);
         assert_eq!(lines("\u{feff}a\n"), [line(1, "a")]);
         assert_eq!(lines("\n\n"), []);
+        // Lines as on old Macs.
+        assert_eq!(lines("a b\r\rc # d\re"), [line(1, "a b"), line(3, "c"), line(4, "e")]);
+        assert_eq!(lines("a\rb\n"), [line(1, "a b")]);
     }
 
     #[test]
     fn a_backslash_joins_lines() {
         assert_eq!(lines("a \\\nb\\\r\nc\nd"), [line(3, "a b c"), line(4, "d")]);
-        assert_eq!(lines("a\\b \\ \nc\\"), [line(1, "a\\b \\"), line(2, "c\\")]);
+        assert_eq!(lines("a\\b \\ \nc\\"), [line(1, "a\\b \\"), line(2, "c")]);
+        assert_eq!(lines("a \\\rb\rc\\"), [line(2, "a b"), line(3, "c")]);
     }
 
     #[test]

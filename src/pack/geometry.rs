@@ -1,5 +1,6 @@
 //! The scene's tree: its items, and the instances of meshes among them.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use bytemuck::cast_vec;
@@ -12,7 +13,7 @@ use super::{
     SOME_SHADOWS, TRIANGLE,
 };
 use crate::mesh::Mesh;
-use crate::scene::{Geometry, Scene};
+use crate::scene::{Geometry, Scene, Shape};
 
 /// Scenes of more bounded primitives have them in the tree. Fewer are faster one by one, and as constants.
 pub const MOST_OUTSIDE: usize = 64;
@@ -31,6 +32,7 @@ pub struct Trees {
 /// The tree over a scene's instances of meshes and these primitives, which have numbers and may cast a shadow.
 pub fn trees(scene: &Scene, primitives: &[(u32, &Primitive, bool)], casts: impl Fn(usize) -> bool) -> Trees {
     let mut trees = Trees::default();
+    let with_normal_maps = with_normal_maps(scene);
     let mut known: Vec<*const Mesh> = Vec::new();
     let mut items = Vec::new();
     for (number, shape) in scene.shapes.iter().enumerate() {
@@ -45,7 +47,8 @@ pub fn trees(scene: &Scene, primitives: &[(u32, &Primitive, bool)], casts: impl 
         let place = known.iter().position(|other| *other == Arc::as_ptr(mesh));
         let place = place.unwrap_or_else(|| {
             known.push(Arc::as_ptr(mesh));
-            trees.meshes.push(mesh.packed());
+            let with_tangents = with_normal_maps.contains(&Arc::as_ptr(mesh));
+            trees.meshes.push(mesh.packed(with_tangents));
             known.len() - 1
         });
         let word = |material: &usize| *material as u32 | if casts(*material) { 0 } else { NO_SHADOW };
@@ -88,29 +91,40 @@ pub fn trees(scene: &Scene, primitives: &[(u32, &Primitive, bool)], casts: impl 
     trees
 }
 
+/// The meshes of which any instance has a normal map.
+fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
+    let has_map = |material: &usize| scene.materials[*material].normal_map().is_some();
+    let mesh = |shape: &Shape| match &shape.geometry {
+        Geometry::Mesh { mesh, materials, .. } if materials.iter().any(has_map) => Some(Arc::as_ptr(mesh)),
+        _ => None,
+    };
+    scene.shapes.iter().filter_map(mesh).collect()
+}
+
 impl Trees {
     /// Tells the instances where their meshes are in buffers: nodes behind all other rows of the first one.
     fn place_rows(&mut self) {
         let mut node_row = self.mesh_nodes_row();
         let mut row = 0;
-        let places: Vec<[u32; 5]> = self
+        let places: Vec<[u32; 6]> = self
             .meshes
             .iter()
             .map(|mesh| {
                 let triangles = row;
                 let vertices = triangles + mesh.triangles.len() as u32;
                 let attributes = vertices + mesh.vertices.len() as u32;
-                let groups = attributes + mesh.attributes.len() as u32;
+                let tangents = attributes + mesh.attributes.len() as u32;
+                let groups = tangents + TANGENT_ROWS * mesh.tangents.len() as u32;
                 row = groups + mesh.groups.len().div_ceil(4) as u32;
                 let nodes = node_row;
                 node_row += NODE_ROWS * mesh.nodes.len() as u32;
                 let or_nothing = |row: u32, is_there: bool| if is_there { row } else { NOTHING };
-                let attributes = or_nothing(attributes, !mesh.attributes.is_empty());
                 [
                     nodes,
                     triangles,
                     vertices,
-                    attributes,
+                    or_nothing(attributes, !mesh.attributes.is_empty()),
+                    or_nothing(tangents, !mesh.tangents.is_empty()),
                     or_nothing(groups, !mesh.groups.is_empty()),
                 ]
             })
@@ -122,6 +136,7 @@ impl Trees {
                 instance.triangles,
                 instance.vertices,
                 instance.attributes,
+                instance.tangents,
                 instance.groups,
             ] = place;
         }
@@ -146,6 +161,7 @@ impl Trees {
 }
 
 const NODE_ROWS: u32 = (size_of::<Node>() / 16) as u32;
+const TANGENT_ROWS: u32 = (size_of::<[Vec4; 2]>() / 16) as u32;
 const INSTANCE_ROWS: u32 = (size_of::<Instance>() / 16) as u32;
 
 fn item(kind: u32, index: u32, (low, high): (DVec3, DVec3)) -> Item {

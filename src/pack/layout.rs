@@ -240,8 +240,10 @@ records! {
         pub shadows: u32,
         /// The number of its mesh.
         pub mesh: u32,
+        /// The first of the two rows of its mesh's first vertex's tangents, [`NOTHING`] if there are none.
+        pub tangents: u32,
         /// 0.
-        pub unused: UVec2,
+        pub unused: u32,
     }
 
     /// What the ray through a pixel's centre meets first; depth 0 and shape [`NOTHING`] where that is nothing.

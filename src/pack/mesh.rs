@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::Node;
 use super::tree::{Aabb, build};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, VertexTangents};
 
 /// Triangles in a leaf, at most.
 const MOST_IN_LEAF: u32 = 4;
@@ -22,6 +22,8 @@ pub struct PackedMesh {
     pub vertices: Vec<Vec4>,
     /// Each vertex's normal, 0 if there is none, and its v; empty if there are neither normals nor texture coordinates.
     pub attributes: Vec<Vec4>,
+    /// Each vertex's tangents along u and along v, for normal maps; or empty.
+    pub tangents: Vec<[Vec4; 2]>,
     /// Each triangle's group, in the order of the triangles; none if there is one group alone.
     pub groups: Vec<u32>,
     /// The lower corner of its box.
@@ -32,28 +34,40 @@ pub struct PackedMesh {
 
 impl PackedMesh {
     /// Packs a mesh, and builds its tree.
-    pub fn of(mesh: &Mesh) -> PackedMesh {
+    pub(crate) fn of(mesh: &Mesh, tangents: Option<VertexTangents>) -> PackedMesh {
         let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
         let boxes: Vec<Aabb> = mesh.triangles.par_iter().map(|t| Aabb::around(&corners(t))).collect();
         let whole = boxes.iter().fold(Aabb::EMPTY, |all, b| all.with(b));
         let tree = build(&boxes, MOST_IN_LEAF);
+        let (triangles, copies, tangents) = match &tangents {
+            Some(of) => (&of.triangles, of.copies.as_slice(), of.tangents.as_slice()),
+            None => (&mesh.triangles, &[][..], &[][..]),
+        };
         let triangles = tree.order.par_iter().map(|&number| {
-            let [a, b, c] = mesh.triangles[number as usize];
+            let [a, b, c] = triangles[number as usize];
             UVec4::new(a, b, c, number)
         });
         let uv = |i: usize| mesh.uvs.get(i).copied().unwrap_or_default();
         let normal = |i: usize| mesh.normals.get(i).copied().unwrap_or_default();
-        let vertices = mesh.positions.par_iter().enumerate().map(|(i, p)| p.extend(uv(i).x));
+        let own = mesh.positions.len();
+        let count = own + copies.len();
+        // The vertex that one is, or is a copy of.
+        let original = |i: usize| if i < own { i } else { copies[i - own] as usize };
+        let vertices = (0..count).into_par_iter().map(original);
+        let vertices = vertices.map(|i| mesh.positions[i].extend(uv(i).x));
         let with_attributes = match mesh.normals.is_empty() && mesh.uvs.is_empty() {
             true => 0,
-            false => mesh.positions.len(),
+            false => count,
         };
-        let attributes = (0..with_attributes).into_par_iter().map(|i| normal(i).extend(uv(i).y));
+        let attributes = (0..with_attributes).into_par_iter().map(original);
+        let attributes = attributes.map(|i| normal(i).extend(uv(i).y));
+        let tangents = tangents.par_iter().map(|of| [of.u.extend(0.0), of.v.extend(0.0)]);
         let group = |&number: &u32| mesh.group_of.get(number as usize).copied();
         PackedMesh {
             triangles: triangles.collect(),
             vertices: vertices.collect(),
             attributes: attributes.collect(),
+            tangents: tangents.collect(),
             groups: tree.order.iter().filter_map(group).collect(),
             low: whole.low,
             high: whole.high,
@@ -68,6 +82,7 @@ impl PackedMesh {
             size_of_val(self.triangles.as_slice()),
             size_of_val(self.vertices.as_slice()),
             size_of_val(self.attributes.as_slice()),
+            size_of_val(self.tangents.as_slice()),
             size_of_val(self.groups.as_slice()),
         ];
         lists.iter().map(|bytes| *bytes as u64).sum()

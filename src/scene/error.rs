@@ -83,7 +83,8 @@ pub(super) fn cut(text: &str) -> Cow<'_, str> {
     cut_to(LONGEST, text)
 }
 
-fn cut_to(longest: usize, text: &str) -> Cow<'_, str> {
+/// A text without its middle where it is longer than so many characters.
+pub(super) fn cut_to(longest: usize, text: &str) -> Cow<'_, str> {
     let count = text.chars().count();
     if count <= longest {
         return text.into();

@@ -1,5 +1,6 @@
 //! From a scene file to a checked [`Scene`], with other values in place of some of the file's.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
@@ -80,14 +81,22 @@ impl Scene {
     ///
     /// The errors of [`Scene::load`], and bad overrides.
     pub fn load_with(path: impl AsRef<Path>, overrides: &Overrides) -> Result<Scene, SceneError> {
-        let path = path.as_ref();
+        Scene::load_and_list(path.as_ref(), overrides, &mut BTreeSet::new())
+    }
+
+    /// [`Scene::load_with`]. What files the scene is made of is told even if it breaks a rule.
+    pub(crate) fn load_and_list(
+        path: &Path,
+        overrides: &Overrides,
+        files: &mut BTreeSet<PathBuf>,
+    ) -> Result<Scene, SceneError> {
         let bytes = read(path).map_err(|error| SceneError::Read {
             path: path.to_owned(),
             error,
         })?;
         let origin = path.display().to_string();
         match std::str::from_utf8(&bytes) {
-            Ok(text) => parse_beside(text, &origin, folder_of(path), overrides),
+            Ok(text) => parse_beside(text, &origin, folder_of(path), overrides, files),
             Err(error) => {
                 let text = String::from_utf8_lossy(&bytes);
                 // Up to there the lossy text is the file's.
@@ -112,7 +121,8 @@ impl Scene {
     ///
     /// The errors of [`Scene::parse`], and bad overrides.
     pub fn parse_with(text: &str, origin: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
-        parse_beside(text, origin, folder_of(Path::new(origin)), overrides)
+        let folder = folder_of(Path::new(origin));
+        parse_beside(text, origin, folder, overrides, &mut BTreeSet::new())
     }
 }
 
@@ -120,7 +130,13 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().unwrap_or(Path::new("."))
 }
 
-fn parse_beside(text: &str, origin: &str, folder: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
+fn parse_beside(
+    text: &str,
+    origin: &str,
+    folder: &Path,
+    overrides: &Overrides,
+    files: &mut BTreeSet<PathBuf>,
+) -> Result<Scene, SceneError> {
     let mut description = Description::parse(text, origin)?;
     overrides.apply(&mut description).map_err(SceneError::Override)?;
     let mut assets = Assets::beside(folder);
@@ -131,7 +147,7 @@ fn parse_beside(text: &str, origin: &str, folder: &Path, overrides: &Overrides) 
     if let Some(root) = &overrides.asset_root {
         assets.root.clone_from(root);
     }
-    match (description.validate_with(&assets), is_course) {
+    match (description.validate_and_list(&assets, files), is_course) {
         (Ok(mut scene), true) => {
             scene.notes.insert(0, course::NOTE.to_owned());
             Ok(scene)

@@ -17,33 +17,58 @@ struct Key {
     normals: Option<Normals>,
 }
 
-/// The meshes that are in use. So a scene that is read again, as by the development mode, has the trees that are built.
-static IN_USE: Mutex<Option<HashMap<Key, Weak<Mesh>>>> = Mutex::new(None);
+/// Length and time of change of a file, if it is there.
+type Stamp = Option<(u64, SystemTime)>;
 
-/// Reads a mesh, unless it is in use and its file has not changed.
+/// A mesh, and its files of materials as they were.
+struct Known {
+    mesh: Weak<Mesh>,
+    libraries: Vec<Stamp>,
+}
+
+/// The meshes that are in use. So a scene that is read again, as by the development mode, has the trees that are built.
+static IN_USE: Mutex<Option<HashMap<Key, Known>>> = Mutex::new(None);
+
+/// Reads a mesh, unless it is in use and neither its file nor its files of materials have changed.
 pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshError> {
     let Some(key) = key(path, normals) else {
         return Mesh::load(path, normals).map(Arc::new); // which says what is wrong with the file
     };
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
     let in_use = in_use.get_or_insert_default();
-    in_use.retain(|_, mesh| mesh.strong_count() > 0);
-    if let Some(mesh) = in_use.get(&key).and_then(Weak::upgrade) {
+    in_use.retain(|_, known| known.mesh.strong_count() > 0);
+    if let Some(known) = in_use.get(&key)
+        && let Some(mesh) = known.mesh.upgrade()
+        && libraries(&mesh) == known.libraries
+    {
         return Ok(mesh);
     }
     let mesh = Arc::new(Mesh::load(path, normals)?);
-    in_use.insert(key, Arc::downgrade(&mesh));
+    let known = Known {
+        mesh: Arc::downgrade(&mesh),
+        libraries: libraries(&mesh),
+    };
+    in_use.insert(key, known);
     Ok(mesh)
 }
 
 fn key(path: &Path, normals: Option<Normals>) -> Option<Key> {
-    let data = fs::metadata(path).ok()?;
+    let (length, changed) = stamp(path)?;
     Some(Key {
         path: path.to_owned(),
-        length: data.len(),
-        changed: data.modified().ok()?,
+        length,
+        changed,
         normals,
     })
+}
+
+fn stamp(path: &Path) -> Stamp {
+    let data = fs::metadata(path).ok()?;
+    Some((data.len(), data.modified().ok()?))
+}
+
+fn libraries(mesh: &Mesh) -> Vec<Stamp> {
+    mesh.libraries.iter().map(|library| stamp(&library.file)).collect()
 }
 
 #[cfg(test)]

@@ -46,17 +46,20 @@ pub struct Scene {
     pub camera: Camera,
     /// How it is rendered.
     pub render: Render,
-    /// The textures that materials name by index, in the order of their names.
+    /// The textures that materials name by index: those of the scene file in the order of their names, then those of MTL files.
     pub textures: Vec<Texture>,
-    /// The materials that shapes name by index, in the order of their names.
+    /// The materials that shapes name by index: those of the scene file in the order of their names, then those that meshes
+    /// bring in MTL files.
     pub materials: Vec<Material>,
+    /// The materials' names.
+    pub material_names: Vec<String>,
     /// The lights, in file order.
     pub lights: Vec<Light>,
     /// The shapes, in file order, and then the instances of meshes, in theirs.
     pub shapes: Vec<Shape>,
     /// How many of the shapes are instances, the last ones.
     pub instances: usize,
-    /// The files that the scene names: its textures' images, and meshes.
+    /// The files that the scene is made of, in order: its textures' images, meshes, and what these name.
     pub files: Vec<PathBuf>,
     /// What a user should know of the scene and of its meshes, if anything: `rock.ply: 12 degenerate triangles dropped`.
     pub notes: Vec<String>,

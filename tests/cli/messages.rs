@@ -293,3 +293,18 @@ fn an_image_outside_the_asset_root_is_told_with_both() {
     let ran = place.run(&["check", "sub/tile.toml", "--asset-root", "."]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
 }
+
+#[test]
+fn what_is_odd_about_a_mesh_is_told_once() {
+    let place = Place::new();
+    place.write("odd.obj", "v 0 0 0\nv 1 0 0\nv 0 0 2\nf 1 2 3\nf 1 1 2\n");
+    let shape = "[[shapes]]\ntype = 'mesh'\nfile = 'odd.obj'\nmaterial = 'gray'\n";
+    place.write("odd.toml", &format!("{SCENE}{shape}"));
+    let told = "warning: odd.toml: odd.obj: 1 degenerate triangle dropped";
+    for options in [&[][..], &["-v"]] {
+        let ran = place.run(&[&["render", "odd.toml", "--device", "cpu"], options].concat());
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        assert!(ran.stderr.lines().any(|line| line == told), "{}", ran.stderr);
+        assert_eq!(ran.stderr.matches("degenerate").count(), 1, "{}", ran.stderr);
+    }
+}

@@ -23,6 +23,72 @@ fn textured(place: &Place) {
     place.write("tiles.toml", &scene);
 }
 
+/// A scene with a mesh of two materials, one of which has an image; and an image of a material that is not used.
+fn with_materials(place: &Place) {
+    for name in ["wood.png", "spare.png"] {
+        image::RgbImage::new(2, 2).save(place.path(name)).unwrap();
+    }
+    place.write(
+        "box.mtl",
+        "newmtl a\nKd 1 0 0\nnewmtl b\nmap_Kd wood.png\nnewmtl c\nmap_Kd spare.png\n",
+    );
+    let mesh = "v 0 -2 0\nv 1 -2 0\nv 0 -2 2\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 1/1 3/1 2/1\n";
+    place.write("box.obj", &format!("mtllib box.mtl\n{mesh}"));
+    let shape = "[[shapes]]\ntype = 'mesh'\nfile = 'box.obj'\n";
+    place.write("box.toml", &format!("{SCENE}{shape}"));
+}
+
+#[test]
+fn nothing_that_a_mesh_names_is_replaced() {
+    let place = Place::new();
+    with_materials(&place);
+    let keeps = "is a file that the scene is made of, and must stay; choose another name by --output";
+    for name in ["wood.png", "spare.png"] {
+        refused(
+            &place,
+            &["box.toml", "-o", name],
+            2,
+            &format!("--output: {name}: {keeps}"),
+        );
+    }
+    for name in ["box.mtl", "box.obj"] {
+        let told = format!("--output: {name}: {keeps}");
+        refused(&place, &["box.toml", "-o", name, "--format", "png"], 2, &told);
+    }
+    let told = format!("--stats: box.mtl: {}", keeps.replace(" by --output", ""));
+    refused(&place, &["box.toml", "--stats", "box.mtl"], 2, &told);
+    place.quietly(&["render", "box.toml", "-o", "other.png", "--device", "cpu"]);
+    let ran = place.run(&["dev", "box.toml", "--no-page", "--out", "wood.png"]);
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    assert!(
+        ran.stderr
+            .contains("--out: wood.png: is a file that the scene is made of"),
+        "{}",
+        ran.stderr
+    );
+}
+
+#[test]
+fn a_mesh_has_the_colours_of_its_file() {
+    let place = Place::new();
+    with_materials(&place);
+    let picture = |scene: &str| {
+        place.quietly(&["render", scene, "-o", "a.exr", "--device", "cpu"]);
+        place.read("a.exr")
+    };
+    let with_own = picture("box.toml");
+    // The same material by the scene.
+    let material = "[materials.red]\ntype = 'phong'\ncolor = [1, 0, 0]\nspecular = [0, 0, 0]\n";
+    let texture = "[textures.wood]\ntype = 'image'\nfile = 'wood.png'\n[materials.wood]\ntype = 'phong'\n\
+                   color = { texture = 'wood' }\nspecular = [0, 0, 0]\n";
+    let scene = String::from_utf8(place.read("box.toml")).unwrap();
+    let told = format!("{scene}materials = {{ a = 'red', b = 'wood' }}\n{material}{texture}");
+    place.write("told.toml", &told);
+    assert!(picture("told.toml") == with_own);
+    place.write("other.toml", &told.replace("[1, 0, 0]", "[0, 1, 0]"));
+    assert!(picture("other.toml") != with_own);
+}
+
 /// The render refused, and every file is as it was.
 #[track_caller]
 fn refused(place: &Place, arguments: &[&str], code: i32, message: &str) {

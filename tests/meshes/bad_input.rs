@@ -1,6 +1,8 @@
 //! Bad mesh files: each is told with its place, the value and the rule; none ends in a panic.
 
+use glam::DVec3;
 use wgray::mesh::{Mesh, MeshError, Normals};
+use wgray::scene::{Color, Material, Scene};
 
 use super::load;
 use super::readers::in_all_formats;
@@ -402,6 +404,108 @@ fn files_that_are_cut_anywhere_are_meshes_or_errors() {
         assert!(errors > 10, "{name}");
         assert!(check(name, load(name, &bytes, None)), "{name}");
     }
+}
+
+/// An MTL file with all that is read, of the materials `a` and `b c`.
+const MTL: &str = "# all\nnewmtl a\nKa 1 1 1\nKd 0.5 0.25 \\\n0.125\nKs 0.5\nNs 20\nd 0.5\nillum 2\nmap_Kd -s 2 2 a.png\n\
+                   newmtl b c\r\nKe 1 0 0\r\nTr 1\r\nNi 1.5\r\nmap_Bump -bm 1 b.png\r\n";
+
+/// Checks that a mesh with this MTL file is a scene, or an error about its materials, and says which.
+fn check_mtl(folder: &std::path::Path, mtl: &[u8]) -> bool {
+    std::fs::write(folder.join("a.mtl"), mtl).unwrap();
+    let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 0 1\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b c\nf 3/1 2/1 1/1\n";
+    std::fs::write(folder.join("a.obj"), text).unwrap();
+    let scene = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n\
+                 [[shapes]]\ntype = 'mesh'\nfile = 'a.obj'\n";
+    let origin = folder.join("s.toml").display().to_string();
+    match Scene::parse(scene, &origin) {
+        Ok(scene) => {
+            for material in &scene.materials {
+                let Material::Phong {
+                    ambient,
+                    diffuse,
+                    specular,
+                    shininess,
+                    ..
+                } = material
+                else {
+                    panic!("{material:?}")
+                };
+                for color in [ambient, diffuse, specular] {
+                    let range = 0.0..=1e6;
+                    let is_valid = |c: DVec3| c.to_array().iter().all(|x| range.contains(x));
+                    assert!(
+                        !matches!(color, Color::Plain(color) if !is_valid(*color)),
+                        "{material:?}"
+                    );
+                }
+                assert!((1e-6..=1e6).contains(shininess), "{material:?}");
+            }
+            assert!(scene.notes.iter().all(|note| note.len() < 500), "{:?}", scene.notes);
+            true
+        }
+        Err(error) => {
+            let message = error.to_string();
+            assert!(message.contains(": shapes[0].material: is missing; "), "{message}");
+            assert!(message.len() < 500, "{message}");
+            false
+        }
+    }
+}
+
+#[test]
+fn materials_that_are_cut_anywhere_are_scenes_or_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenes = (0..=MTL.len()).filter(|end| check_mtl(folder.path(), &MTL.as_bytes()[..*end]));
+    let last = MTL.find("b c").unwrap() + 3;
+    // All of them from the second name on.
+    assert_eq!(scenes.collect::<Vec<_>>(), (last..=MTL.len()).collect::<Vec<_>>());
+}
+
+#[test]
+fn materials_with_random_bytes_are_scenes_or_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let random = Random::new(17);
+    let long = [b"newmtl ".as_slice(), &[b'x'; 5000], b"\nmap_Kd ", &[b'y'; 5000], b"\n"].concat();
+    let words: &[&[u8]] = &[
+        b"nan",
+        b"-1",
+        b"1e308",
+        b"\\\n",
+        b"\n",
+        b"newmtl a",
+        b"newmtl b c",
+        b"Kd ",
+        b"map_Kd ",
+        b"-o",
+        b"/",
+        b"..",
+        b"\0",
+        b"#",
+        b"\xff",
+        &long,
+    ];
+    let (mut good, mut bad) = (0, 0);
+    for _ in 0..1000 {
+        let mut bytes = MTL.as_bytes().to_vec();
+        for _ in 0..=random.below(6) {
+            let at = random.below(bytes.len() as u32) as usize;
+            match random.below(4) {
+                0 => bytes[at] = random.bits() as u8,
+                1 => bytes[at] ^= 1 << random.below(8),
+                2 => drop(bytes.splice(at..at + 1, random.pick(words).iter().copied())),
+                _ => drop(bytes.drain(at..(at + random.below(9) as usize).min(bytes.len()))),
+            }
+            if bytes.is_empty() {
+                break;
+            }
+        }
+        match check_mtl(folder.path(), &bytes) {
+            true => good += 1,
+            false => bad += 1,
+        }
+    }
+    assert!(good > 100 && bad > 100, "{good} scenes, {bad} errors");
 }
 
 #[test]

@@ -175,3 +175,61 @@ shininess = 16
 type = 'glass'
 ior = 1.5
 ";
+
+/// A piece of a curved surface with normals and texture coordinates: a grid of vertices over the (u, v) from 0 to 1. A closed
+/// surface has vertices twice where it closes.
+#[derive(Clone, Debug)]
+pub struct Sheet {
+    pub form: Form,
+    pub normals: Vec<DVec3>,
+    pub uvs: Vec<[f64; 2]>,
+}
+
+impl Sheet {
+    /// By its position and its outward normal, and as many squares along u and along v.
+    pub fn of(columns: u32, rows: u32, at: impl Fn(f64, f64) -> [DVec3; 2]) -> Sheet {
+        let (mut points, mut normals, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for j in 0..=rows {
+            for i in 0..=columns {
+                let (u, v) = (f64::from(i) / f64::from(columns), f64::from(j) / f64::from(rows));
+                let [point, normal] = at(u, v);
+                points.push(point);
+                normals.push(normal);
+                uvs.push([u, v]);
+                if i < columns && j < rows {
+                    let a = j * (columns + 1) + i;
+                    let (b, c, d) = (a + 1, a + columns + 2, a + columns + 1);
+                    triangles.extend([[a, b, c], [a, c, d]]);
+                }
+            }
+        }
+        Sheet {
+            form: Form { points, triangles },
+            normals,
+            uvs,
+        }
+    }
+
+    /// The unit sphere; u goes east and v north.
+    pub fn sphere(columns: u32, rows: u32) -> Sheet {
+        Sheet::of(columns, rows, |u, v| {
+            let ((sin, cos), angle) = ((TAU * u.fract()).sin_cos(), TAU / 2.0 * (v - 0.5));
+            // The poles are one point each.
+            let radius = if v == v.fract() && v > 0.0 { angle.cos() } else { 0.0 };
+            [DVec3::new(radius * cos, radius * sin, angle.sin()); 2]
+        })
+    }
+
+    /// A torus around the z axis.
+    pub fn torus(columns: u32, rows: u32) -> Sheet {
+        Sheet::of(columns, rows, |u, v| {
+            let ((sin, cos), (up, out)) = ((TAU * u.fract()).sin_cos(), (TAU * v.fract()).sin_cos());
+            let normal = DVec3::new(out * cos, out * sin, up);
+            [DVec3::new(cos, sin, 0.0) + normal * 0.4, normal]
+        })
+    }
+
+    pub fn obj(&self) -> String {
+        self.form.obj(Some(&self.normals), Some(&self.uvs))
+    }
+}

@@ -6,6 +6,7 @@ pub mod forms;
 mod made;
 mod readers;
 mod sphere;
+mod tangents;
 mod trees;
 mod watertight;
 

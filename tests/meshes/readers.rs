@@ -141,9 +141,9 @@ fn obj_corners_may_have_all_forms() {
 #[test]
 fn obj_vertices_are_shared_where_all_is_equal() {
     let text =
-        format!("{SQUARE}vt 0 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1/1/1 3/2/1 4/1/1\nf 3/2/1 4/1/1 1/1/1\n");
+        format!("{SQUARE}vt 0 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1/1/1 3/2/1 4/1/1\nf 4/1/1 3/2/1 1/1/1\n");
     let mesh = load("a.obj", &text, None).unwrap();
-    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 3, 4], [3, 4, 0]]);
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 3, 4], [4, 3, 0]]);
     // Normals that are made anew tell no vertices apart.
     let text = format!("{SQUARE}vn 0 0 1\nvn 1 0 0\nf 1//1 2//1 3//1\nf 1//2 3//2 4//2\n");
     let count = |normals| load("a.obj", &text, normals).unwrap().positions.len();
@@ -151,6 +151,31 @@ fn obj_vertices_are_shared_where_all_is_equal() {
     assert_eq!(count(Some(Normals::File)), 6);
     assert_eq!(count(Some(Normals::Flat)), 4);
     assert_eq!(count(Some(Normals::Smooth)), 4);
+}
+
+#[test]
+fn lines_may_end_as_on_old_macs() {
+    let text = format!("mtllib none\\.mtl # a\n{SQUARE}g a b\nf 1 2 \\\n3\nf 1 3 4\n");
+    let expected = load("a.obj", &text, None).unwrap();
+    let mesh = load("a.obj", text.replace('\n', "\r"), None).unwrap();
+    assert_eq!(corners(&mesh), TWO_TRIANGLES);
+    assert_eq!(mesh.groups, expected.groups);
+    // A line is told as it is counted.
+    let error = load("a.obj", "v 0 0 0\r\rv 0 1\r", None).unwrap_err();
+    assert_eq!(error, "a.obj:3: z is missing");
+    let mesh = load("a.stl", SOLIDS.replace('\n', "\r"), None).unwrap();
+    assert_eq!((corners(&mesh), mesh.groups.len()), (TWO_TRIANGLES.to_vec(), 3));
+    let ply = "ply\rformat ascii 1.0\relement vertex 3\rproperty float x\rproperty float y\rproperty float z\r\
+               element face 1\rproperty list uchar int vertex_index\rend_header\r0 0 0\r1 0 0\r1 1 0\r3 0 1 2\r";
+    assert_eq!(corners(&load("a.ply", ply, None).unwrap()), TWO_TRIANGLES[..1]);
+}
+
+#[test]
+fn a_backslash_may_end_a_file() {
+    let mesh = load("a.obj", format!("{SQUARE}f 1 2 3\nf 1 3 4 \\"), None).unwrap();
+    assert_eq!(corners(&mesh), TWO_TRIANGLES);
+    let error = load("a.obj", format!("{SQUARE}f 1 2\\"), None).unwrap_err();
+    assert_eq!(error, "a.obj:5: a face must have 3 corners or more; this one has 2");
 }
 
 #[test]
@@ -188,11 +213,30 @@ fn degenerate_triangles_are_dropped_and_counted() {
 }
 
 #[test]
+fn duplicate_triangles_are_dropped_and_counted() {
+    let text = format!("{SQUARE}v 0 0 0\nf 1 2 3\nf 1 3 4\nf 2 3 5\n");
+    let mesh = load("a.obj", &text, Some(Normals::Smooth)).unwrap();
+    assert_eq!(corners(&mesh), TWO_TRIANGLES);
+    assert_eq!(
+        (mesh.positions.len(), &mesh.notes[..]),
+        (4, &["1 duplicate triangle dropped".to_string()][..])
+    );
+    // Not those of another group, nor those that look the other way.
+    let mesh = load("a.obj", text.replace("f 2 3 5", "g b\nf 2 3 5"), None).unwrap();
+    assert_eq!((mesh.triangles.len(), mesh.notes.len()), (3, 2), "{:?}", mesh.notes);
+    let mesh = load("a.obj", text.replace("f 2 3 5", "f 3 2 5"), None).unwrap();
+    assert_eq!(mesh.triangles.len(), 3);
+    let many = load("a.obj", format!("{text}{}", "f 1 3 4\nf 3 4 1\n".repeat(1000)), None).unwrap();
+    assert_eq!(corners(&many), TWO_TRIANGLES);
+    assert_eq!(many.notes, ["2001 duplicate triangles dropped"]);
+}
+
+#[test]
 fn obj_groups_are_pairs_of_name_and_material() {
-    let face = "f 1 2 3\n";
+    let [first, second, third] = ["f 1 2 3\n", "f 1 3 4\n", "f 1 2 4\n"];
     let text = format!(
-        "{SQUARE}{face}o box\nusemtl dark red\n{face}g lid of it\nusemtl blue\n{face}o box\nusemtl dark red\n{face}{face}\
-         o empty\ng lid of it\n{face}usemtl blue\n{face}usemtl\n{face}"
+        "{SQUARE}{first}o box\nusemtl dark red\n{first}g lid of it\nusemtl blue\n{first}o box\nusemtl dark red\n{second}\
+         {third}o empty\ng lid of it\n{first}usemtl blue\n{second}usemtl\n{first}"
     );
     let mesh = load("a.obj", text, None).unwrap();
     let groups: Vec<(&str, Option<&str>)> = mesh
@@ -227,15 +271,22 @@ fn materials_come_from_the_folder_of_the_mesh() {
     );
     std::fs::write(&path, text).unwrap();
     let mesh = Mesh::load(&path, None).unwrap();
-    let names: Vec<&str> = mesh.library.iter().map(|material| material.name.as_str()).collect();
-    assert_eq!(names, ["red", "blue"]);
-    assert_eq!(mesh.library[0].diffuse, Some([1.0, 0.0, 0.0]));
+    let libraries = &mesh.libraries;
+    let files: Vec<_> = libraries.iter().map(|library| library.file.clone()).collect();
+    let named = ["more/my red.mtl", "../outside.mtl", "blue.mtl", "none.mtl"];
+    assert_eq!(files, named.map(|name| inner.join(name)));
+    let names = libraries.iter().flat_map(|library| &library.materials);
+    let names: Vec<_> = names.map(|material| (material.name.as_str(), material.line)).collect();
+    assert_eq!(names, [("red", 1), ("blue", 1)]);
+    assert_eq!(libraries[0].materials[0].diffuse, Some([1.0, 0.0, 0.0]));
+    let unread: Vec<bool> = libraries.iter().map(|library| library.problem.is_some()).collect();
+    assert_eq!(unread, [false, true, false, true]);
     let [values, outside, none] = &mesh.notes[..] else {
         panic!("{:?}", mesh.notes)
     };
     assert_eq!(
         values,
-        "more/my red.mtl:3: the value: \"a\" must be a number; 1 more lines cannot be read"
+        "more/my red.mtl:3: the value: \"a\" must be a number; 1 more line cannot be read"
     );
     assert_eq!(
         outside,
@@ -245,6 +296,29 @@ fn materials_come_from_the_folder_of_the_mesh() {
         none.starts_with("the file of materials \"none.mtl\" is not read: "),
         "{none}"
     );
+}
+
+#[test]
+fn materials_may_be_named_by_paths_of_other_machines() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("in")).unwrap();
+    std::fs::write(folder.path().join("a b.mtl"), "newmtl a\n").unwrap();
+    std::fs::write(folder.path().join("in/c.mtl"), "newmtl c\n").unwrap();
+    let path = folder.path().join("a.obj");
+    for (named, expected) in [
+        ("C:\\some body\\a b.mtl", "a"),
+        ("/some body/a b.mtl", "a"),
+        (".\\in\\c.mtl", "c"),
+        ("in/c.mtl", "c"),
+    ] {
+        std::fs::write(&path, format!("mtllib {named}\n{SQUARE}f 1 2 3\n")).unwrap();
+        let mesh = Mesh::load(&path, None).unwrap();
+        assert_eq!(mesh.notes, Vec::<String>::new(), "{named}");
+        assert_eq!(mesh.libraries[0].materials[0].name, expected, "{named}");
+    }
+    // A name without a folder is no path.
+    std::fs::write(&path, format!("mtllib c.mtl\n{SQUARE}f 1 2 3\n")).unwrap();
+    assert_eq!(Mesh::load(&path, None).unwrap().notes.len(), 1);
 }
 
 #[test]
@@ -339,7 +413,7 @@ fn binary_stl_is_told_by_its_size() {
     assert!(error.starts_with("a.stl:1: "), "{error}");
     longer[0] = b'x';
     let mesh = load("a.stl", &longer, None).unwrap();
-    assert_eq!(mesh.notes, ["1 bytes behind the last triangle are not looked at"]);
+    assert_eq!(mesh.notes, ["1 byte behind the last triangle is not looked at"]);
     assert_eq!(
         load("a.stl", &longer[..300], None).unwrap_err(),
         "a.stl: byte 80: 6 triangles must be a file of 384 bytes; it has 300"
@@ -414,8 +488,8 @@ fn a_mesh_far_away_keeps_its_digits() {
 fn surfaces_that_are_odd_are_noted() {
     let text = format!("{SQUARE}v 0 0 1\nf 1 2 3\nf 1 4 3\nf 1 5 3\n");
     let mesh = load("a.obj", text, None).unwrap();
-    assert_eq!(mesh.notes, ["1 edges belong to more than two triangles (non-manifold)"]);
+    assert_eq!(mesh.notes, ["1 edge belongs to more than two triangles (non-manifold)"]);
     let mesh = load("a.obj", format!("{SQUARE}f 1 2 3\nf 1 4 3\n"), None).unwrap();
-    let rest = "edges are passed in the same direction by both triangles (windings differ)";
-    assert_eq!(mesh.notes, [format!("1 {rest}")]);
+    let told = "1 edge is passed in the same direction by both triangles (windings differ)";
+    assert_eq!(mesh.notes, [told]);
 }

@@ -139,6 +139,7 @@ fn is_hidden(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> bool 
     let surface = Surface {
         position: origin,
         normal: Vec3::Z,
+        smooth_normal: Vec3::Z,
         shading_normal: Vec3::Z,
         wo: Vec3::Z,
         start: origin,
@@ -165,7 +166,7 @@ fn is_hidden(scene: &Packed, origin: Vec3, direction: Vec3, times: f64) -> bool 
         group: 0,
         key: UVec2::ZERO,
     };
-    hidden_samples(scene, &surface, &light, block) == 1
+    hidden_samples(scene, &surface, &light, block, 0) == 1
 }
 
 fn convex() -> [(&'static str, Form); 4] {

@@ -8,6 +8,7 @@ use wgray::job::Cut;
 use wgray::pack::Packed;
 
 use super::{cpu_picture, scene, write_exr, write_png};
+use crate::meshes::forms::Sheet;
 use crate::pictures::{Way, backend, film, reference, whole};
 use crate::render::compare;
 use crate::{adapter, sources};
@@ -37,7 +38,45 @@ fn scenes(folder: &Path) -> Vec<(String, Packed)> {
             scenes.push((format!("{filter} {wrap}"), scene(&every_shape(filter, wrap), folder)));
         }
     }
+    scenes.push(("meshes".to_string(), scene(&meshes(folder), folder)));
     scenes
+}
+
+/// Smooth meshes with normal maps: one whose texture goes around it, and one whose texture is mirrored in its middle.
+fn meshes(folder: &Path) -> String {
+    let around = Sheet::torus(12, 8);
+    let mut mirrored = around.clone();
+    for [u, v] in &mut mirrored.uvs {
+        (*u, *v) = ((*u - 0.5).abs() * 3.0, *v + *u);
+    }
+    for (name, sheet) in [("around.obj", around), ("mirrored.obj", mirrored)] {
+        std::fs::write(folder.join(name), sheet.obj()).unwrap();
+    }
+    let head = every_shape("ewa", "repeat");
+    format!(
+        "{head}
+        [[shapes]]
+        type = 'mesh'
+        file = 'around.obj'
+        material = 'float'
+        scale = [0.5, -0.7, 0.4]
+        rotate = [70, 20, 10]
+        translate = [0.6, 0.8, 1.3]
+        [[shapes]]
+        type = 'mesh'
+        file = 'mirrored.obj'
+        material = 'glass'
+        scale = 0.6
+        rotate = [30, -20, 0]
+        translate = [-0.7, -0.6, 1.4]
+        [[shapes]]
+        type = 'mesh'
+        file = 'mirrored.obj'
+        material = 'float'
+        normals = 'flat'
+        scale = 0.5
+        translate = [0.2, -1, 0.3]"
+    )
 }
 
 fn every_shape(filter: &str, wrap: &str) -> String {

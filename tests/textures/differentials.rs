@@ -6,13 +6,14 @@ use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3};
 use wgray::cpu::camera::{camera_differential, camera_ray};
 use wgray::cpu::differential::{Arrival, reflected_derivative};
 use wgray::cpu::footprint::surface_footprint;
-use wgray::cpu::geometry::{arrival_of, closest_hit, material_of, spot_of, surface_of};
+use wgray::cpu::geometry::{arrival_of, closest_hit, footprint_of, material_of, spot_of, surface_of};
 use wgray::cpu::integrators::phong::{is_specular, scatter};
 use wgray::cpu::path::Path;
 use wgray::cpu::surface::{Surface, with_coordinates};
 use wgray::pack::{NOTHING, NOWHERE, Packed, Primitive};
 
 use super::scene;
+use crate::meshes::forms::Sheet;
 
 const PERSPECTIVE: &str = "camera = { position = [0.3, -4, 1.6], look_at = [0, 0, 0.6], fov = 40 }";
 const ORTHOGRAPHIC: &str =
@@ -291,4 +292,149 @@ fn a_curved_mirror_needs_its_curvature() {
     };
     assert!(error(arrival.normal_x) < 1e-3, "{}", error(arrival.normal_x));
     assert!(error(Vec3::ZERO) > 0.3, "{}", error(Vec3::ZERO));
+}
+
+/// A smooth mesh under this map.
+fn torus(sheet: &Sheet, camera: &str, matrix: DMat3) -> Packed {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("torus.obj"), sheet.obj()).unwrap();
+    let rows = matrix.transpose();
+    let row = |row: DVec3| format!("[{}, {}, {}, 0.1]", row.x, row.y, row.z);
+    let text = format!(
+        "image = {{ width = 64, height = 48 }}
+        {camera}
+        [textures.t]
+        type = 'checker'
+        even = [0, 0, 0]
+        odd = [1, 1, 1]
+        [materials.m]
+        type = 'phong'
+        color = {{ texture = 't' }}
+        [[shapes]]
+        type = 'mesh'
+        file = 'torus.obj'
+        material = 'm'
+        matrix = [{}, {}, {}]",
+        row(rows.x_axis),
+        row(rows.y_axis),
+        row(rows.z_axis)
+    );
+    scene(&text, folder.path())
+}
+
+/// What a point of a mesh is like, in f64.
+struct Point {
+    position: DVec3,
+    uv: DVec2,
+    normal: DVec3,
+}
+
+/// The point where a ray meets the plane of a mesh's triangle.
+fn on_triangle(sheet: &Sheet, matrix: DMat3, triangle: usize, (o, d): (DVec3, DVec3)) -> Point {
+    let corners = sheet.form.triangles[triangle].map(|vertex| vertex as usize);
+    let [p, q, r] = corners.map(|corner| matrix * sheet.form.points[corner] + 0.1);
+    let (e, f) = (q - p, r - p);
+    let across = e.cross(f);
+    let position = o + d * ((p - o).dot(across) / d.dot(across));
+    let way = position - p;
+    let b = way.cross(f).dot(across) / across.length_squared();
+    let c = e.cross(way).dot(across) / across.length_squared();
+    let weights = [1.0 - b - c, b, c];
+    let to_world = matrix.inverse().transpose();
+    let [mut uv, mut normal] = [DVec3::ZERO; 2];
+    for (corner, weight) in corners.into_iter().zip(weights) {
+        let [u, v] = sheet.uvs[corner];
+        uv += DVec3::new(u, v, 0.0) * weight;
+        normal += (to_world * sheet.normals[corner]).normalize() * weight;
+    }
+    let normal = normal.normalize();
+    Point {
+        position,
+        uv: uv.truncate(),
+        // Towards the viewer, as its triangle is.
+        normal: if d.dot(across) * matrix.determinant() > 0.0 {
+            -normal
+        } else {
+            normal
+        },
+    }
+}
+
+#[test]
+fn points_of_a_mesh_change_as_on_neighbouring_rays() {
+    let sheet = Sheet::torus(12, 8);
+    let turned = DMat3::from_cols(
+        DVec3::new(0.9, 0.3, 0.2),
+        DVec3::new(-0.2, 0.5, 0.5),
+        DVec3::new(0.1, -0.6, 0.8),
+    );
+    let mirroring = DMat3::from_cols(turned.x_axis, turned.y_axis, -turned.z_axis);
+    // From inside of its tube.
+    let inside = "camera = { position = [1, 0.45, 0.4], look_at = [0.5, 0.75, 0.7], fov = 70 }";
+    for (camera, matrix) in [
+        (PERSPECTIVE, turned),
+        (PERSPECTIVE, mirroring),
+        (ORTHOGRAPHIC, turned),
+        (inside, turned),
+    ] {
+        let packed = torus(&sheet, camera, matrix);
+        let exact = Exact {
+            scene: &packed,
+            ellipsoid: None,
+        };
+        let mut compared = 0;
+        for (x, y) in (0..48).flat_map(|y| (0..64).map(move |x| (x, y))) {
+            let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+            let ray = camera_ray(&packed.camera, at);
+            let hit = closest_hit(&packed, ray, NOWHERE, NOWHERE);
+            if hit.primitive == NOTHING {
+                continue;
+            }
+            let spot = spot_of(&packed, hit);
+            let surface = surface_of(&packed, &spot, hit, ray);
+            if ray.direction.dot(surface.normal).abs() < 0.1 {
+                continue;
+            }
+            let differential = camera_differential(&packed.camera, at, 1.0);
+            let arrival = arrival_of(&packed, &spot, hit, surface, ray, differential);
+            let footprint = footprint_of(&spot, hit, surface, arrival);
+            let point = |at: DVec2| {
+                let (o, d) = exact.camera(at);
+                on_triangle(&sheet, matrix, hit.primitive as usize, (o + packed.origin, d))
+            };
+            let middle = point(at.as_dvec2());
+            let met = surface.position.as_dvec3() + packed.origin;
+            assert!(
+                (met - middle.position).length() < 1e-4,
+                "({x}, {y}): {met} {}",
+                middle.position
+            );
+            assert!(
+                (surface.shading_normal.as_dvec3() - middle.normal).length() < 1e-3,
+                "({x}, {y})"
+            );
+            let h = 1e-3;
+            for (step, found, uv, normal) in [
+                (DVec2::X, arrival.x, footprint.dx, arrival.normal_x),
+                (DVec2::Y, arrival.y, footprint.dy, arrival.normal_y),
+            ] {
+                let (after, before) = (point(at.as_dvec2() + step * h), point(at.as_dvec2() - step * h));
+                let of_position = (after.position - before.position) / (2.0 * h);
+                let of_uv = (after.uv - before.uv) / (2.0 * h);
+                let of_normal = (after.normal - before.normal) / (2.0 * h);
+                for (name, found, expected) in [
+                    ("position", found.position.as_dvec3(), of_position),
+                    ("uv", uv.as_dvec2().extend(0.0), of_uv.extend(0.0)),
+                    ("normal", normal.as_dvec3(), of_normal),
+                ] {
+                    assert!(
+                        (found - expected).length() < 1e-3 * expected.length() && expected.length() > 1e-4,
+                        "({x}, {y}): {name}: {found} {expected}"
+                    );
+                    compared += 1;
+                }
+            }
+        }
+        assert!(compared > 3000, "{camera}: {compared}");
+    }
 }

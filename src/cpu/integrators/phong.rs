@@ -7,7 +7,7 @@ use crate::cpu::geometry::{arrival_of, closest_hit, hidden_samples, material_of,
 use crate::cpu::light::segments_to_light;
 use crate::cpu::mesh::Spot;
 use crate::cpu::path::{Path, Scattered, glass_path, mirrored_path, usable_normal};
-use crate::cpu::phong::{Lobes, phong_block};
+use crate::cpu::phong::{Lobes, phong_block, unlit_samples};
 use crate::cpu::ray::{Hit, Ray};
 use crate::cpu::rng::unit_float;
 use crate::cpu::sampling::{decision_bits, sample_key};
@@ -106,11 +106,13 @@ pub fn radiance_from(scene: &Packed, spot: &Spot, hit: Hit, path: Path, pixel: U
     let (area_lights, delta_lights) = scene.lights.split_at(scene.counts.lights.x as usize);
     for light in area_lights {
         let (pattern, side, count) = (s.light_pattern, s.light_side, s.light_samples);
-        let lobes = lobes_of_light(scene, &surface, material, light, pattern, side, count, pixel, sample);
+        let lobes = lobes_of_light(
+            scene, spot, &surface, material, light, pattern, side, count, pixel, sample,
+        );
         sum += phong_radiance(material, light, lobes, scene.environment.light_weight);
     }
     for light in delta_lights {
-        let lobes = lobes_of_light(scene, &surface, material, light, GRID, 1, 1, pixel, sample);
+        let lobes = lobes_of_light(scene, spot, &surface, material, light, GRID, 1, 1, pixel, sample);
         sum += phong_radiance(material, light, lobes, 1.0);
     }
     sum
@@ -119,6 +121,7 @@ pub fn radiance_from(scene: &Packed, spot: &Spot, hit: Hit, path: Path, pixel: U
 #[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
 pub fn lobes_of_light(
     scene: &Packed,
+    spot: &Spot,
     surface: &Surface,
     material: &Material,
     light: &Light,
@@ -144,7 +147,11 @@ pub fn lobes_of_light(
             group: sample,
             key,
         };
-        let hidden = hidden_samples(scene, surface, light, block);
+        let mut unlit = 0;
+        if scene.specialization.in_tree != 0 {
+            unlit = unlit_samples(spot, surface, to, block);
+        }
+        let hidden = hidden_samples(scene, surface, light, block, unlit);
         lobes = phong_block(
             surface,
             material,

@@ -8,34 +8,27 @@ use fearless_simd::prelude::*;
 
 use super::closest::{STACK, side};
 use super::four::Four;
-use super::line::{LEAST, greater, in_order, less};
-use super::{Line, Mesh, Segments};
-use crate::pack::tree::Node;
+use super::line::{LEAST, axes_from, greater, in_order, less};
+use super::{Directions, Line, MOST, Mesh, Segments};
+use crate::pack::tree::{Aabb, Node};
 
-/// Segments at once, at most.
-const MOST: usize = 32;
-/// Blocks that they make at most: each of three groups has one that is not full, and one of 4 is as small as they get.
-const BLOCKS: usize = MOST / 4 + 2;
-
-/// So many segments are tested against the boxes of a node one by one.
+/// So many segments are tested against the boxes of a node, or the triangles of a leaf, one by one.
 const FEW: u32 = 6;
 
-/// So many segments are tested against the triangles of a leaf one by one.
-const FEW_IN_LEAF: u32 = 6;
+/// As many vectors hold all segments, at most: of four numbers each.
+const MOST_LANES: usize = MOST / 4;
 
-/// Segments whose directions have the largest component along the same axis, as many as a vector has places.
+/// As many segments as a vector has places. Their places are their numbers.
 #[derive(Clone, Copy)]
-struct Block<S: Simd> {
-    /// As for a [`Line`](super::Line).
-    axes: [usize; 3],
+struct Lanes<S: Simd> {
+    /// The axes as for a [`Line`](super::Line), if they are those of all segments.
+    axes: Option<[usize; 3]>,
+    /// Where the largest component is along x, and where along y.
+    largest: [S::mask32s; 2],
     /// As for a [`Line`](super::Line).
     shear: [S::f32s; 3],
     /// The reciprocals of the directions' x, y and z.
     inverse: [S::f32s; 3],
-    /// A bit for each that there is.
-    full: u64,
-    /// Which they are.
-    numbers: [u8; 16],
 }
 
 /// One axis of all directions, for tests that a box passes wherever one of the segments does.
@@ -52,13 +45,9 @@ struct Slope {
     inverse: [f32; 2],
 }
 
-/// Components of directions, one array an axis.
-type Components = [[f32; MOST]; 3];
-
 /// See [`super::hidden`].
 #[inline(always)]
 pub fn hidden<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) -> u32 {
-    let width = S::f32s::LEN;
     let o = segments.o.to_array();
     walk(
         simd,
@@ -66,20 +55,14 @@ pub fn hidden<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) ->
         segments,
         asked,
         #[inline(always)]
-        |blocks, items, mask| {
+        |lanes, items, mask| {
             let mut waiting = mask;
             for triangles in mesh.triangles[items].chunks(4) {
-                if waiting.count_ones() <= FEW_IN_LEAF {
+                if waiting.count_ones() <= FEW {
                     let four = Four::new(simd, mesh, triangles);
-                    let mut each = waiting;
-                    while each != 0 {
-                        let i = each.trailing_zeros() as usize;
-                        each &= each - 1;
-                        let (block, place) = (&blocks[i / width], i % width);
-                        let (mut met, t) = four.met_by(simd, &block.line(place, &o, segments.pad));
-                        while met != 0 {
-                            let c = met.trailing_zeros() as usize;
-                            met &= met - 1;
+                    for i in bits_of(waiting) {
+                        let (met, t) = four.met_by(simd, &line_at(lanes, i, &o, segments.pad));
+                        for c in bits_of(met) {
                             if t[c] > 0.0 && t[c] < segments.reach && triangles[c][3] != segments.skip {
                                 waiting &= !(1 << i);
                             }
@@ -96,11 +79,11 @@ pub fn hidden<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) ->
                         &mesh.vertices[*b as usize],
                         &mesh.vertices[*c as usize],
                     ];
-                    for (i, block) in blocks.iter().enumerate() {
-                        if waiting >> (i * width) & block.full != 0 {
-                            waiting &= !(triangle_hides(simd, block, &o, segments, vertices) << (i * width));
-                        }
-                    }
+                    waiting &= !in_lanes(
+                        lanes,
+                        #[inline(always)]
+                        |lanes| triangle_hides(simd, lanes, &o, segments, vertices),
+                    );
                 }
             }
             mask & !waiting
@@ -108,74 +91,87 @@ pub fn hidden<S: Simd>(simd: S, mesh: &Mesh, segments: &Segments, asked: u32) ->
     )
 }
 
-/// See [`super::hidden_leaves`].
+/// See [`super::hidden_items`].
 #[inline(always)]
-pub fn leaves<S: Simd>(
+pub fn items<S: Simd>(
     simd: S,
     nodes: &[Node],
     segments: &Segments,
     asked: u32,
-    mut visit: impl FnMut(Range<usize>, u32) -> u32,
+    boxes: impl Fn(usize) -> Option<Aabb>,
+    mut visit: impl FnMut(usize, u32) -> u32,
 ) -> u32 {
-    let width = S::f32s::LEN;
+    let o = segments.o.to_array();
     walk(
         simd,
         nodes,
         segments,
         asked,
         #[inline(always)]
-        |blocks, items, mask| {
-            let hidden = visit(items, numbers_of(blocks, width, mask));
-            let mut places = mask;
-            let mut each = mask;
-            while each != 0 {
-                let i = each.trailing_zeros() as usize;
-                each &= each - 1;
-                if hidden >> blocks[i / width].numbers[i % width] & 1 == 0 {
-                    places &= !(1 << i);
+        |lanes, items, mask| {
+            let mut hidden = 0;
+            for item in items {
+                let Some(bounds) = boxes(item) else { continue };
+                let passing = in_lanes(
+                    lanes,
+                    #[inline(always)]
+                    |lanes| passing_box(simd, lanes, &o, segments, &bounds),
+                ) & mask
+                    & !hidden;
+                if passing != 0 {
+                    hidden |= visit(item, passing);
                 }
             }
-            places
+            hidden
         },
     )
 }
 
-/// The segments at these places of the blocks, a bit for each.
+/// The numbers of the bits that are set.
 #[inline(always)]
-fn numbers_of<S: Simd>(blocks: &[Block<S>], width: usize, mut places: u64) -> u32 {
-    let mut numbers = 0;
-    while places != 0 {
-        let i = places.trailing_zeros() as usize;
-        places &= places - 1;
-        numbers |= 1 << blocks[i / width].numbers[i % width];
-    }
-    numbers
+fn bits_of(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(
+        #[inline(always)]
+        move || {
+            let i = bits.trailing_zeros();
+            bits &= bits.checked_sub(1)?;
+            Some(i as usize)
+        },
+    )
 }
 
-/// Visits leaves with the segments that pass their boxes, as bits for places of the blocks, each of which has as many as a
-/// vector; is told which of them are hidden; and says which segments are.
+/// What a test of all segments of a vector says, for all of them.
+#[inline(always)]
+fn in_lanes<S: Simd>(lanes: &[Lanes<S>], mut test: impl FnMut(&Lanes<S>) -> u64) -> u32 {
+    let mut bits = 0;
+    for (i, lanes) in lanes.iter().enumerate() {
+        bits |= (test(lanes) as u32) << (i * S::f32s::LEN);
+    }
+    bits
+}
+
+/// Visits leaves with the segments that pass their boxes; is told which of them are hidden; and says which of all are.
 #[inline(always)]
 fn walk<S: Simd>(
     simd: S,
     nodes: &[Node],
     segments: &Segments,
     asked: u32,
-    mut visit: impl FnMut(&[Block<S>], Range<usize>, u64) -> u64,
+    mut visit: impl FnMut(&[Lanes<S>], Range<usize>, u32) -> u32,
 ) -> u32 {
-    let width = S::f32s::LEN;
-    let mut blocks = ArrayVec::new();
-    let slopes = prepare(simd, segments, asked, &mut blocks);
-    let mut all = 0u64;
-    for (i, block) in blocks.iter().enumerate() {
-        all |= block.full << (i * width);
+    let mut waiting = asked & segments.directions.all();
+    if waiting == 0 {
+        return 0;
     }
-    let mut waiting = all;
+    let asked = waiting;
+    let mut lanes = ArrayVec::new();
+    let slopes = prepare(simd, segments, &mut lanes);
     let zero = f32x8::splat(simd, 0.0);
     let reach = f32x8::splat(simd, segments.reach);
-    let mut stack: ArrayVec<(u32, u64), STACK> = ArrayVec::new();
+    let mut stack: ArrayVec<(u32, u32), STACK> = ArrayVec::new();
     stack.push((0, waiting));
     while let Some((number, mask)) = stack.pop() {
-        let mut mask = mask & waiting;
+        let mask = mask & waiting;
         if mask == 0 {
             continue;
         }
@@ -189,16 +185,14 @@ fn walk<S: Simd>(
             }
         }
         // For each child those that pass its box; the children that any passes.
-        let mut children = [0u64; 8];
+        let mut children = [0u32; 8];
         let mut any = 0;
         if mask.count_ones() <= FEW {
-            while mask != 0 {
-                let i = mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                let inverse = &blocks[i / width].inverse;
+            for i in bits_of(mask) {
+                let inverse = &lanes[i / S::f32s::LEN].inverse;
                 let (mut near, mut far) = (zero, reach);
                 for k in 0..3 {
-                    let inverse = inverse[k][i % width];
+                    let inverse = inverse[k][i % S::f32s::LEN];
                     let (a, b) = (seen[0][k] * inverse, seen[1][k] * inverse);
                     if slopes[k].same {
                         near = near.max(a);
@@ -212,7 +206,7 @@ fn walk<S: Simd>(
                 any |= passed;
                 // No branches, as they would be guessed wrong.
                 for (c, child) in children.iter_mut().enumerate() {
-                    *child |= u64::from(passed >> c & 1) << i;
+                    *child |= (passed >> c & 1) << i;
                 }
             }
         } else {
@@ -226,118 +220,95 @@ fn walk<S: Simd>(
                     near = near.max(second);
                 }
             }
-            let mut passed = (near.simd_le(far) & far.simd_gt(zero)).to_bitmask() as u32;
-            while passed != 0 {
-                let c = passed.trailing_zeros() as usize;
-                passed &= passed - 1;
-                for (i, block) in blocks.iter().enumerate() {
-                    children[c] |= passing(simd, block, &slopes, &seen, c, segments.reach) << (i * width);
-                }
-                children[c] &= mask;
+            let passed = (near.simd_le(far) & far.simd_gt(zero)).to_bitmask() as u32;
+            for c in bits_of(passed) {
+                children[c] = mask
+                    & in_lanes(
+                        &lanes,
+                        #[inline(always)]
+                        |lanes| passing(simd, lanes, &slopes, &seen, c, segments.reach),
+                    );
                 any |= u32::from(children[c] != 0) << c;
             }
         }
-        let mut inner = any & u32::from(node.inner);
-        while inner != 0 {
-            let c = inner.trailing_zeros();
-            inner &= inner - 1;
+        for c in bits_of(any & u32::from(node.inner)) {
             let before = u32::from(node.inner) & ((1 << c) - 1);
-            stack.push((node.first_child + before.count_ones(), children[c as usize]));
+            stack.push((node.first_child + before.count_ones(), children[c]));
         }
-        let mut leaves = any & !u32::from(node.inner);
-        while leaves != 0 {
-            let c = leaves.trailing_zeros() as usize;
-            leaves &= leaves - 1;
+        for c in bits_of(any & !u32::from(node.inner)) {
             let mask = children[c] & waiting;
             if mask != 0 {
-                waiting &= !visit(&blocks, node.items(c), mask);
+                waiting &= !visit(&lanes, node.items(c), mask);
             }
         }
     }
-    numbers_of(&blocks, width, all & !waiting)
+    asked & !waiting
 }
 
-impl<S: Simd> Block<S> {
-    /// The segment at a place.
-    #[inline(always)]
-    fn line(&self, place: usize, o: &[f32; 3], pad: f32) -> Line {
-        let o = in_order(o, self.axes);
-        let [x, y, z] = self.axes;
-        Line {
-            axes: self.axes,
-            o,
-            o_low: [o[0] + pad, o[1] + pad, o[2] + pad],
-            o_high: [o[0] - pad, o[1] - pad, o[2] - pad],
-            inverse: [self.inverse[x][place], self.inverse[y][place], self.inverse[z][place]],
-            shear: [self.shear[0][place], self.shear[1][place], self.shear[2][place]],
-        }
-    }
-}
-
-/// Makes blocks of the segments that are asked for.
+/// The segment at a place.
 #[inline(always)]
-fn prepare<S: Simd>(simd: S, segments: &Segments, asked: u32, blocks: &mut ArrayVec<Block<S>, BLOCKS>) -> [Slope; 3] {
-    let width = S::f32s::LEN;
-    let mut all: Components = [[1.0; MOST]; 3];
-    let mut numbers = [0; MOST];
-    let mut count = 0;
-    for (i, d) in segments.directions.iter().enumerate().take(MOST) {
-        if asked >> i & 1 == 1 {
-            [all[0][count], all[1][count], all[2][count]] = d.to_array();
-            numbers[count] = i as u8;
-            count += 1;
-        }
+fn line_at<S: Simd>(lanes: &[Lanes<S>], place: usize, o: &[f32; 3], pad: f32) -> Line {
+    let (lanes, i) = (&lanes[place / S::f32s::LEN], place % S::f32s::LEN);
+    let axes = lanes.axes.unwrap_or_else(|| {
+        let [x, y] = lanes.largest.map(|mask| mask.to_bitmask() >> i & 1 == 1);
+        axes_from(if x {
+            0
+        } else if y {
+            1
+        } else {
+            2
+        })
+    });
+    let o = in_order(o, axes);
+    let [x, y, z] = axes;
+    Line {
+        axes,
+        o,
+        o_low: [o[0] + pad, o[1] + pad, o[2] + pad],
+        o_high: [o[0] - pad, o[1] - pad, o[2] - pad],
+        inverse: [lanes.inverse[x][i], lanes.inverse[y][i], lanes.inverse[z][i]],
+        shear: [lanes.shear[0][i], lanes.shear[1][i], lanes.shear[2][i]],
     }
-    // The places that are left of the last vector.
-    for i in count..count.next_multiple_of(width) {
-        for axis in &mut all {
-            axis[i] = axis[0];
-        }
-    }
+}
+
+/// Makes vectors of the segments.
+#[inline(always)]
+fn prepare<S: Simd>(simd: S, segments: &Segments, lanes: &mut ArrayVec<Lanes<S>, MOST_LANES>) -> [Slope; 3] {
+    let one = S::f32s::splat(simd, 1.0);
     let mut bounds = [
         [S::f32s::splat(simd, f32::INFINITY); 3],
         [S::f32s::splat(simd, f32::NEG_INFINITY); 3],
     ];
-    let mut thirds = [0u32; 3];
-    for i in (0..count).step_by(width) {
-        let mut size = [S::f32s::splat(simd, 0.0); 3];
+    let Directions { count, along } = segments.directions;
+    for i in (0..*count).step_by(S::f32s::LEN) {
+        let mut d = [one; 3];
+        let mut inverse = [one; 3];
         for k in 0..3 {
-            let d = S::f32s::from_slice(simd, &all[k][i..i + width]);
-            size[k] = d.abs();
-            let away = away_from_zero(simd, d);
+            d[k] = S::f32s::from_slice(simd, &along[k][i..i + S::f32s::LEN]);
+            let away = away_from_zero(simd, d[k]);
             bounds[0][k] = bounds[0][k].min(away);
             bounds[1][k] = bounds[1][k].max(away);
+            inverse[k] = one / away;
         }
-        let [x, y, z] = size;
-        let x_first = (x.simd_ge(y) & x.simd_ge(z)).to_bitmask() as u32;
-        let y_first = y.simd_ge(z).to_bitmask() as u32 & !x_first;
-        thirds[0] |= x_first << i;
-        thirds[1] |= y_first << i;
-    }
-    let these = if count == MOST { !0 } else { (1 << count) - 1 };
-    thirds = [thirds[0] & these, thirds[1] & these, these & !(thirds[0] | thirds[1])];
-    for (third, mut bits) in thirds.into_iter().enumerate() {
-        let axes = [(third + 1) % 3, (third + 2) % 3, third];
-        if bits == 0 {
-            continue;
-        }
-        if bits == these {
-            add_blocks(simd, axes, &all, &numbers, count, blocks);
-            break;
-        }
-        let mut group: Components = [[1.0; MOST]; 3];
-        let mut group_numbers = [0; MOST];
-        let mut group_count = 0;
-        while bits != 0 {
-            let i = bits.trailing_zeros() as usize;
-            bits &= bits - 1;
-            for k in 0..3 {
-                group[k][group_count] = all[k][i];
-            }
-            group_numbers[group_count] = numbers[i];
-            group_count += 1;
-        }
-        add_blocks(simd, axes, &group, &group_numbers, group_count, blocks);
+        let [x, y, z] = d.map(|d| d.abs());
+        let x_first = x.simd_ge(y) & x.simd_ge(z);
+        let y_first = y.simd_ge(z) & !x_first;
+        let all = (1 << S::f32s::LEN) - 1;
+        let axes = match (x_first.to_bitmask(), y_first.to_bitmask()) {
+            (x, _) if x == all => Some(axes_from(0)),
+            (_, y) if y == all => Some(axes_from(1)),
+            (0, 0) => Some(axes_from(2)),
+            _ => None,
+        };
+        let mut new = Lanes {
+            axes,
+            largest: [x_first, y_first],
+            shear: [one; 3],
+            inverse,
+        };
+        let [x, y, z] = new.in_order(d);
+        new.shear = [x / z, y / z, one / z];
+        lanes.push(new);
     }
     let mut slopes = [Slope::default(); 3];
     for k in 0..3 {
@@ -376,44 +347,67 @@ fn away_from_zero<S: Simd>(simd: S, d: S::f32s) -> S::f32s {
     d.abs().simd_ge(least).select(d, near)
 }
 
-/// Adds blocks of segments whose directions have the largest component along the third of the axes.
-#[inline(always)]
-fn add_blocks<S: Simd>(
-    simd: S,
-    axes: [usize; 3],
-    directions: &Components,
-    numbers: &[u8; MOST],
-    count: usize,
-    blocks: &mut ArrayVec<Block<S>, BLOCKS>,
-) {
-    let width = S::f32s::LEN;
-    let one = S::f32s::splat(simd, 1.0);
-    for first in (0..count).step_by(width) {
-        let here = width.min(count - first);
-        let mut d = [one; 3];
-        let mut inverse = [one; 3];
-        for k in 0..3 {
-            d[k] = S::f32s::from_slice(simd, &directions[k][first..first + width]);
-            inverse[k] = one / away_from_zero(simd, d[k]);
+impl<S: Simd> Lanes<S> {
+    /// A vector's components in the order of each segment's axes.
+    #[inline(always)]
+    fn in_order(&self, v: [S::f32s; 3]) -> [S::f32s; 3] {
+        if let Some([x, y, z]) = self.axes {
+            return [v[x], v[y], v[z]];
         }
-        let [x, y, z] = [d[axes[0]], d[axes[1]], d[axes[2]]];
-        let mut block = Block {
-            axes,
-            shear: [x / z, y / z, one / z],
-            inverse,
-            full: (1 << here) - 1,
-            numbers: [0; 16],
-        };
-        block.numbers[..here].copy_from_slice(&numbers[first..first + here]);
-        blocks.push(block);
+        let [x, y, z] = v;
+        let [x_largest, y_largest] = self.largest;
+        [
+            x_largest.select(y, y_largest.select(z, x)),
+            x_largest.select(z, y_largest.select(x, y)),
+            x_largest.select(x, y_largest.select(y, z)),
+        ]
+    }
+
+    /// The same of one that all segments have in common.
+    #[inline(always)]
+    fn splat_in_order(&self, simd: S, v: [f32; 3]) -> [S::f32s; 3] {
+        match self.axes {
+            Some(axes) => in_order(&v, axes).map(|x| S::f32s::splat(simd, x)),
+            None => self.in_order(v.map(|x| S::f32s::splat(simd, x))),
+        }
     }
 }
 
-/// Which of the segments of a block that are not hidden pass a child's box.
+/// Which of the segments pass the box of an item: `is_passed` of `slab.rs`.
+#[inline(always)]
+fn passing_box<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], segments: &Segments, bounds: &Aabb) -> u64 {
+    let [near, far] = passage(
+        simd,
+        lanes,
+        o,
+        segments.pad,
+        bounds.low.to_array(),
+        bounds.high.to_array(),
+    );
+    let zero = S::f32s::splat(simd, 0.0);
+    let reach = S::f32s::splat(simd, segments.reach);
+    (near.simd_le(far) & far.simd_ge(zero) & near.simd_le(reach)).to_bitmask()
+}
+
+/// From where to where the segments' lines are in a box: [`Line::slab`](super::Line::slab) for each.
+#[inline(always)]
+fn passage<S: Simd>(simd: S, lanes: &Lanes<S>, o: &[f32; 3], pad: f32, low: [f32; 3], high: [f32; 3]) -> [S::f32s; 2] {
+    let mut near = S::f32s::splat(simd, f32::NEG_INFINITY);
+    let mut far = S::f32s::splat(simd, f32::INFINITY);
+    for k in 0..3 {
+        let a = lanes.inverse[k] * (low[k] - (o[k] + pad));
+        let b = lanes.inverse[k] * (high[k] - (o[k] - pad));
+        near = near.max(a.min(b));
+        far = far.min(a.max(b));
+    }
+    [near, far]
+}
+
+/// Which of the segments pass a child's box.
 #[inline(always)]
 fn passing<S: Simd>(
     simd: S,
-    block: &Block<S>,
+    lanes: &Lanes<S>,
     slopes: &[Slope; 3],
     seen: &[[f32x8<S>; 3]; 2],
     child: usize,
@@ -423,8 +417,8 @@ fn passing<S: Simd>(
     let mut near = zero;
     let mut far = S::f32s::splat(simd, reach);
     for k in 0..3 {
-        let a = block.inverse[k] * seen[0][k][child];
-        let b = block.inverse[k] * seen[1][k][child];
+        let a = lanes.inverse[k] * seen[0][k][child];
+        let b = lanes.inverse[k] * seen[1][k][child];
         if slopes[k].same {
             near = near.max(a);
             far = far.min(b);
@@ -433,29 +427,24 @@ fn passing<S: Simd>(
             far = far.min(a.max(b));
         }
     }
-    (near.simd_le(far) & far.simd_gt(zero)).to_bitmask() & block.full
+    (near.simd_le(far) & far.simd_gt(zero)).to_bitmask()
 }
 
-/// Which of the segments of a block a triangle hides: [`Line::triangle`](super::Line::triangle) for each.
+/// Which of the segments a triangle hides: [`Line::triangle`](super::Line::triangle) for each.
 #[inline(always)]
 fn triangle_hides<S: Simd>(
     simd: S,
-    block: &Block<S>,
+    lanes: &Lanes<S>,
     o: &[f32; 3],
     segments: &Segments,
     vertices: [&[f32; 4]; 3],
 ) -> u64 {
-    let o = in_order(o, block.axes);
     let zero = S::f32s::splat(simd, 0.0);
-    let mut corners = [[0.0; 3]; 3];
-    let mut seen = [[zero; 2]; 3];
-    for i in 0..3 {
-        corners[i] = in_order(vertices[i], block.axes);
-        let [x, y, z] = [corners[i][0] - o[0], corners[i][1] - o[1], corners[i][2] - o[2]];
-        seen[i] = [
-            S::f32s::splat(simd, x) - block.shear[0] * z,
-            S::f32s::splat(simd, y) - block.shear[1] * z,
-        ];
+    let mut seen = [[zero; 3]; 3];
+    for (seen, vertex) in seen.iter_mut().zip(vertices) {
+        let from_o = [vertex[0] - o[0], vertex[1] - o[1], vertex[2] - o[2]];
+        let [x, y, z] = lanes.splat_in_order(simd, from_o);
+        *seen = [x - lanes.shear[0] * z, y - lanes.shear[1] * z, z];
     }
     let [a, b, c] = seen;
     let u = c[0] * b[1] - c[1] * b[0];
@@ -463,26 +452,19 @@ fn triangle_hides<S: Simd>(
     let w = b[0] * a[1] - b[1] * a[0];
     let inside =
         (u.simd_ge(zero) & v.simd_ge(zero) & w.simd_ge(zero)) | (u.simd_le(zero) & v.simd_le(zero) & w.simd_le(zero));
-    if inside.to_bitmask() & block.full == 0 {
+    if inside.to_bitmask() == 0 {
         return 0;
     }
     let determinant = u + v + w;
-    let mut z = [zero; 3];
-    for i in 0..3 {
-        z[i] = block.shear[2] * (corners[i][2] - o[2]);
-    }
-    let t = (u * z[0] + v * z[1] + w * z[2]) / determinant;
-    let mut near = S::f32s::splat(simd, f32::NEG_INFINITY);
-    let mut far = S::f32s::splat(simd, f32::INFINITY);
+    let [a, b, c] = [a[2], b[2], c[2]].map(|z| lanes.shear[2] * z);
+    let t = (u * a + v * b + w * c) / determinant;
+    let [mut low, mut high] = [[0.0; 3]; 2];
     for k in 0..3 {
-        let low = less(less(corners[0][k], corners[1][k]), corners[2][k]);
-        let high = greater(greater(corners[0][k], corners[1][k]), corners[2][k]);
-        let inverse = block.inverse[block.axes[k]];
-        let a = inverse * (low - (o[k] + segments.pad));
-        let b = inverse * (high - (o[k] - segments.pad));
-        near = near.max(a.min(b));
-        far = far.min(a.max(b));
+        let [a, b, c] = vertices.map(|vertex| vertex[k]);
+        low[k] = less(less(a, b), c);
+        high[k] = greater(greater(a, b), c);
     }
+    let [near, far] = passage(simd, lanes, o, segments.pad, low, high);
     // Selected in this way, NaN stays NaN.
     let t = near.simd_gt(t).select(near, t);
     let t = far.simd_lt(t).select(far, t);
@@ -491,5 +473,5 @@ fn triangle_hides<S: Simd>(
         & near.simd_le(far)
         & t.simd_gt(zero)
         & t.simd_lt(S::f32s::splat(simd, segments.reach));
-    hit.to_bitmask() & block.full
+    hit.to_bitmask()
 }

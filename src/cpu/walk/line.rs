@@ -41,6 +41,12 @@ pub fn axes(d: Vec3) -> [usize; 3] {
         _ if y >= z => 1,
         _ => 2,
     };
+    axes_from(third)
+}
+
+/// The axes that end with this one.
+#[inline(always)]
+pub fn axes_from(third: usize) -> [usize; 3] {
     [(third + 1) % 3, (third + 2) % 3, third]
 }
 

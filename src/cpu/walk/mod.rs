@@ -22,7 +22,7 @@ use fearless_simd::dispatch;
 use glam::Vec3;
 
 pub use self::line::Line;
-use crate::pack::tree::Node;
+use crate::pack::tree::{Aabb, Node};
 
 /// Triangles below a tree.
 #[derive(Clone, Copy, Debug)]
@@ -64,6 +64,46 @@ pub fn leaves(level: Level, nodes: &[Node], line: &Line, limit: f32, visit: impl
     dispatch!(level, simd => closest::leaves(simd, nodes, line, limit, visit))
 }
 
+/// Segments at once, at most.
+pub const MOST: usize = 32;
+
+/// Up to 32 vectors, their x, y and z; the first stands in all places that are left.
+#[derive(Clone, Debug)]
+pub struct Directions {
+    /// How many there are.
+    pub count: usize,
+    /// The components.
+    pub along: [[f32; MOST]; 3],
+}
+
+impl Directions {
+    /// These vectors, at most 32.
+    pub fn new(vectors: &[Vec3]) -> Directions {
+        let first = vectors.first().copied().unwrap_or(Vec3::Z);
+        let mut directions = Directions {
+            count: vectors.len().min(MOST),
+            along: first.to_array().map(|x| [x; MOST]),
+        };
+        for (i, v) in vectors.iter().enumerate().take(MOST) {
+            for k in 0..3 {
+                directions.along[k][i] = v[k];
+            }
+        }
+        directions
+    }
+
+    /// One of them.
+    pub fn get(&self, i: usize) -> Vec3 {
+        let [x, y, z] = &self.along;
+        Vec3::new(x[i], y[i], z[i])
+    }
+
+    /// A bit for each.
+    pub fn all(&self) -> u32 {
+        ((1_u64 << self.count) - 1) as u32
+    }
+}
+
 /// Up to 32 segments from one point.
 #[derive(Clone, Copy, Debug)]
 pub struct Segments<'a> {
@@ -71,8 +111,8 @@ pub struct Segments<'a> {
     pub o: Vec3,
     /// Boxes are tested as if they were larger by so much on all sides.
     pub pad: f32,
-    /// From the point to the other ends, at most 32.
-    pub directions: &'a [Vec3],
+    /// From the point to the other ends.
+    pub directions: &'a Directions,
     /// Triangles at so many lengths of the direction, or beyond, hide nothing.
     pub reach: f32,
     /// The number of a triangle that hides nothing.
@@ -84,16 +124,33 @@ pub fn hidden(level: Level, mesh: &Mesh, segments: &Segments, asked: u32) -> u32
     dispatch!(level, simd => hidden::hidden(simd, mesh, segments, asked))
 }
 
-/// Visits the leaves of a tree that any of some segments meet: `visit` is given a range of the tree's order and the segments that
-/// meet its box, and says which of these are hidden. Says which of all are.
-pub fn hidden_leaves(
+/// Visits the items below a tree whose boxes any of some segments pass: `boxes` gives the box of an item, or nothing if it
+/// hides nothing; `visit` is given the item and the segments that pass its box, and says which of these are hidden. Says which of
+/// all are.
+pub fn hidden_items(
     level: Level,
     nodes: &[Node],
     segments: &Segments,
     asked: u32,
-    visit: impl FnMut(Range<usize>, u32) -> u32,
+    boxes: impl Fn(usize) -> Option<Aabb>,
+    visit: impl FnMut(usize, u32) -> u32,
 ) -> u32 {
-    dispatch!(level, simd => hidden::leaves(simd, nodes, segments, asked, visit))
+    dispatch!(level, simd => hidden::items(simd, nodes, segments, asked, boxes, visit))
+}
+
+/// All levels of instructions that this machine has.
+#[cfg(test)]
+pub(crate) fn levels() -> Vec<Level> {
+    let best = Level::new();
+    #[allow(unused_mut, reason = "not all machines have several")]
+    let mut levels = vec![best];
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    {
+        levels.extend(best.as_avx2().map(Level::Avx2));
+        levels.extend(best.as_sse4_2().map(Level::Sse4_2));
+        levels.extend(best.as_sse2().map(Level::Sse2));
+    }
+    levels
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 
-use super::{Level, Line, Mesh, Nearest, Segments, closest, hidden, hidden_leaves, leaves};
+use super::{Directions, Level, Line, Mesh, Nearest, Segments, closest, hidden, hidden_items, leaves, levels};
 use crate::pack::tree::{Aabb, Tree, build};
 
 const NONE: Nearest = Nearest {
@@ -96,8 +96,8 @@ impl Scene {
     /// [`hidden`] without a tree.
     fn hidden(&self, segments: &Segments, asked: u32) -> u32 {
         let mut bits = 0;
-        for (i, d) in segments.directions.iter().enumerate() {
-            let line = Line::new(segments.o, *d, segments.pad);
+        for i in 0..segments.directions.count {
+            let line = Line::new(segments.o, segments.directions.get(i), segments.pad);
             let hides = |triangle: &[u32; 4]| {
                 triangle[3] != segments.skip && self.t(triangle, &line).is_some_and(|t| t < segments.reach)
             };
@@ -105,20 +105,6 @@ impl Scene {
         }
         bits & asked
     }
-}
-
-/// All levels of instructions that this machine has.
-fn levels() -> Vec<Level> {
-    let best = Level::new();
-    #[allow(unused_mut, reason = "not all machines have several")]
-    let mut levels = vec![best];
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    {
-        levels.extend(best.as_avx2().map(Level::Avx2));
-        levels.extend(best.as_sse4_2().map(Level::Sse4_2));
-        levels.extend(best.as_sse2().map(Level::Sse2));
-    }
-    levels
 }
 
 /// What was compared, so that a test can say that it was something.
@@ -183,7 +169,7 @@ fn compare(
         let segments = Segments {
             o,
             pad,
-            directions: &directions,
+            directions: &Directions::new(&directions),
             reach: if i % 2 == 0 { 1.0 } else { 1e30 },
             skip,
         };
@@ -233,7 +219,7 @@ fn nothing_at_all() {
     let segments = Segments {
         o: Vec3::ZERO,
         pad: 0.0,
-        directions: &[Vec3::X, Vec3::Y],
+        directions: &Directions::new(&[Vec3::X, Vec3::Y]),
         reach: 1.0,
         skip: u32::MAX,
     };
@@ -411,20 +397,24 @@ fn leaves_are_visited_until_the_limit() {
             let segments = Segments {
                 o,
                 pad: 0.0,
-                directions: &directions,
+                directions: &Directions::new(&directions),
                 reach: 1.0,
                 skip: u32::MAX,
             };
             let asked = random.bits();
             let mut visits = 0;
-            let bits = hidden_leaves(level, &scene.tree.nodes, &segments, asked, |items, some| {
+            let bounds = |i: usize| {
+                let corners = [0, 1, 2].map(|k| scene.vertices[scene.triangles[i][k] as usize]);
+                Some(Aabb::around(&corners.map(|v| Vec3::new(v[0], v[1], v[2]))))
+            };
+            let bits = hidden_items(level, &scene.tree.nodes, &segments, asked, bounds, |item, some| {
                 assert_eq!(some & !asked, 0);
                 visits += 1;
                 let mut hidden = 0;
                 for (i, d) in directions.iter().enumerate().filter(|(i, _)| some >> i & 1 == 1) {
                     let line = Line::new(o, *d, 0.0);
-                    let hides = |triangle| scene.t(triangle, &line).is_some_and(|t| t < 1.0);
-                    hidden |= u32::from(scene.triangles[items.clone()].iter().any(hides)) << i;
+                    let hides = scene.t(&scene.triangles[item], &line).is_some_and(|t| t < 1.0);
+                    hidden |= u32::from(hides) << i;
                 }
                 hidden
             });

@@ -76,7 +76,7 @@ impl Painter {
         let names = self.loaded.as_ref().map(|loaded| Names {
             shapes: (loaded.scene.shapes.len() - loaded.scene.instances) as u32,
             instances: loaded.scene.instances as u32,
-            materials: loaded.materials.clone(),
+            materials: loaded.scene.material_names.clone(),
         });
         let bins = self.loaded.iter().flat_map(|loaded| &loaded.packed.filter_table);
         let look = Look {

@@ -15,6 +15,8 @@ use super::{At, BTreeMap, Checked, Color, Problem, between, check, color, list, 
 
 /// What all texels together may take, in bytes, as they are rendered from.
 const TEXEL_MEMORY: u64 = 1 << 30;
+/// The exponents of highlights.
+pub(super) const SHININESS: (f64, f64) = (1e-6, 1e6);
 /// Largest index of refraction.
 const DENSEST: f64 = 100.0;
 /// Largest ratio of a footprint's axes.
@@ -22,28 +24,35 @@ const LONGEST_FOOTPRINT: f64 = 64.0;
 /// The largest factor of, and addend to, a texture coordinate.
 const FARTHEST_COORDINATE: f64 = 1e6;
 
-pub(super) fn textures(descriptions: &BTreeMap<String, TextureDescription>, assets: &Assets) -> Checked<Vec<Texture>> {
-    let mut images = Images {
-        assets,
-        files: BTreeMap::new(),
-        taken: 0,
-    };
+pub(super) fn textures(
+    descriptions: &BTreeMap<String, TextureDescription>,
+    images: &mut Images,
+) -> Checked<Vec<Texture>> {
     let textures = descriptions
         .iter()
-        .map(|(name, description)| texture(description, &mut images).at(name.as_str()));
+        .map(|(name, description)| texture(description, images).at(name.as_str()));
     textures.collect()
 }
 
 /// The images so far: each file is read and kept once, whatever its names and however many textures have it.
-struct Images<'a> {
-    assets: &'a Assets,
+pub(super) struct Images<'a> {
+    pub(super) assets: &'a Assets,
     /// By their place, with the words that each takes.
     files: BTreeMap<Place, Vec<(File, u64)>>,
     /// The memory of all of them, in bytes.
     taken: u64,
 }
 
-impl Images<'_> {
+impl<'a> Images<'a> {
+    /// None so far.
+    pub(super) fn new(assets: &'a Assets) -> Images<'a> {
+        Images {
+            assets,
+            files: BTreeMap::new(),
+            taken: 0,
+        }
+    }
+
     fn image(&mut self, texture: &ImageTextureDescription) -> Result<Arc<Image>, String> {
         let file = &texture.file;
         let place = self.assets.find(file)?;
@@ -89,7 +98,7 @@ impl Images<'_> {
     }
 }
 
-fn texture(description: &TextureDescription, images: &mut Images) -> Checked<Texture> {
+pub(super) fn texture(description: &TextureDescription, images: &mut Images) -> Checked<Texture> {
     Ok(match description {
         TextureDescription::Constant(constant) => Texture {
             kind: TextureKind::Constant(color(constant.color).at("color")?),
@@ -226,7 +235,7 @@ impl Textures<'_> {
                     ambient: self.factor(phong, &phong.ambient, "ambient")?,
                     diffuse: self.factor(phong, &phong.diffuse, "diffuse")?,
                     specular: self.factor(phong, &phong.specular, "specular")?,
-                    shininess: between(phong.shininess, 1e-6, 1e6).at("shininess")?,
+                    shininess: between(phong.shininess, SHININESS.0, SHININESS.1).at("shininess")?,
                     normal_map: self.normal_map(&phong.normal_map).at("normal_map")?,
                 }
             }

@@ -5,23 +5,38 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
+use super::super::error::cut;
 use super::super::image_file::Place;
 use super::super::mesh_file;
 use super::super::{
     Assets, Color, Geometry, InstanceDescription, Material, MeshDescription, MeshFileDescription, Rotation, Scale,
     Shape, ShapeDescription, Up,
 };
+use super::mtl::Looks;
 use super::{At, Checked, FARTHEST, FLATTEST, LENGTHS, Problem, between, check, list, number, point, show, unit};
 use crate::mesh::{Group, Mesh, Normals};
 
 /// The most groups of all meshes' instances together.
 const MOST_GROUPS: usize = 1 << 24;
 
-/// What shapes name: materials, and meshes with the axis that is up.
+/// What shapes name: the scene's materials, and files.
 pub(super) struct Known<'a> {
     pub names: &'a BTreeMap<&'a str, usize>,
-    pub materials: &'a [Material],
+    pub looks: Looks<'a>,
     pub assets: &'a Assets,
+}
+
+impl Known<'_> {
+    /// The index of a material of the scene.
+    pub fn material(&self, name: &str) -> Checked<usize> {
+        let unknown = || {
+            Problem::new(match self.names.is_empty() {
+                true => format!("{name:?} is no material; the file has none"),
+                false => format!("{name:?} is no material; there are {}", list(self.names.keys())),
+            })
+        };
+        self.names.get(name).copied().ok_or_else(unknown)
+    }
 }
 
 /// A mesh that instances name.
@@ -42,18 +57,18 @@ struct Placement<'a> {
 }
 
 /// A mesh of `[meshes.NAME]`.
-pub(super) fn named(description: &MeshFileDescription, assets: &Assets) -> Checked<NamedMesh> {
+pub(super) fn named(description: &MeshFileDescription, known: &mut Known) -> Checked<NamedMesh> {
     let MeshFileDescription { file, normals, up } = description;
     Ok(NamedMesh {
-        mesh: load(file, *normals, assets)?,
+        mesh: load(file, *normals, known)?,
         up: *up,
         file: file.clone(),
     })
 }
 
 /// A shape of type `mesh`.
-pub(super) fn mesh(shape: &MeshDescription, known: &Known) -> Checked<Shape> {
-    let mesh = load(&shape.file, shape.normals, known.assets)?;
+pub(super) fn mesh(shape: &MeshDescription, known: &mut Known) -> Checked<Shape> {
+    let mesh = load(&shape.file, shape.normals, known)?;
     let placement = Placement {
         material: shape.material.as_ref(),
         materials: &shape.materials,
@@ -69,7 +84,7 @@ pub(super) fn mesh(shape: &MeshDescription, known: &Known) -> Checked<Shape> {
 pub(super) fn instance(
     instance: &InstanceDescription,
     meshes: &BTreeMap<&str, NamedMesh>,
-    known: &Known,
+    known: &mut Known,
 ) -> Checked<Shape> {
     let name = &instance.mesh;
     let unknown = || {
@@ -126,17 +141,19 @@ pub(super) fn notes(
     notes.into_iter().collect()
 }
 
-fn load(file: &str, normals: Option<Normals>, assets: &Assets) -> Checked<Arc<Mesh>> {
-    let place = assets.find(file).map_err(Problem::new).at("file")?;
+fn load(file: &str, normals: Option<Normals>, known: &mut Known) -> Checked<Arc<Mesh>> {
+    let place = known.assets.find(file).map_err(Problem::new).at("file")?;
     let Place::File(path) = place else {
         return Err(Problem::new(format!("{file:?} is an image in memory, and no mesh"))).at("file");
     };
-    mesh_file::load(&path, normals)
+    let mesh = mesh_file::load(&path, normals)
         .map_err(|error| Problem::new(error.to_string()))
-        .at("file")
+        .at("file")?;
+    known.looks.know(&mesh);
+    Ok(mesh)
 }
 
-fn placed(mesh: Arc<Mesh>, up: Up, file: &str, placement: &Placement, known: &Known) -> Checked<Shape> {
+fn placed(mesh: Arc<Mesh>, up: Up, file: &str, placement: &Placement, known: &mut Known) -> Checked<Shape> {
     let to_world = transform(placement)? * turned_up(up);
     let corners: Vec<DVec3> = mesh.corners().map(|corner| to_world.transform_point3(corner)).collect();
     let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
@@ -167,19 +184,14 @@ fn placed(mesh: Arc<Mesh>, up: Up, file: &str, placement: &Placement, known: &Kn
     })
 }
 
-/// For each group of a mesh the index of its material.
-fn materials(mesh: &Mesh, file: &str, placement: &Placement, known: &Known) -> Checked<Vec<usize>> {
+/// For each group of a mesh the index of its material: what the scene says, else what the mesh's own file does.
+fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, known: &mut Known) -> Checked<Vec<usize>> {
     let named = |name: &String| {
-        let unknown = || {
-            Problem::new(match known.names.is_empty() {
-                true => format!("{name:?} is no material; the file has none"),
-                false => format!("{name:?} is no material; there are {}", list(known.names.keys())),
-            })
-        };
-        let index = *known.names.get(name.as_str()).ok_or_else(unknown)?;
-        check(!mesh.uvs.is_empty() || !has_textures(&known.materials[index]), || {
-            format!("{name:?} must have no texture here, as {file:?} has no texture coordinates")
-        })?;
+        let index = known.material(name)?;
+        check(
+            !mesh.uvs.is_empty() || !has_textures(&known.looks.materials[index]),
+            || format!("{name:?} must have no texture here, as {file:?} has no texture coordinates"),
+        )?;
         Ok(index)
     };
     let whole = placement.material.map(named).transpose().at("material")?;
@@ -198,17 +210,58 @@ fn materials(mesh: &Mesh, file: &str, placement: &Placement, known: &Known) -> C
         .at("materials")?;
         of_names.insert(group.as_str(), named(material).at(group.as_str()).at("materials")?);
     }
-    let of_group = |group: &Group| {
-        let named = names(group).find_map(|name| of_names.get(name).copied());
-        named.or(whole).ok_or_else(|| {
-            let message = match names(group).find(|name| !name.is_empty()) {
-                Some(name) => format!("is missing; {file:?} has the group {name:?}, which materials does not name"),
-                None => "is missing".to_owned(),
+    let mut indices = Vec::with_capacity(mesh.groups.len());
+    for (i, group) in mesh.groups.iter().enumerate() {
+        let named = names(group).find_map(|name| of_names.get(name).copied()).or(whole);
+        indices.extend(named.or_else(|| known.looks.of_group(mesh, i)));
+        if indices.len() == i {
+            let has_none = |(j, group): &(usize, &Group)| {
+                let named = names(group).any(|name| of_names.contains_key(name));
+                !named && known.looks.of_group(mesh, *j).is_none()
             };
-            Problem::of("material", message)
-        })
+            let missing = mesh.groups.iter().enumerate().skip(i).filter(has_none);
+            let missing = missing.map(|(_, group)| group).collect::<Vec<_>>();
+            return Err(Problem::of("material", without_material(mesh, file, &missing)));
+        }
+    }
+    Ok(indices)
+}
+
+/// What is told of groups that have no material.
+fn without_material(mesh: &Mesh, file: &str, groups: &[&Group]) -> String {
+    /// The most names in the message.
+    const MOST_NAMES: usize = 8;
+    // Few materials may have many groups.
+    let name = |group: &&Group| group.material.clone().unwrap_or_else(|| group.name.clone());
+    let names: BTreeSet<String> = groups.iter().map(name).collect();
+    let is_unnamed = names.contains("");
+    let count = names.len() - usize::from(is_unnamed);
+    let shown = names.iter().filter(|name| !name.is_empty()).take(MOST_NAMES);
+    let mut parts: Vec<String> = shown.map(|name| format!("{:?}", cut(name))).collect();
+    if count > MOST_NAMES {
+        parts.push(format!("{} more", count - MOST_NAMES));
+    }
+    if is_unnamed {
+        parts.push("triangles without a name".to_owned());
+    }
+    let what = match (count, parts.pop()) {
+        (0, _) => return format!("is missing; {file:?} has triangles without a group that materials could name"),
+        (_, None) => String::new(),
+        (_, Some(last)) if parts.is_empty() => last,
+        (_, Some(last)) => format!("{} and {last}", parts.join(", ")),
     };
-    mesh.groups.iter().map(of_group).collect()
+    let why = match mesh.libraries.as_slice() {
+        _ if groups.iter().all(|group| group.material.is_none()) => String::new(),
+        [] => ", and the file names no MTL file that has".to_owned(),
+        libraries => match libraries.iter().find_map(|l| Some((l, l.problem.as_ref()?))) {
+            Some((library, problem)) => {
+                let name = library.file.file_name().unwrap_or_default().display();
+                format!("; its MTL file \"{name}\" is not read: {problem}")
+            }
+            None => ", nor do its MTL files".to_owned(),
+        },
+    };
+    format!("is missing; {file:?} has {what}, which materials does not name{why}")
 }
 
 /// The names by which a file's group may be told: its own, and that of the material which the file gives it.
@@ -311,8 +364,15 @@ fn matrix(rows: &[[f64; 4]]) -> Checked<DAffine3> {
         [rows @ .., [0.0, 0.0, 0.0, 1.0]] if rows.len() == 3 => rows.try_into(),
         rows => rows.try_into(),
     }
-    .map_err(|_| {
-        Problem::new("must be a list of 3 rows of 4 numbers; there may be a fourth one, which is [0, 0, 0, 1]")
+    .map_err(|_| match rows {
+        [_, _, _, [x, y, z, w]] => {
+            let row = [x, y, z, w].map(|x| number(*x)).join(", ");
+            Problem::new(format!("[{row}] must be [0, 0, 0, 1], or not be there")).at(3)
+        }
+        rows => Problem::new(format!(
+            "must be a list of 3 rows of 4 numbers; it has {}. There may be a fourth one, which is [0, 0, 0, 1]",
+            rows.len()
+        )),
     })?;
     for (i, row) in rows.iter().enumerate() {
         point(DVec3::new(row[0], row[1], row[2])).at(i)?;

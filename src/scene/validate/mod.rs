@@ -4,14 +4,16 @@
 
 mod appearance;
 mod mesh;
+mod mtl;
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use self::appearance::Textures;
+use self::appearance::{Images, Textures};
 use self::mesh::Known;
+use self::mtl::Looks;
 use super::error::{At, Problem};
 use super::parse::list;
 use super::{
@@ -53,10 +55,17 @@ impl Description {
     ///
     /// The first value that breaks a rule.
     pub fn validate_with(&self, assets: &Assets) -> Result<Scene, Problem> {
+        self.validate_and_list(assets, &mut BTreeSet::new())
+    }
+
+    /// [`Description::validate_with`]. What files the scene is made of is told even if it breaks a rule.
+    pub(super) fn validate_and_list(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problem> {
+        files.extend(self.files_beside(assets));
         // A map is sorted: a material's index is its place among the names.
         let names = self.materials.keys().map(String::as_str);
         let indices: BTreeMap<_, _> = names.zip(0..).collect();
-        let textures = appearance::textures(&self.textures, assets).at("textures")?;
+        let mut images = Images::new(assets);
+        let textures = appearance::textures(&self.textures, &mut images).at("textures")?;
         let known = Textures {
             names: self.textures.keys().map(String::as_str).collect(),
             textures: &textures,
@@ -65,20 +74,27 @@ impl Description {
             .map(|(name, description)| known.material(description).at(name.as_str()))
             .collect::<Checked<Vec<_>>>()
             .at("materials")?;
-        let known = Known {
+        let own = (self.materials.keys().cloned().collect(), materials);
+        let mut known = Known {
             names: &indices,
-            materials: &materials,
+            looks: Looks::new(own, textures, images, files),
             assets,
         };
-        let mut shapes = each(&self.shapes, |description| shape(description, &known)).at("shapes")?;
+        let mut shapes = each(&self.shapes, |description| shape(description, &mut known)).at("shapes")?;
         let meshes = (self.meshes.iter())
-            .map(|(name, description)| Ok((name.as_str(), mesh::named(description, assets).at(name.as_str())?)))
+            .map(|(name, description)| Ok((name.as_str(), mesh::named(description, &mut known).at(name.as_str())?)))
             .collect::<Checked<BTreeMap<_, _>>>()
             .at("meshes")?;
-        let instance = |description: &InstanceDescription| mesh::instance(description, &meshes, &known);
+        let instance = |description: &InstanceDescription| mesh::instance(description, &meshes, &mut known);
         shapes.extend(each(&self.instances, instance).at("instances")?);
         mesh::few_groups(&shapes).at("instances")?;
-        let notes = mesh::notes(&self.shapes, &shapes, &meshes);
+        let mut notes = mesh::notes(&self.shapes, &shapes, &meshes);
+        let mut looks = known.looks;
+        let material_names = std::mem::take(&mut looks.names);
+        let materials = std::mem::take(&mut looks.materials);
+        let textures = std::mem::take(&mut looks.textures);
+        let files = looks.files.iter().cloned().collect();
+        notes.extend(looks.notes());
         Ok(Scene {
             width: side(self.image.width).at("width").at("image")?,
             height: side(self.image.height).at("height").at("image")?,
@@ -87,9 +103,10 @@ impl Description {
             lights: each(&self.lights, light).at("lights")?,
             textures,
             materials,
+            material_names,
             shapes,
             instances: self.instances.len(),
-            files: self.files_beside(assets).collect(),
+            files,
             notes,
         })
     }
@@ -106,7 +123,7 @@ impl CameraDescription {
     }
 }
 
-fn each<D, T>(descriptions: &[D], check: impl Fn(&D) -> Checked<T>) -> Checked<Vec<T>> {
+fn each<D, T>(descriptions: &[D], mut check: impl FnMut(&D) -> Checked<T>) -> Checked<Vec<T>> {
     let descriptions = descriptions.iter().enumerate();
     descriptions.map(|(i, description)| check(description).at(i)).collect()
 }
@@ -269,8 +286,7 @@ pub(super) fn light(description: &LightDescription) -> Checked<Light> {
     })
 }
 
-fn shape(description: &ShapeDescription, known: &Known) -> Checked<Shape> {
-    let (indices, materials) = (known.names, known.materials);
+fn shape(description: &ShapeDescription, known: &mut Known) -> Checked<Shape> {
     let (geometry, name) = match description {
         ShapeDescription::Rectangle(shape) => {
             let rectangle = rectangle(shape.center, shape.size, shape.normal, shape.tangent)?;
@@ -313,17 +329,12 @@ fn shape(description: &ShapeDescription, known: &Known) -> Checked<Shape> {
             (plane, &shape.material)
         }
     };
-    let unknown = || {
-        Problem::new(match indices.is_empty() {
-            true => format!("{name:?} is no material; the file has none"),
-            false => format!("{name:?} is no material; there are {}", list(indices.keys())),
-        })
-    };
-    let material = *indices.get(name.as_str()).ok_or_else(unknown).at("material")?;
+    let material = known.material(name).at("material")?;
     let has_tangents = !matches!(geometry, Geometry::Triangles(_));
-    check(has_tangents || materials[material].normal_map().is_none(), || {
-        format!("{name:?} must have no normal map here, as the sides of this shape have no tangents")
-    })
+    check(
+        has_tangents || known.looks.materials[material].normal_map().is_none(),
+        || format!("{name:?} must have no normal map here, as the sides of this shape have no tangents"),
+    )
     .at("material")?;
     Ok(Shape { geometry, material })
 }

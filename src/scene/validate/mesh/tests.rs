@@ -206,12 +206,17 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         LINE_OF_MATRIX,
         "matrix = [[1, 0, 0, 5], [0, 1, 0, 6]]",
-        "shapes[1].matrix: must be a list of 3 rows of 4 numbers; there may be a fourth one, which is [0, 0, 0, 1]",
+        "shapes[1].matrix: must be a list of 3 rows of 4 numbers; it has 2. There may be a fourth one, which is [0, 0, 0, 1]",
     ),
     (
         LINE_OF_MATRIX,
         "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 2]]",
-        "shapes[1].matrix: must be a list of 3 rows of 4 numbers; there may be a fourth one, which is [0, 0, 0, 1]",
+        "shapes[1].matrix[3]: [0, 0, 0, 2] must be [0, 0, 0, 1], or not be there",
+    ),
+    (
+        LINE_OF_MATRIX,
+        "matrix = [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1], [0, 0, 0, 1]]",
+        "shapes[1].matrix: must be a list of 3 rows of 4 numbers; it has 5. ",
     ),
     (
         LINE_OF_MATRIX,
@@ -239,7 +244,11 @@ const BAD: &[(&str, &str, &str)] = &[
         "material = \"blue\"",
         "shapes[1].material: \"blue\" is no material; there are \"checked\", \"red\", \"white\"",
     ),
-    ("material = \"white\"", "", "shapes[1].material: is missing"),
+    (
+        "material = \"white\"",
+        "",
+        "shapes[1].material: is missing; \"one.obj\" has triangles without a group that materials could name",
+    ),
     (
         "material = \"white\"",
         "material = \"checked\"",
@@ -269,7 +278,13 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         LINE_OF_MATERIALS,
         "materials = { roof = \"red\", wall = \"red\" }",
-        "instances[0].material: is missing; \"parts.obj\" has the group \"door\", which materials does not name",
+        "instances[0].material: is missing; \"parts.obj\" has \"brick\", which materials does not name, and the file names \
+         no MTL file that has",
+    ),
+    (
+        LINE_OF_MATERIALS,
+        "",
+        "instances[0].material: is missing; \"parts.obj\" has \"brick\" and \"roof\", which materials does not name, and",
     ),
 ];
 
@@ -467,7 +482,7 @@ fn values_at_the_limits_are_good() {
 fn what_is_odd_is_noted_once_for_each_file() {
     assert_eq!(parse(GOOD).unwrap().notes, Vec::<String>::new());
     let scene = parse(&GOOD.replace("one.obj", "odd.obj")).unwrap();
-    assert_eq!(scene.notes, ["odd.obj: 1 degenerate triangles dropped"]);
+    assert_eq!(scene.notes, ["odd.obj: 1 degenerate triangle dropped"]);
     let text = GOOD.replace("one.obj", "odd.obj") + "[meshes.other]\nfile = './odd.obj'\n";
     assert_eq!(parse(&text).unwrap().notes.len(), 2);
 }

@@ -1,0 +1,66 @@
+//! All samples of a block at once: in arrays, of which a processor takes several numbers at a time. They are those of
+//! `block_sample` and `segment`, one by one.
+
+use std::sync::LazyLock;
+
+use fearless_simd::{Level, dispatch};
+
+use super::light::Segments;
+use super::shadow::{Block, block_sample};
+use super::walk::{Directions, MOST};
+use crate::pack::GRID;
+
+/// The instructions that this processor has for several numbers at once.
+pub static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);
+
+/// The samples of a block on the unit square; the first stands in all places that are left.
+pub struct Samples {
+    count: usize,
+    x: [f32; MOST],
+    y: [f32; MOST],
+}
+
+impl Samples {
+    /// Those of this block.
+    pub fn of(block: Block) -> Samples {
+        let count = block.count as usize;
+        let first = block_sample(block, 0);
+        let mut samples = Samples {
+            count,
+            x: [first.x; MOST],
+            y: [first.y; MOST],
+        };
+        if block.pattern == GRID {
+            // Without a division for each.
+            let cell = 1.0 / block.side as f32;
+            let (mut column, mut row) = (block.first % block.side, block.first / block.side);
+            for (x, y) in samples.x.iter_mut().zip(&mut samples.y).take(count) {
+                *x = (column as f32 + 0.5) * cell;
+                *y = (row as f32 + 0.5) * cell;
+                column += 1;
+                if column == block.side {
+                    (column, row) = (0, row + 1);
+                }
+            }
+            return samples;
+        }
+        for i in 1..count {
+            let at = block_sample(block, i as u32);
+            (samples.x[i], samples.y[i]) = (at.x, at.y);
+        }
+        samples
+    }
+
+    /// The vectors to them.
+    pub fn segments(&self, level: Level, to: Segments) -> Directions {
+        dispatch!(level, _simd => {
+            let mut along = [[0.0; MOST]; 3];
+            for (k, along) in along.iter_mut().enumerate() {
+                for ((d, x), y) in along.iter_mut().zip(&self.x).zip(&self.y) {
+                    *d = to.towards[k] + to.u[k] * (2.0 * x - 1.0) + to.v[k] * (2.0 * y - 1.0);
+                }
+            }
+            Directions { count: self.count, along }
+        })
+    }
+}

@@ -1,0 +1,167 @@
+//! The header of a PLY file: what elements there are, and the types of their properties.
+
+use super::super::error::{Fault, Place, shown};
+use super::super::words::Words;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Format {
+    Ascii,
+    Binary { is_big: bool },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    fn named(name: &[u8]) -> Option<Scalar> {
+        Some(match name {
+            b"char" | b"int8" => Scalar::I8,
+            b"uchar" | b"uint8" => Scalar::U8,
+            b"short" | b"int16" => Scalar::I16,
+            b"ushort" | b"uint16" => Scalar::U16,
+            b"int" | b"int32" => Scalar::I32,
+            b"uint" | b"uint32" => Scalar::U32,
+            b"float" | b"float32" => Scalar::F32,
+            b"double" | b"float64" => Scalar::F64,
+            _ => return None,
+        })
+    }
+
+    /// Its bytes in a binary file.
+    pub fn size(self) -> usize {
+        match self {
+            Scalar::I8 | Scalar::U8 => 1,
+            Scalar::I16 | Scalar::U16 => 2,
+            Scalar::I32 | Scalar::U32 | Scalar::F32 => 4,
+            Scalar::F64 => 8,
+        }
+    }
+
+    pub fn is_whole(self) -> bool {
+        !matches!(self, Scalar::F32 | Scalar::F64)
+    }
+}
+
+pub(super) struct Property {
+    pub name: String,
+    /// The type of a list's length, if it is a list.
+    pub count: Option<Scalar>,
+    pub scalar: Scalar,
+}
+
+pub(super) struct Element {
+    pub name: String,
+    pub count: usize,
+    pub properties: Vec<Property>,
+    /// Where the header tells of it.
+    pub place: Place,
+}
+
+pub(super) struct Header {
+    pub format: Format,
+    pub elements: Vec<Element>,
+}
+
+pub(super) fn header(words: &mut Words) -> Result<Header, Fault> {
+    if words.on_line() != Some(&b"ply"[..]) {
+        return Err(words.fault("the file must begin with \"ply\""));
+    }
+    let mut format = None;
+    let mut elements: Vec<Element> = Vec::new();
+    loop {
+        if !words.skip_line() {
+            return Err(words.fault("the file ends inside of its header; \"end_header\" is missing"));
+        }
+        match words.on_line() {
+            None | Some(b"comment" | b"obj_info") => {}
+            Some(b"format") => {
+                let name = words.on_line().unwrap_or_default();
+                format = Some(match name {
+                    b"ascii" => Format::Ascii,
+                    b"binary_little_endian" => Format::Binary { is_big: false },
+                    b"binary_big_endian" => Format::Binary { is_big: true },
+                    _ => {
+                        let rule = "must be ascii, binary_little_endian or binary_big_endian";
+                        return Err(words.fault(format!("format: {} {rule}", shown(name))));
+                    }
+                });
+                let version = words.on_line().unwrap_or_default();
+                if version != &b"1.0"[..] {
+                    return Err(words.fault(format!("format: version {} must be 1.0", shown(version))));
+                }
+            }
+            Some(b"element") => {
+                let name = String::from_utf8_lossy(words.on_line().unwrap_or_default()).into_owned();
+                let count = words.on_line().unwrap_or_default();
+                let count = std::str::from_utf8(count)
+                    .ok()
+                    .and_then(|count| count.parse().ok())
+                    .ok_or_else(|| {
+                        let rule = "must be a whole number that memory has room for";
+                        words.fault(format!("element {name:?}: {} {rule}", shown(count)))
+                    })?;
+                elements.push(Element {
+                    name,
+                    count,
+                    properties: Vec::new(),
+                    place: words.place(),
+                });
+            }
+            Some(b"property") => {
+                let property = property(words)?;
+                match elements.last_mut() {
+                    Some(element) => element.properties.push(property),
+                    None => return Err(words.fault("a property must follow its element")),
+                }
+            }
+            Some(b"end_header") => break,
+            Some(word) => {
+                let rule = "must be \"format\", \"comment\", \"obj_info\", \"element\", \"property\" or \"end_header\"";
+                return Err(words.fault(format!("{} {rule}", shown(word))));
+            }
+        }
+    }
+    words.skip_line();
+    match format {
+        Some(format) => Ok(Header { format, elements }),
+        None => Err(words.fault("the header must have a line \"format\"")),
+    }
+}
+
+fn property(words: &mut Words) -> Result<Property, Fault> {
+    let scalar = |words: &Words, name: &[u8]| {
+        Scalar::named(name).ok_or_else(|| {
+            let rule = "must be a type: char, uchar, short, ushort, int, uint, float or double";
+            words.fault(format!("property: {} {rule}", shown(name)))
+        })
+    };
+    let mut kind = words.on_line().unwrap_or_default();
+    let mut count = None;
+    if kind == &b"list"[..] {
+        let word = words.on_line().unwrap_or_default();
+        let number = scalar(words, word)?;
+        if !number.is_whole() {
+            return Err(words.fault(format!("property: {} must be a type of whole numbers", shown(word))));
+        }
+        count = Some(number);
+        kind = words.on_line().unwrap_or_default();
+    }
+    let scalar = scalar(words, kind)?;
+    match words.on_line() {
+        Some(name) => Ok(Property {
+            name: String::from_utf8_lossy(name).into_owned(),
+            count,
+            scalar,
+        }),
+        None => Err(words.fault("property: its name is missing")),
+    }
+}

@@ -1,0 +1,114 @@
+//! The values behind the header of a PLY file: numbers in words, or bytes of either order.
+
+use super::super::error::{Fault, Place, shown};
+use super::super::words::{self, Words};
+use super::header::Scalar;
+
+/// The values, one after the other.
+pub(super) trait Values {
+    fn next(&mut self, scalar: Scalar) -> Result<f64, Fault>;
+    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), Fault>;
+    /// The fewest bytes that so many values take.
+    fn fewest_bytes(&self, scalar: Scalar) -> usize;
+    fn left(&self) -> usize;
+    /// Where the next value is.
+    fn place(&mut self) -> Place;
+}
+
+pub(super) struct Ascii<'a> {
+    pub words: Words<'a>,
+}
+
+impl Values for Ascii<'_> {
+    #[inline]
+    fn next(&mut self, _: Scalar) -> Result<f64, Fault> {
+        match self.words.anywhere() {
+            Some(word) => {
+                words::number(word).ok_or_else(|| self.words.fault(format!("{} must be a number", shown(word))))
+            }
+            None => Err(self.words.fault("the file ends too early: values are missing")),
+        }
+    }
+
+    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), Fault> {
+        (0..count).try_for_each(|_| self.next(scalar).map(|_| ()))
+    }
+
+    /// A digit and a blank; the last one has no blank.
+    fn fewest_bytes(&self, _: Scalar) -> usize {
+        2
+    }
+
+    fn left(&self) -> usize {
+        self.words.left() + 1
+    }
+
+    fn place(&mut self) -> Place {
+        self.words.find_word_anywhere();
+        self.words.place()
+    }
+}
+
+pub(super) struct Binary<'a> {
+    pub bytes: &'a [u8],
+    pub at: usize,
+    pub is_big: bool,
+}
+
+impl Binary<'_> {
+    #[inline]
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], Fault> {
+        let Some(bytes) = self.bytes[self.at..].first_chunk::<N>() else {
+            return Err(self.ended());
+        };
+        self.at += N;
+        let mut bytes = *bytes;
+        if self.is_big {
+            bytes.reverse();
+        }
+        Ok(bytes)
+    }
+
+    #[cold]
+    fn ended(&self) -> Fault {
+        Place::Byte(self.at).fault("the file ends too early: values are missing")
+    }
+}
+
+impl Values for Binary<'_> {
+    #[inline]
+    fn next(&mut self, scalar: Scalar) -> Result<f64, Fault> {
+        Ok(match scalar {
+            Scalar::I8 => i8::from_le_bytes(self.take()?).into(),
+            Scalar::U8 => u8::from_le_bytes(self.take()?).into(),
+            Scalar::I16 => i16::from_le_bytes(self.take()?).into(),
+            Scalar::U16 => u16::from_le_bytes(self.take()?).into(),
+            Scalar::I32 => i32::from_le_bytes(self.take()?).into(),
+            Scalar::U32 => u32::from_le_bytes(self.take()?).into(),
+            Scalar::F32 => f32::from_le_bytes(self.take()?).into(),
+            Scalar::F64 => f64::from_le_bytes(self.take()?),
+        })
+    }
+
+    fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), Fault> {
+        match count.checked_mul(scalar.size()) {
+            Some(size) if size <= self.left() => {
+                self.at += size;
+                Ok(())
+            }
+            _ => Err(self.ended()),
+        }
+    }
+
+    fn fewest_bytes(&self, scalar: Scalar) -> usize {
+        scalar.size()
+    }
+
+    fn left(&self) -> usize {
+        self.bytes.len() - self.at
+    }
+
+    fn place(&mut self) -> Place {
+        Place::Byte(self.at)
+    }
+}

@@ -1,0 +1,261 @@
+//! Materials that meshes bring: what a group's MTL file says of it, as a Phong material, where the scene says nothing.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::super::error::{cut, cut_to};
+use super::super::image_file::Place;
+use super::super::{Color, ImageTextureDescription, Material, Texture, TextureDescription};
+use super::appearance::{Images, SHININESS, texture};
+use super::{BRIGHTEST, number, show};
+use crate::mesh::{Mesh, MtlMaterial, file_beside};
+
+/// What a material is like of which its file does not say it: `Kd` by Ramey, Rose and Tyerman, "MTL material format", 1995;
+/// the exponent as of a scene's own materials.
+const DIFFUSE: f64 = 0.8;
+const NS: f64 = 16.0;
+
+/// The most characters that are told of why there is no image.
+const MOST_OF_MAP: usize = 300;
+
+/// All materials of a scene, those of meshes behind its own.
+pub(super) struct Looks<'a> {
+    pub names: Vec<String>,
+    pub materials: Vec<Material>,
+    pub textures: Vec<Texture>,
+    /// The files that the scene is made of.
+    pub files: &'a mut BTreeSet<PathBuf>,
+    images: Images<'a>,
+    /// The folder that files are named from in messages, without links.
+    folder: PathBuf,
+    /// What is known of each mesh, by its address.
+    meshes: HashMap<usize, Described>,
+    /// The materials by their file and line, and by whether their mesh has texture coordinates.
+    known: HashMap<(PathBuf, usize, bool), usize>,
+    /// The textures of maps.
+    maps: BTreeMap<Place, usize>,
+    oddities: BTreeMap<(PathBuf, Oddity), (String, usize)>,
+}
+
+/// Where the materials of a mesh's groups are.
+struct Described {
+    /// For each group a file of materials and a material in it, if there is one.
+    places: Vec<Option<(usize, usize)>>,
+    /// For each group the scene's material, once it was asked for.
+    materials: Vec<Option<usize>>,
+}
+
+/// What is told once for each file, however many of its materials it is true of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Oddity {
+    Diffuse,
+    Bright,
+    Specular,
+    Shininess,
+    Emission,
+    Opacity,
+    Map,
+    Other(&'static str),
+}
+
+impl<'a> Looks<'a> {
+    /// The scene's own materials and textures, with the images that they have.
+    pub fn new(
+        (names, materials): (Vec<String>, Vec<Material>),
+        textures: Vec<Texture>,
+        images: Images<'a>,
+        files: &'a mut BTreeSet<PathBuf>,
+    ) -> Self {
+        let folder = &images.assets.folder;
+        Looks {
+            folder: folder.canonicalize().unwrap_or_else(|_| folder.clone()),
+            names,
+            materials,
+            textures,
+            files,
+            images,
+            meshes: HashMap::new(),
+            known: HashMap::new(),
+            maps: BTreeMap::new(),
+            oddities: BTreeMap::new(),
+        }
+    }
+
+    /// Takes note of a mesh, and of the files that it names, whether or not anything is taken from there.
+    pub fn know(&mut self, mesh: &Arc<Mesh>) {
+        let address = Arc::as_ptr(mesh).addr();
+        if self.meshes.contains_key(&address) {
+            return;
+        }
+        self.meshes.insert(address, Described::of(mesh));
+        for library in &mesh.libraries {
+            let maps = library.materials.iter().filter_map(|m| m.diffuse_map.as_ref());
+            let maps: BTreeSet<&String> = maps.collect();
+            let maps = maps.into_iter().map(|map| beside(&library.file, map));
+            for path in maps.chain([library.file.clone()]) {
+                let path = self.images.assets.folder.join(self.shown(&path));
+                self.files.insert(path);
+            }
+        }
+    }
+
+    /// The material that a mesh's file gives to a group of it.
+    pub fn of_group(&mut self, mesh: &Arc<Mesh>, group: usize) -> Option<usize> {
+        let address = Arc::as_ptr(mesh).addr();
+        let described = self.meshes.get(&address)?;
+        if let Some(material) = described.materials[group] {
+            return Some(material);
+        }
+        let (library, i) = described.places[group]?;
+        let library = &mesh.libraries[library];
+        let own = &library.materials[i];
+        let has_uvs = !mesh.uvs.is_empty();
+        let key = (library.file.clone(), own.line, has_uvs);
+        let material = match self.known.get(&key) {
+            Some(material) => *material,
+            None => {
+                let material = self.phong(own, &library.file, has_uvs);
+                self.names.push(own.name.clone());
+                self.materials.push(material);
+                self.known.insert(key, self.materials.len() - 1);
+                self.materials.len() - 1
+            }
+        };
+        if let Some(described) = self.meshes.get_mut(&address) {
+            described.materials[group] = Some(material);
+        }
+        Some(material)
+    }
+
+    /// What is odd about the materials that are used.
+    pub fn notes(self) -> impl Iterator<Item = String> {
+        self.oddities.into_values().map(|(first, count)| match count {
+            1 => first,
+            2 => format!("{first} (and 1 more material)"),
+            _ => format!("{first} (and {} more materials)", count - 1),
+        })
+    }
+
+    /// `Ka` is not looked at: exporters write what they like there, and one ambient light wants the colour of the surface.
+    fn phong(&mut self, own: &MtlMaterial, file: &Path, has_uvs: bool) -> Material {
+        let mut odd = Vec::new();
+        let mut color = |name: &str, color: Option<[f64; 3]>, default: f64, oddity: Oddity| {
+            let color = color.map_or(DVec3::splat(default), DVec3::from);
+            let inside = color.clamp(DVec3::ZERO, DVec3::splat(BRIGHTEST));
+            if inside != color {
+                let (color, limit, inside) = (show(color), number(BRIGHTEST), show(inside));
+                let rule = format!("each of {color} must be from 0 to {limit}; {inside} stands for it");
+                odd.push((oddity, format!("{name}: {rule}")));
+            }
+            inside
+        };
+        let diffuse = color("Kd", own.diffuse, DIFFUSE, Oddity::Diffuse);
+        // Models 0 and 1 have no highlights.
+        let specular = match own.illumination {
+            Some(0 | 1) => DVec3::ZERO,
+            _ => color("Ks", own.specular, 0.0, Oddity::Specular),
+        };
+        if diffuse.max_element() > 1.0 {
+            let rule = "is rendered so, but colours of MTL files are from 0 to 1";
+            odd.push((Oddity::Bright, format!("Kd: {} {rule}", show(diffuse))));
+        }
+        let exponent = own.shininess.unwrap_or(NS);
+        let shininess = exponent.clamp(SHININESS.0, SHININESS.1);
+        if shininess != exponent && specular != DVec3::ZERO {
+            let [exponent, low, high, inside] = [exponent, SHININESS.0, SHININESS.1, shininess].map(number);
+            let rule = format!("Ns: {exponent} must be from {low} to {high}; {inside} stands for it");
+            odd.push((Oddity::Shininess, rule));
+        }
+        if own.emission.is_some_and(|emission| emission != [0.0; 3]) {
+            let rule = "Ke: no surface emits light here; [[lights]] of the scene do";
+            odd.push((Oddity::Emission, rule.to_owned()));
+        }
+        if own.opacity.is_some_and(|opacity| opacity < 1.0) {
+            let rule = "d or Tr: it is rendered opaque; a material of type \"glass\" of the scene may stand in for it";
+            odd.push((Oddity::Opacity, rule.to_owned()));
+        }
+        for other in &own.others {
+            let verb = if other.starts_with("the ") { "are" } else { "is" };
+            odd.push((Oddity::Other(other), format!("{other} {verb} not looked at")));
+        }
+        let texture = own.diffuse_map.as_ref().map(|map| match has_uvs {
+            true => self.map(&beside(file, map)),
+            false => Err("the mesh has no texture coordinates".to_owned()),
+        });
+        let diffuse = match texture {
+            None => Color::Plain(diffuse),
+            Some(Ok(texture)) => Color::Texture(texture),
+            Some(Err(why)) => {
+                let why = cut_to(MOST_OF_MAP, &why);
+                odd.push((Oddity::Map, format!("map_Kd: {why}; Kd stands for it")));
+                Color::Plain(diffuse)
+            }
+        };
+        let place = format!("{}:{}: {:?}", self.shown(file).display(), own.line, cut(&own.name));
+        for (oddity, message) in odd {
+            let told = self.oddities.entry((file.to_owned(), oddity));
+            told.or_insert_with(|| (format!("{place}: {message}"), 0)).1 += 1;
+        }
+        Material::Phong {
+            ambient: diffuse,
+            diffuse,
+            specular: Color::Plain(specular),
+            shininess,
+            normal_map: None,
+        }
+    }
+
+    /// The texture of an image, or why there is none.
+    fn map(&mut self, path: &Path) -> Result<usize, String> {
+        let file = self.shown(path).to_string_lossy().into_owned();
+        let place = self.images.assets.find(&file)?;
+        if let Some(texture) = self.maps.get(&place) {
+            return Ok(*texture);
+        }
+        let image = TextureDescription::Image(ImageTextureDescription::new(file));
+        let texture = texture(&image, &mut self.images).map_err(|problem| problem.message)?;
+        self.textures.push(texture);
+        self.maps.insert(place, self.textures.len() - 1);
+        Ok(self.textures.len() - 1)
+    }
+
+    fn shown<'p>(&self, path: &'p Path) -> &'p Path {
+        shown(&self.folder, path)
+    }
+}
+
+impl Described {
+    fn of(mesh: &Mesh) -> Described {
+        let mut by_name = HashMap::new();
+        for (i, library) in mesh.libraries.iter().enumerate() {
+            for (j, material) in library.materials.iter().enumerate() {
+                by_name.entry(material.name.as_str()).or_insert((i, j)); // the first one of a name
+            }
+        }
+        let place = |name: &String| by_name.get(name.as_str()).copied();
+        Described {
+            places: mesh
+                .groups
+                .iter()
+                .map(|g| g.material.as_ref().and_then(place))
+                .collect(),
+            materials: vec![None; mesh.groups.len()],
+        }
+    }
+}
+
+/// A file that an MTL file names.
+fn beside(library: &Path, name: &str) -> PathBuf {
+    file_beside(library.parent().unwrap_or(Path::new("")), name)
+}
+
+/// A path as it is shown: from the scene's folder if it is in there.
+fn shown<'p>(folder: &Path, path: &'p Path) -> &'p Path {
+    path.strip_prefix(folder).unwrap_or(path)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,363 @@
+//! The tangents of smooth meshes, for their normal maps: those of the surfaces that meshes stand for, without jumps from a
+//! triangle to the next.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+
+use glam::{DMat3, DVec3, Vec2, Vec3};
+use wgray::cpu::differential::Arrival;
+use wgray::cpu::geometry::{material_of, spot_of, surface_of};
+use wgray::cpu::mesh::{Spot, face_frame, face_tangents, face_uv};
+use wgray::cpu::normal_map::mapped_normal;
+use wgray::cpu::primitive::Tangents;
+use wgray::cpu::ray::{Hit, Ray};
+use wgray::cpu::texture::appearance;
+use wgray::pack::{NOTHING, Packed, TEXTURE_NUMBER};
+
+use super::forms::{HEAD, Sheet, scene};
+use crate::pictures::reference;
+use crate::textures::write_exr;
+
+/// What a normal map says everywhere.
+const LEAN: Vec3 = Vec3::new(0.6, 0.0, 0.8);
+
+/// A mesh with a normal map that leans everywhere, with more lines for the texture and for the shape.
+fn leaning(obj: &str, texture: &str, shape: &str) -> Packed {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("mesh.obj"), obj).unwrap();
+    write_exr(&folder.path().join("lean.exr"), 2, 2, |_, _| {
+        (LEAN * 0.5 + 0.5).to_array()
+    });
+    // A small part of the unit sphere, seen close.
+    let head = HEAD.replace("width = 48, height = 36", "width = 192, height = 144");
+    let head = head.replace("fov = 40", "fov = 8");
+    let text = format!(
+        "{head}
+        [textures.lean]
+        type = 'image'
+        file = 'lean.exr'
+        {texture}
+        [materials.leaning]
+        type = 'phong'
+        ambient = [0, 0, 0]
+        diffuse = [1, 1, 1]
+        specular = [0, 0, 0]
+        normal_map = {{ texture = 'lean' }}
+        [[shapes]]
+        type = 'mesh'
+        file = 'mesh.obj'
+        material = 'leaning'
+        {shape}"
+    );
+    scene(&text, folder.path())
+}
+
+/// A point of the triangle in a slot.
+fn hit(packed: &Packed, slot: usize, barycentric: Vec2) -> Hit {
+    Hit {
+        t: 1.0,
+        instance: 1,
+        primitive: packed.meshes[0].triangles[slot].w,
+        slot: slot as u32,
+        barycentric,
+    }
+}
+
+/// Points of a triangle: near its corners, on its edges, in it.
+const PLACES: [Vec2; 7] = [
+    Vec2::new(0.0, 0.0),
+    Vec2::new(1.0, 0.0),
+    Vec2::new(0.0, 1.0),
+    Vec2::new(0.5, 0.5),
+    Vec2::new(0.3, 0.3),
+    Vec2::new(0.1, 0.6),
+    Vec2::new(0.0, 0.4),
+];
+
+/// The largest angle, in degrees, between the tangents of a mesh and those of its surface: as they are, and the triangles'.
+fn errors(packed: &Packed, surface: impl Fn(f64, f64) -> Option<[DVec3; 2]>) -> [f64; 2] {
+    let i = &packed.instances[0];
+    let to_world = DMat3::from_cols(i.u.as_dvec3(), i.v.as_dvec3(), i.w.as_dvec3());
+    let mut worst = [0.0; 2];
+    for slot in 0..packed.meshes[0].triangles.len() {
+        for b in PLACES {
+            let spot = spot_of(packed, hit(packed, slot, b));
+            let uv = face_uv(&spot, b);
+            let Some(exact) = surface(f64::from(uv.x), f64::from(uv.y)) else {
+                continue;
+            };
+            for (worst, found) in worst.iter_mut().zip([face_frame(&spot, b), face_tangents(&spot)]) {
+                for (found, exact) in [found.u, found.v].into_iter().zip(exact) {
+                    let angle = found.as_dvec3().angle_between(to_world * exact).to_degrees();
+                    *worst = f64::max(*worst, angle);
+                }
+            }
+        }
+    }
+    worst
+}
+
+/// The derivatives by u and v of a surface, by differences.
+fn derivatives(at: impl Fn(f64, f64) -> DVec3, u: f64, v: f64) -> [DVec3; 2] {
+    let h = 1e-5;
+    [
+        (at(u + h, v) - at(u - h, v)) / (2.0 * h),
+        (at(u, v + h) - at(u, v - h)) / (2.0 * h),
+    ]
+}
+
+#[test]
+fn tangents_are_those_of_the_surface() {
+    let sphere = |u: f64, v: f64| {
+        let (angle, height) = (TAU * u, TAU / 2.0 * (v - 0.5));
+        DVec3::new(height.cos() * angle.cos(), height.cos() * angle.sin(), height.sin())
+    };
+    let torus = |u: f64, v: f64| {
+        let ((sin, cos), (up, out)) = ((TAU * u).sin_cos(), (TAU * v).sin_cos());
+        DVec3::new((1.0 + 0.4 * out) * cos, (1.0 + 0.4 * out) * sin, 0.4 * up)
+    };
+    // An instance that stretches, turns and mirrors has the derivatives of what it makes of the surface.
+    for (shape, most) in [
+        ("", 1.5),
+        ("matrix = [[1, 0.3, 0, 5], [-0.2, 2, 0.4, 0], [0, 0.5, -0.7, 3]]", 3.0),
+        ("scale = 1e-5", 1.5),
+    ] {
+        let packed = leaning(&Sheet::sphere(32, 16).obj(), "", shape);
+        // At the poles there is no direction to the east.
+        let found = errors(&packed, |u, v| {
+            (0.12..0.88).contains(&v).then(|| derivatives(sphere, u, v))
+        });
+        println!("sphere, {shape}: {found:?}");
+        assert!(found[0] < most && found[1] > 10.0, "{shape}: {found:?}");
+        let packed = leaning(&Sheet::torus(40, 20).obj(), "", shape);
+        let found = errors(&packed, |u, v| Some(derivatives(torus, u, v)));
+        println!("torus, {shape}: {found:?}");
+        assert!(found[0] < most && found[1] > 10.0, "{shape}: {found:?}");
+    }
+}
+
+/// The normal that the map gives at a point of a triangle: as it is, and by the triangle's own tangents.
+fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
+    let hit = hit(packed, slot, b);
+    let spot = spot_of(packed, hit);
+    let q = &spot.primitive;
+    let ray = Ray {
+        origin: q.anchor + q.z * 3.0,
+        direction: -q.z,
+    };
+    let surface = surface_of(packed, &spot, hit, ray);
+    let material = material_of(packed, &spot);
+    let found = appearance(packed, &spot, hit, material, surface, Arrival::default(), 1).normal;
+    let Tangents { u, v } = face_tangents(&spot);
+    let by_triangle = wgray::cpu::surface::Surface {
+        du: u,
+        dv: v,
+        ..surface
+    };
+    let texture = &packed.textures[(material.lookups.x & TEXTURE_NUMBER) as usize];
+    [found, mapped_normal(by_triangle, texture, LEAN)]
+}
+
+/// The largest angle, in degrees, between the normals on the two sides of an edge, seams among them; and by the triangles'
+/// own tangents.
+fn jumps(packed: &Packed, is_looked_at: impl Fn(Vec3) -> bool) -> ([f32; 2], usize) {
+    let mesh = &packed.meshes[0];
+    let mut sides: HashMap<_, Vec<[Vec3; 2]>> = HashMap::new();
+    for (slot, triangle) in mesh.triangles.iter().enumerate() {
+        let corners = [triangle.x, triangle.y, triangle.z].map(|vertex| mesh.vertices[vertex as usize].truncate());
+        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+            let ends = [Vec2::ZERO, Vec2::X, Vec2::Y];
+            let mut points = [(corners[i], ends[i]), (corners[j], ends[j])];
+            points.sort_by_key(|(point, _)| point.to_array().map(f32::to_bits));
+            let [(from, b), (to, c)] = points;
+            if is_looked_at(from) && is_looked_at(to) {
+                let key = [from, to].map(|point| point.to_array().map(f32::to_bits));
+                sides
+                    .entry(key)
+                    .or_default()
+                    .push(normals(packed, slot, b.lerp(c, 0.3)));
+            }
+        }
+    }
+    let mut worst = [0.0; 2];
+    let mut edges = 0;
+    for normals in sides.values() {
+        if let [a, b] = normals[..] {
+            edges += 1;
+            for (worst, (a, b)) in worst.iter_mut().zip(a.into_iter().zip(b)) {
+                *worst = f32::max(*worst, a.angle_between(b).to_degrees());
+            }
+        }
+    }
+    (worst, edges)
+}
+
+#[test]
+fn normals_do_not_jump_at_edges_and_seams() {
+    let sphere = Sheet::sphere(16, 8);
+    // However the texture lies.
+    for texture in ["", "rotate = 45", "rotate = 90\nscale = [3, 0.5]", "scale = [-1, 1]"] {
+        let packed = leaning(&sphere.obj(), texture, "");
+        let (found, edges) = jumps(&packed, |p| p.z.abs() < 0.99);
+        println!("sphere, {texture}: {found:?} at {edges} edges");
+        assert!(edges > 250 && found[0] < 0.05 && found[1] > 4.0, "{texture}: {found:?}");
+        let packed = leaning(&Sheet::torus(16, 12).obj(), texture, "scale = [1, 2, 1]");
+        let (found, edges) = jumps(&packed, |_| true);
+        println!("torus, {texture}: {found:?} at {edges} edges");
+        assert!(
+            edges == 16 * 12 * 3 && found[0] < 0.05 && found[1] > 4.0,
+            "{texture}: {found:?}"
+        );
+    }
+}
+
+/// The largest difference between neighbouring pixels.
+fn largest_step(packed: &Packed) -> f32 {
+    let pixels: Vec<[f32; 3]> = reference(packed).means().collect();
+    let (width, height) = (192, 144);
+    let mut largest = 0.0;
+    for (x, y) in (0..height - 1).flat_map(|y| (0..width - 1).map(move |x| (x, y))) {
+        let at = pixels[y * width + x][0];
+        for other in [pixels[y * width + x + 1][0], pixels[(y + 1) * width + x][0]] {
+            largest = f32::max(largest, (at - other).abs());
+        }
+    }
+    largest
+}
+
+#[test]
+fn a_picture_shows_no_triangles() {
+    let light = "[[lights]]\ntype = 'directional'\ndirection = [0.2, 1, -0.7]\ncolor = [1, 1, 1]";
+    // The seam is where the camera looks.
+    let shape = format!("rotate = [0, 0, -80]\n{light}");
+    let mut packed = leaning(&Sheet::sphere(16, 8).obj(), "", &shape);
+    let found = largest_step(&packed);
+    // The control: the triangles' own tangents.
+    packed.instances[0].tangents = NOTHING;
+    let by_triangle = largest_step(&packed);
+    println!("steps of {found}, {by_triangle} without tangents");
+    assert!(found < 0.005 && by_triangle > 0.015, "{found} {by_triangle}");
+}
+
+#[test]
+fn mirrored_texture_coordinates_are_not_averaged_with_others() {
+    // A bent sheet whose u counts from its middle in both directions, with vertices that both halves share.
+    let mut sheet = Sheet::of(8, 4, |u, v| {
+        let (sin, cos) = (u - 0.5).sin_cos();
+        let normal = DVec3::new(sin, 0.0, cos);
+        [normal + DVec3::Y * (v - 0.5), normal]
+    });
+    let plain = leaning(&sheet.obj(), "", "");
+    assert_eq!(plain.meshes[0].vertices.len(), 9 * 5);
+    for uv in &mut sheet.uvs {
+        uv[0] = (uv[0] - 0.5).abs();
+    }
+    let packed = leaning(&sheet.obj(), "", "");
+    let mesh = &packed.meshes[0];
+    // The middle's vertices are there twice.
+    assert_eq!(mesh.vertices.len(), 9 * 5 + 5);
+    assert_eq!(mesh.attributes.len(), mesh.vertices.len());
+    assert_eq!(mesh.tangents.len(), mesh.vertices.len());
+    for slot in 0..mesh.triangles.len() {
+        for b in PLACES {
+            let spot = spot_of(&packed, hit(&packed, slot, b));
+            let at = spot.primitive.anchor + spot.edge_1 * b.x + spot.edge_2 * b.y;
+            let middle = spot.primitive.anchor + (spot.edge_1 + spot.edge_2) / 3.0;
+            // To the right u grows along x, to the left against it; v grows along y.
+            let right = Vec3::new(at.z, 0.0, -at.x).normalize() * middle.x.signum();
+            let found = face_frame(&spot, b);
+            assert!(found.u.angle_between(right) < 0.01, "{at}: {} {right}", found.u);
+            assert!(found.v.angle_between(Vec3::Y) < 0.01, "{at}: {}", found.v);
+            let normal = normals(&packed, slot, b)[0];
+            let outward = Vec3::new(at.x, 0.0, at.z).normalize();
+            let expected = right * LEAN.x + outward * LEAN.z;
+            assert!(normal.angle_between(expected) < 0.01, "{at}: {normal} {expected}");
+        }
+    }
+}
+
+/// A texture that repeats goes on over a seam; where pieces meet that lie in it elsewhere, each has its own tangents.
+#[test]
+fn pieces_of_a_texture_keep_their_directions() {
+    // Two sheets that meet at x = 1, the right one with its texture turned around the middle of the seam, and moved.
+    let directions = |turn: f64, shift: f64| {
+        let sheet = |left: f64| Sheet::of(2, 2, |u, v| [DVec3::new(left + u, v, 0.0), DVec3::Z]);
+        let (mut whole, right) = (sheet(0.0), sheet(1.0));
+        let (sin, cos) = turn.to_radians().sin_cos();
+        let first = whole.form.points.len() as u32;
+        for p in &right.form.points {
+            let (x, y) = (p.x - 1.0, p.y - 0.5);
+            whole
+                .uvs
+                .push([1.0 + shift + x * cos + y * sin, 0.5 + y * cos - x * sin]);
+        }
+        whole.form.points.extend(right.form.points);
+        whole.normals.extend(right.normals);
+        let triangles = right.form.triangles.into_iter();
+        whole.form.triangles.extend(triangles.map(|t| t.map(|i| first + i)));
+        let packed = leaning(&whole.obj(), "", "");
+        let mesh = &packed.meshes[0];
+        let mut directions: Vec<f32> = mesh
+            .vertices
+            .iter()
+            .zip(&mesh.tangents)
+            .filter(|(position, _)| (position.x, position.y) == (1.0, 0.5))
+            .map(|(_, [u, _])| u.y.atan2(u.x).to_degrees().round())
+            .collect();
+        directions.sort_by(f32::total_cmp);
+        directions
+    };
+    assert_eq!(directions(30.0, -1.0), [15.0, 15.0]);
+    assert_eq!(directions(30.0, 0.3), [0.0, 30.0]);
+    assert_eq!(directions(70.0, -1.0), [0.0, 70.0]);
+}
+
+#[test]
+fn only_smooth_meshes_with_normal_maps_have_tangents() {
+    let sphere = Sheet::sphere(16, 8);
+    let (with, count) = (leaning(&sphere.obj(), "", ""), 17 * 9);
+    assert_eq!(with.meshes[0].tangents.len(), count - 2); // a pole's vertices are of a triangle each, but for one
+    assert!(with.instances[0].tangents != NOTHING);
+    let flat = leaning(&sphere.obj(), "", "normals = 'flat'");
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("mesh.obj"), sphere.obj()).unwrap();
+    let text = format!("{HEAD}[[shapes]]\ntype = 'mesh'\nfile = 'mesh.obj'\nmaterial = 'm'");
+    for packed in [flat, scene(&text, folder.path())] {
+        assert!(packed.meshes[0].tangents.is_empty());
+        assert_eq!(packed.instances[0].tangents, NOTHING);
+        let spot: Spot = spot_of(&packed, hit(&packed, 0, Vec2::ZERO));
+        assert_eq!(spot.tangents_0, Tangents::default());
+        assert_eq!(face_frame(&spot, Vec2::ZERO), face_tangents(&spot));
+    }
+}
+
+/// Texture coordinates without an area, that cancel, or of all sizes, give normals that are numbers, in the surface's plane.
+#[test]
+fn odd_texture_coordinates_give_usable_tangents() {
+    let size = |factor: f64| move |[u, v]: [f64; 2]| [u * factor, v * factor];
+    let maps: [&dyn Fn([f64; 2]) -> [f64; 2]; 8] = [
+        &|_| [0.5, 0.5],
+        &|[u, _]| [u, 0.0],
+        &|[u, v]| [u, v * 1e-12],
+        &|[u, v]| [(7.0 * u).fract(), (5.0 * v).fract()],
+        &|[u, v]| [(u * 8.0).round() / 8.0, v],
+        &size(1e-30),
+        &size(1e30),
+        &|[u, v]| [u.mul_add(91.0, v * 17.0).sin(), (u * 53.0).cos()],
+    ];
+    for (number, map) in maps.into_iter().enumerate() {
+        let mut sheet = Sheet::torus(16, 12);
+        sheet.uvs.iter_mut().for_each(|uv| *uv = map(*uv));
+        let packed = leaning(&sheet.obj(), "rotate = 30", "scale = 1e-6");
+        for slot in 0..packed.meshes[0].triangles.len() {
+            for b in PLACES {
+                let normal = normals(&packed, slot, b)[0];
+                assert!(
+                    (normal.length() - 1.0).abs() < 1e-5,
+                    "{number}: {slot}, {b}: {normal}, {:?}",
+                    spot_of(&packed, hit(&packed, slot, b))
+                );
+            }
+        }
+    }
+}
