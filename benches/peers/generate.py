@@ -55,6 +55,37 @@ tangent = [1, 0, 0]
 color = [0.9, 0.9, 0.9]
 """
 
+PATH_HEAD = """[image]
+width = 512
+height = 512
+
+[camera]
+position = [0, -3, 1.3]
+look_at = [0, 0, 1]
+fov = 45
+
+[render]
+integrator = "path"
+max_depth = 5
+pixel_samples = { count = 64 }
+
+[materials.ground]
+type = "diffuse"
+color = [0.7, 0.7, 0.7]
+
+[materials.stone]
+type = "diffuse"
+color = [0.7, 0.55, 0.4]
+
+[[lights]]
+type = "rectangle"
+center = [0, 0, 1.95]
+size = [0.5, 0.3]
+normal = [0, 0, -1]
+tangent = [1, 0, 0]
+color = [17, 12, 5]
+"""
+
 RECTANGLE = """
 [[shapes]]
 type = "rectangle"
@@ -101,15 +132,22 @@ def terrain(mesh):
                        light_normal=[1, -0.8, -1.2]) + MESH.format(mesh=mesh)
 
 
+def box():
+    """The five walls of the assignment's box."""
+    return "".join(RECTANGLE.format(center=center, size=[2, 2], normal=normal, tangent=tangent) for center, normal, tangent in (
+        ([0, 0, 0], [0, 0, 1], [1, 0, 0]), ([0, 0, 2], [0, 0, -1], [1, 0, 0]), ([-1, 0, 1], [1, 0, 0], [0, 1, 0]),
+        ([1, 0, 1], [-1, 0, 0], [0, 1, 0]), ([0, 1, 1], [0, -1, 0], [1, 0, 0])))
+
+
+def rock_in_box(mesh):
+    return PATH_HEAD + box() + MESH.format(mesh=mesh) + "translate = [0, 0.1, 0.38]\n"
+
+
 def ellipsoids(count):
     """A box with so many ellipsoids at random, of the same area together whatever their number."""
     source = random.Random(count)
     text = HEAD.format(position=[0, -3, 1.3], look_at=[0, 0, 1], fov=45, light=[0, 0, 1.95], light_size=[0.8, 0.8],
-                       light_normal=[0, 0, -1])
-    for center, normal, tangent in (([0, 0, 0], [0, 0, 1], [1, 0, 0]), ([0, 0, 2], [0, 0, -1], [1, 0, 0]),
-                                    ([-1, 0, 1], [1, 0, 0], [0, 1, 0]), ([1, 0, 1], [-1, 0, 0], [0, 1, 0]),
-                                    ([0, 1, 1], [0, -1, 0], [1, 0, 0])):
-        text += RECTANGLE.format(center=center, size=[2, 2], normal=normal, tangent=tangent)
+                       light_normal=[0, 0, -1]) + box()
     rows, radius = [], 0.8 / math.sqrt(count)
     for _ in range(count):
         turn = rotation(source)
@@ -149,6 +187,7 @@ SCENES = {  # name: what makes its text, and its mesh
     **{name: (terrain, name) for name in ("terrain1m", "terrain10m")},
     "dragon870k": (dragon, "dragon870k"),
     **{f"ellipsoids{count}": (lambda _, count=count: ellipsoids(count), None) for count in (10, 1000, 100000)},
+    "path-rock70k": (rock_in_box, "rock70k"),
     "instances1000": (lambda mesh: instances(1000, mesh), "rock70k"),
 }
 

@@ -1,7 +1,7 @@
 """Installs the peers into a folder of their own and says how to start them.
 
-PyPI's mitsuba, numpy and OpenEXR go into a virtual environment, Debian's povray and libllvm19 are unpacked beside it;
-nothing on the system changes.
+PyPI's mitsuba, numpy, OpenEXR and scipy go into a virtual environment, bpy (Blender, for Cycles) into another when it is first
+wanted, Debian's povray and libllvm19 are unpacked beside them; nothing on the system changes.
 """
 import os
 import pathlib
@@ -13,7 +13,8 @@ import sysconfig
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 FOLDER = ROOT / "target" / "peers"
-PYPI = ["mitsuba==3.9.1", "numpy", "OpenEXR"]
+PYPI = ["mitsuba==3.9.1", "numpy", "OpenEXR", "scipy"]
+CYCLES = ["bpy==5.0.1"]  # the last one for Python 3.11
 DEBIAN = ["povray", "libllvm19"]
 
 
@@ -24,13 +25,22 @@ class Peers:
         self.debian = self.folder / "debian"
         self.libraries = self.debian / "usr" / "lib" / (sysconfig.get_config_var("MULTIARCH") or "x86_64-linux-gnu")
 
+    def environment(self, name, packages):
+        """The Python of a virtual environment with these packages."""
+        folder = self.folder / name
+        python, stamp = folder / "bin" / "python", folder / "installed"
+        if not stamp.exists() or stamp.read_text().split() != packages:
+            print("installing " + ", ".join(packages) + f" into {os.path.relpath(folder)}", file=sys.stderr)
+            subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+            subprocess.run([python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *packages], check=True)
+            stamp.write_text("\n".join(packages))
+        return str(python)
+
+    def cycles(self):
+        return self.environment("cycles", CYCLES)
+
     def install(self):
-        stamp = self.folder / "venv" / "installed"
-        if not stamp.exists() or stamp.read_text().split() != PYPI:
-            print("installing " + ", ".join(PYPI) + f" into {os.path.relpath(self.folder)}", file=sys.stderr)
-            subprocess.run([sys.executable, "-m", "venv", self.folder / "venv"], check=True)
-            subprocess.run([self.python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *PYPI], check=True)
-            stamp.write_text("\n".join(PYPI))
+        self.environment("venv", PYPI)
         subprocess.run([HERE / "debs", self.debian, "bookworm", *DEBIAN], check=True)
         for what in (self.povray()[0], self.llvm()):
             if not what or not pathlib.Path(what).exists():

@@ -23,11 +23,13 @@ import sys
 import tempfile
 
 sys.dont_write_bytecode = True
+import install
+os.environ |= install.Peers().mitsuba()[1]  # before the import, which loads LLVM
+
 import mitsuba as mi
 import numpy as np
 import OpenEXR
 
-import install
 import scenes
 
 SAMPLES, SIDE = 16, 4
@@ -48,7 +50,7 @@ def mitsuba(path, size, moved=0):
     import mitsuba_scenes
     scene = scenes.load(path)
     scene.position = [scene.position[0] + moved, *scene.position[1:]]
-    loaded = mitsuba_scenes.load(scene, (size, size), 1, SAMPLES, exact=True)
+    loaded = mitsuba_scenes.load(scene, (size, size), 1, SAMPLES, curved="exact")
     y, x = np.mgrid[:size, :size]
     film = mi.Point2f(mi.Float(((x.ravel() + 0.5) / size).astype(np.float32)), mi.Float(((y.ravel() + 0.5) / size).astype(np.float32)))
     ray, _ = loaded.sensors()[0].sample_ray(0.0, 0.5, film, mi.Point2f(0.5))
@@ -118,7 +120,6 @@ def main():
     parser.add_argument("--wgray", default=str(install.ROOT / "target/release/wgray"))
     parser.add_argument("--device", default="cpu")
     args = parser.parse_args()
-    os.environ |= install.Peers().mitsuba()[1]
     mi.set_variant("llvm_ad_rgb")
     mi.set_log_level(mi.LogLevel.Error)
     good = all([check(args, path) for path in args.scenes])

@@ -8,9 +8,15 @@ shading: diffuse). Mitsuba chooses a light at random for each of its `emitter_sa
 the number of lights. `load_s` is the time to read the scene's files and to build Embree's trees, `first_s` the first render,
 which compiles, `warm_s` the median of WARM more; --warm 0 with -o is what a user's script does, the whole process.
 
+With --integrator path it renders a scene of the path tracer: `path`, or `volpath` where glass absorbs, with a depth of one more
+than `max_depth`, as Mitsuba counts what is seen and wgray bounces. Its BSDFs are Mitsuba's own but for Phong's, which it has
+not got and which stands here in Python. `emission` is an area light on the outer side of a closed shape, and two of them back
+to back for a rectangle, a disk and a triangle. Meshes that shine must be closed. --seed 0 is that of the first picture.
+
 Mitsuba's `sphere` takes no unequal axes and no shear. Where a scene has ellipsoids, --ellipsoids says what stands for them:
     spheres   a sphere of the same volume; Mitsuba's fastest for few
     exact     Mitsuba's shape `ellipsoids`, made for splatting: one for all ellipsoids of a material; its fastest for many
+    mesh      a fine mesh with the ellipsoid's normals; spheres stay spheres
     auto      spheres for up to 1,000 ellipsoids, else exact (default)
 An infinite plane becomes a rectangle of half side 1000. Meshes of one file and material are instances of one shape group.
 """
@@ -27,34 +33,90 @@ sys.dont_write_bytecode = True
 import mitsuba as mi
 import numpy as np
 
+import mitsuba_phong
 import scenes
 
 MOST_SPHERES = 1000
+APART = 2e-5  # of the two sides of a rectangle, disk or triangle that shines: at 5e-4 what is near them is visibly brighter
+BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0, 0, 0]}}
 
 
-def paint(material):
-    return {"type": "twosided", "b": {"type": "diffuse", "reflectance": {"type": "rgb", "value": material.diffuse}}}
+def tint(value):
+    """A colour as Mitsuba's texture; its checkers repeat after two squares, as ours do, but within 0 to 1."""
+    if isinstance(value, scenes.Checker):
+        u, v = value.scale
+        return {"type": "checkerboard", "color0": tint(value.even), "color1": tint(value.odd),
+                "to_uv": mi.ScalarTransform3f().scale([u / 2, v / 2])}
+    return {"type": "rgb", "value": value}
 
 
-def rectangle(T, center, u, v):
+def paint(material, traced):
+    if material.kind == "phong" and traced:
+        plugin = {"type": mitsuba_phong.NAME, "kd": tint(material.diffuse), "ks": tint(material.specular),
+                  "shininess": material.shininess}
+    elif material.kind in ("phong", "diffuse"):
+        plugin = {"type": "diffuse", "reflectance": tint(material.diffuse if material.kind == "phong" else material.color)}
+    elif material.kind == "conductor":
+        plugin = {"type": "conductor", "material": "none", "specular_reflectance": tint(material.color)}
+    else:
+        return {"type": "dielectric", "int_ior": float(material.ior), "ext_ior": 1.0, "specular_transmittance": tint(material.color)}
+    return {"type": "twosided", "b": plugin}
+
+
+def rectangle(T, center, u, v, kind="rectangle"):
     m = np.eye(4)
     m[:3, 0], m[:3, 1], m[:3, 2], m[:3, 3] = u, v, np.cross(u, v) / np.linalg.norm(np.cross(u, v)), center
-    return {"type": "rectangle", "to_world": T(m)}
+    return {"type": kind, "to_world": T(m)}
 
 
-def triangles(s, path):
-    mesh = mi.Mesh("triangles", len(s.vertices), len(s.faces))
+def triangles(vertices, faces, path, normals=None):
+    mesh = mi.Mesh("triangles", len(vertices), len(faces), has_vertex_normals=normals is not None)
     params = mi.traverse(mesh)
-    params["vertex_positions"] = np.array(s.vertices, np.float32).ravel()
-    params["faces"] = np.array(s.faces, np.uint32).ravel()
+    params["vertex_positions"] = np.array(vertices, np.float32).ravel()
+    params["faces"] = np.array(faces, np.uint32).ravel()
+    if normals is not None:
+        params["vertex_normals"] = np.array(normals, np.float32).ravel()
     params.update()
     mesh.write_ply(path)
-    return {"type": "ply", "filename": path, "face_normals": True}
+    return {"type": "ply", "filename": path, "face_normals": normals is None}
 
 
 def sphere(T, s):
     radius = float(abs(np.linalg.det(np.array([s.a, s.b, s.c]))) ** (1 / 3))
     return {"type": "sphere", "to_world": T().translate(s.center).scale(radius)}
+
+
+def round_mesh(T, s, path, rows=256):
+    """A sphere, or for unequal axes a mesh so fine that its facets do not matter, shaded by the ellipsoid's normals."""
+    axes = np.array([s.a, s.b, s.c], float)
+    if np.allclose(axes @ axes.T, np.eye(3) * np.dot(axes[0], axes[0]), atol=1e-9):
+        return sphere(T, s)
+    theta, phi = np.meshgrid(np.linspace(0, np.pi, rows + 1), np.linspace(0, 2 * np.pi, 2 * rows + 1), indexing="ij")
+    unit = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1).reshape(-1, 3)
+    normals = unit @ np.linalg.inv(axes).T
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    i, j = (n.ravel() for n in np.meshgrid(range(rows), range(2 * rows), indexing="ij"))
+    a, b, c, d = (n * (2 * rows + 1) + m for n, m in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)))
+    faces = np.concatenate([np.stack([a, b, c], -1)[i < rows - 1], np.stack([a, c, d], -1)[i > 0]])
+    if np.linalg.det(axes) < 0:
+        faces = faces[:, ::-1]
+    return triangles(unit @ axes + s.center, faces, path, normals)
+
+
+def both_sides(T, s, path):
+    """The two one-sided shapes of a shape without an inside that shines: the second is turned over by exchanging its edges."""
+    if any(isinstance(c, scenes.Checker) and c.scale[0] != c.scale[1] for c in (s.material.color, s.material.diffuse, s.material.emission)):
+        raise ValueError("a checker on a shape that shines needs one scale for u and v")
+    if isinstance(s, scenes.Triangles):
+        a, b, c = np.array(s.vertices, float)
+        n = np.cross(b - a, c - a)
+        n *= APART / np.linalg.norm(n)
+        return [triangles([a + n, b + n, c + n], [(0, 1, 2)], path + "-front.ply"),
+                triangles([a - n, c - n, b - n], [(0, 1, 2)], path + "-back.ply")]
+    kind = "disk" if isinstance(s, scenes.Disk) else "rectangle"
+    n = np.cross(s.u, s.v)
+    n *= APART / np.linalg.norm(n)
+    return [rectangle(T, s.center + n, s.u, s.v, kind), rectangle(T, s.center - n, s.v, s.u, kind)]
 
 
 def ellipsoids(shapes):
@@ -79,61 +141,105 @@ def quaternion(turn):
     return [x, y, z, w]
 
 
-def ply(s):
-    if not s.file.endswith(".ply"):
-        raise ValueError(f"{s.file}: the peers' meshes are PLY files")
+def mesh_file(s):
+    kind = os.path.splitext(s.file)[1]
+    if kind not in (".ply", ".obj"):
+        raise ValueError(f"{s.file}: the peers' meshes are PLY or OBJ files")
     # Without a word on normals, wgray's are the file's or flat, Mitsuba's the file's or smooth: our files have none.
-    return {"type": "ply", "filename": s.file, "face_normals": s.normals in (None, "flat")}
+    return {"type": kind[1:], "filename": s.file, "face_normals": s.normals in (None, "flat")}
 
 
-def load(scene, size, spp, light_samples, exact=None):
-    """Mitsuba's scene; `exact` as --ellipsoids has it, None for auto."""
+def sensor(T, scene, width, height, spp):
+    row = {"film": {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}},
+           "sampler": {"type": "independent", "sample_count": spp}}
+    place = T().look_at(origin=scene.position, target=scene.look_at, up=scene.up)
+    if scene.height_seen is None:
+        return row | {"type": "perspective", "fov": scene.fov, "fov_axis": "y", "to_world": place}
+    # Mitsuba's orthographic camera sees from -1 to 1 along x, and along y by the picture's shape
+    half = scene.height_seen / 2 * width / height
+    return row | {"type": "orthographic", "near_clip": 1e-4, "to_world": place @ T().scale([half, half, 1])}
+
+
+def lights(T, scene):
+    for l in scene.lights:
+        if isinstance(l, scenes.Point):
+            yield {"type": "point", "position": l.position, "intensity": tint(l.color)}
+        elif isinstance(l, scenes.Sun):
+            yield {"type": "directional", "direction": l.direction, "irradiance": tint(l.color)}
+        else:
+            # Mitsuba's radiance falls off with distance and the cosine at the light; 20 makes the phong picture about as bright.
+            radiance = l.color if scene.integrator == "path" else scenes.scaled(l.color, 20)
+            yield rectangle(T, l.center, l.u, l.v) | {"bsdf": BLACK, "emitter": {"type": "area", "radiance": tint(radiance)}}
+
+
+def integrator(scene, light_samples):
+    if scene.integrator != "path":
+        return {"type": "direct", "emitter_samples": light_samples * len(scene.lights), "bsdf_samples": 0}
+    absorbs = any(s.material.absorption and any(s.material.absorption) for s in scene.shapes)
+    return {"type": "volpath" if absorbs else "path", "max_depth": scene.max_depth + 1, "rr_depth": scene.rr_depth + 1}
+
+
+def load(scene, size, spp, light_samples, curved="auto"):
+    """Mitsuba's scene; `curved` is as --ellipsoids has it."""
     T = mi.ScalarTransform4f
     folder = tempfile.mkdtemp()
     width, height = size or (scene.width, scene.height)
-    parts = {
-        "type": "scene",
-        "integrator": {"type": "direct", "emitter_samples": light_samples * len(scene.lights), "bsdf_samples": 0},
-        "sensor": {"type": "perspective", "fov": scene.fov, "fov_axis": "y",
-                   "to_world": T().look_at(origin=scene.position, target=scene.look_at, up=scene.up),
-                   "film": {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}},
-                   "sampler": {"type": "independent", "sample_count": spp}},
-    }
+    traced = scene.integrator == "path"
+    if traced:
+        mitsuba_phong.register()
+    parts = {"type": "scene", "integrator": integrator(scene, light_samples), "sensor": sensor(T, scene, width, height, spp)}
+    if scene.environment and any(scene.environment):
+        parts["environment"] = {"type": "constant", "radiance": tint(scene.environment)}
     bsdfs = {}  # by the material, so that shapes share them
 
     def painted(row, material):
         name = bsdfs.setdefault(id(material), f"material{len(bsdfs)}")
-        parts.setdefault(name, paint(material))
-        return row | {"bsdf": {"type": "ref", "id": name}}
+        parts.setdefault(name, paint(material, traced))
+        row = row | {"bsdf": {"type": "ref", "id": name}}
+        if shines(material):
+            row["emitter"] = {"type": "area", "radiance": tint(material.emission)}
+        if material.absorption and any(material.absorption):
+            most = max(material.absorption)  # colours of a medium are at most 1, its scale is free; at 0 Mitsuba has no numbers
+            row["interior"] = {"type": "homogeneous", "albedo": tint([0, 0, 0]), "scale": float(most),
+                               "sigma_t": tint([max(a / most, 1e-6) for a in material.absorption])}
+        return row
 
-    curved = [s for s in scene.shapes if isinstance(s, scenes.Ellipsoid)]
-    if exact is None:
-        exact = len(curved) > MOST_SPHERES
+    ellipses = [s for s in scene.shapes if isinstance(s, scenes.Ellipsoid)]
+    if curved == "auto":
+        curved = "exact" if len(ellipses) > MOST_SPHERES else "spheres"
     together = collections.defaultdict(list)
-    for s in curved if exact else []:
+    for s in ellipses if curved == "exact" else []:
         together[id(s.material)].append(s)
     for i, group in enumerate(together.values()):
         parts[f"ellipsoids{i}"] = painted(ellipsoids(group), group[0].material)
     uses = collections.Counter((s.file, id(s.material)) for s in scene.shapes if isinstance(s, scenes.Mesh))
     groups = {}  # names of shape groups
     for i, s in enumerate(scene.shapes):
-        if isinstance(s, scenes.Quad):
-            row = rectangle(T, s.center, s.u, s.v)
+        path = os.path.join(folder, str(i))
+        checked = any(isinstance(c, scenes.Checker) for c in vars(s.material).values())
+        if checked and not isinstance(s, scenes.Quad):
+            raise ValueError("the peers' checkers are on rectangles alone")
+        if shines(s.material) and (isinstance(s, (scenes.Quad, scenes.Disk)) or isinstance(s, scenes.Triangles) and len(s.faces) == 1):
+            for side, row in zip(("front", "back"), both_sides(T, s, path)):
+                parts[f"shape{i}{side}"] = painted(row, s.material)
+            continue
+        if isinstance(s, (scenes.Quad, scenes.Disk)):
+            row = rectangle(T, s.center, s.u, s.v, "disk" if isinstance(s, scenes.Disk) else "rectangle")
         elif isinstance(s, scenes.Triangles):
-            row = triangles(s, os.path.join(folder, f"{i}.ply"))
+            row = triangles(s.vertices, s.faces, path + ".ply")
         elif isinstance(s, scenes.Ellipsoid):
-            if exact:
+            if curved == "exact":
                 continue
-            row = sphere(T, s)
+            row = sphere(T, s) if curved == "spheres" else round_mesh(T, s, path + ".ply")
         elif isinstance(s, scenes.Mesh):
             key = (s.file, id(s.material))
             place = T(np.array([*s.to_world, [0, 0, 0, 1]]))
-            if uses[key] == 1:
-                row = ply(s) | {"to_world": place}
+            if uses[key] == 1 or shines(s.material):  # no instance of Mitsuba's may shine
+                row = mesh_file(s) | {"to_world": place}
             else:
                 if key not in groups:
                     groups[key] = f"group{len(groups)}"
-                    parts[groups[key]] = {"type": "shapegroup", "mesh": painted(ply(s), s.material)}
+                    parts[groups[key]] = {"type": "shapegroup", "mesh": painted(mesh_file(s), s.material)}
                 parts[f"shape{i}"] = {"type": "instance", "group": {"type": "ref", "id": groups[key]}, "to_world": place}
                 continue
         else:
@@ -142,40 +248,45 @@ def load(scene, size, spp, light_samples, exact=None):
             u *= 1000 / np.linalg.norm(u)
             row = rectangle(T, s.point, u, np.cross(s.normal, u))
         parts[f"shape{i}"] = painted(row, s.material)
-    for i, l in enumerate(scene.lights):
-        # Mitsuba's radiance falls off with distance and the cosine at the light; 20 makes the picture about as bright.
-        parts[f"light{i}"] = rectangle(T, l.center, l.u, l.v) | {
-            "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0, 0, 0]}},
-            "emitter": {"type": "area", "radiance": {"type": "rgb", "value": scenes.scaled(l.color, 20)}}}
+    for i, row in enumerate(lights(T, scene)):
+        parts[f"light{i}"] = row
     return mi.load_dict(parts)
+
+
+def shines(material):
+    return isinstance(material.emission, scenes.Checker) or any(material.emission or [])
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scene")
+    parser.add_argument("--integrator", choices=["phong", "path"], default="phong")
     parser.add_argument("--variant", default="llvm_ad_rgb")
     parser.add_argument("--size", type=int)
     parser.add_argument("--spp", type=int, default=16)
     parser.add_argument("--light-samples", type=int, default=16, help="to every light")
     parser.add_argument("--warm", type=int, default=5)
-    parser.add_argument("--ellipsoids", choices=["auto", "spheres", "exact"], default="auto")
-    parser.add_argument("-o", "--output")
+    parser.add_argument("--seed", type=int, default=0, help="of the first picture; each more has the next one")
+    parser.add_argument("--ellipsoids", choices=["auto", "spheres", "exact", "mesh"], default="auto")
+    parser.add_argument("-o", "--output", help="the last picture")
+    parser.add_argument("--each", metavar="FOLDER", help="write every warm picture there, named by its seed")
     args = parser.parse_args()
 
     mi.set_variant(args.variant)
     mi.set_log_level(mi.LogLevel.Error)  # warnings go to standard output, before the line of JSON
-    scene = scenes.load(args.scene)
+    scene = scenes.load(args.scene, args.integrator)
     size = (args.size, args.size) if args.size else (scene.width, scene.height)
     start = time.perf_counter()
-    exact = {"auto": None, "spheres": False, "exact": True}[args.ellipsoids]
-    loaded = load(scene, size, args.spp, args.light_samples, exact)
+    loaded = load(scene, size, args.spp, args.light_samples, args.ellipsoids)
     load_s = time.perf_counter() - start
     times = []
-    for seed in range(1 + args.warm):
+    for n in range(1 + args.warm):
         start = time.perf_counter()
-        picture = mi.render(loaded, spp=args.spp, seed=seed)
+        picture = mi.render(loaded, spp=args.spp, seed=args.seed + n)
         image = np.array(picture)  # waits for the picture
         times.append(time.perf_counter() - start)
+        if args.each and n:
+            mi.util.write_bitmap(os.path.join(args.each, f"{args.seed + n}.exr"), picture, write_async=False)
     if not np.isfinite(image).all() or not image.mean() > 0.01 and min(size) > 1:
         sys.exit("Mitsuba's picture is black or not finite")
     if args.output:

@@ -1,7 +1,9 @@
 """Reads wgray's scene files for the peers, so that a scene stands in one place.
 
-`load` takes the part of the format that the benchmark scenes use (docs/scene-format.md) and refuses the rest.
+`load` takes the part of the format that the benchmark scenes use (docs/scene-format.md) and refuses the rest: what the phong
+integrator renders, with plain colours under rectangle lights, or with `integrator="path"` what the path tracer does.
 """
+import json
 import math
 import os
 import tomllib
@@ -30,10 +32,24 @@ def unit(a):
 
 @dataclass
 class Material:
-    ambient: list
-    diffuse: list
-    specular: list
-    shininess: float
+    """Colours are lists of three numbers or a Checker. `kind` is the format's type, but for "mirror" and "glass", which are
+    "conductor" and "dielectric"."""
+    kind: str = "phong"
+    ambient: list | None = None
+    diffuse: list | None = None
+    specular: list | None = None
+    shininess: float = 16
+    color: list | None = None
+    ior: float = 1
+    absorption: list | None = None
+    emission: list | None = None
+
+
+@dataclass
+class Checker:
+    even: list
+    odd: list
+    scale: list
 
 
 @dataclass
@@ -44,6 +60,27 @@ class Quad:
     v: list
     material: Material | None = None
     color: list | None = None
+
+
+@dataclass
+class Disk:
+    """The points `center + s u + t v` with s² + t² <= 1."""
+    center: list
+    u: list
+    v: list
+    material: Material
+
+
+@dataclass
+class Point:
+    position: list
+    color: list
+
+
+@dataclass
+class Sun:
+    direction: list
+    color: list
 
 
 @dataclass
@@ -90,6 +127,12 @@ class Scene:
     ambient: list
     shapes: list = field(default_factory=list)
     lights: list = field(default_factory=list)
+    integrator: str = "phong"
+    height_seen: float | None = None  # of an orthographic camera
+    environment: list | None = None
+    max_depth: int = 8
+    rr_depth: int = 5
+    spp: int = 16
 
 
 def quad(row, **more):
@@ -135,24 +178,57 @@ def to_world(row, up):
     return product(moved, UP[up])
 
 
-def load(path):
+def color(path, row, key, textures, default=None):
+    """A colour of a material: three numbers, or a checker where the path tracer renders."""
+    value = row.get(key, default)
+    if not isinstance(value, dict):
+        return value
+    texture = textures.get(value["texture"], {})
+    if texture.get("type") != "checker" or "rotate" in texture or "offset" in texture:
+        raise ValueError(f"{path}: {key}: the peers' textures are checkers, neither turned nor moved")
+    return Checker(texture["even"], texture["odd"], texture.get("scale", [1, 1]))
+
+
+def material(path, row, textures, traced):
+    kind = {"mirror": "conductor", "glass": "dielectric"}.get(row["type"], row["type"])
+    if kind != "phong" and not traced:
+        raise ValueError(f"{path}: a material {row['type']!r}: the peers' materials are phong")
+    if row.get("roughness", 0) != 0 or "normal_map" in row:
+        raise ValueError(f"{path}: the peers have neither roughness nor normal maps")
+    made = Material(kind, emission=color(path, row, "emission", textures))
+    if kind == "phong":
+        plain = color(path, row, "color", textures)
+        made.ambient, made.diffuse, made.specular = (color(path, row, term, textures, plain) for term in ("ambient", "diffuse", "specular"))
+        made.shininess = row.get("shininess", 16)
+    else:
+        made.color = color(path, row, "tint" if row["type"] in ("mirror", "glass") else "color", textures, [1, 1, 1])
+        made.ior, made.absorption = row.get("ior", 1), row.get("absorption")
+    if not traced and not all(isinstance(c, list) for c in (made.ambient, made.diffuse, made.specular)):
+        raise ValueError(f"{path}: the peers' colours are plain")
+    return made
+
+
+def load(path, integrator="phong"):
+    traced = integrator == "path"
+    if traced and str(path).endswith(".json"):
+        return course(path)
     with open(path, "rb") as file:
         text = tomllib.load(file)
-    camera, render = text["camera"], text["render"]
-    if camera.get("type", "perspective") != "perspective" or render.get("integrator", "phong") != "phong":
-        raise ValueError(f"{path}: the peers' scenes have a perspective camera and the phong integrator")
+    camera, render = text["camera"], text.get("render", {})
+    orthographic = camera.get("type", "perspective") == "orthographic"
+    if render.get("integrator", "phong") != integrator:
+        raise ValueError(f"{path}: render.integrator must be {integrator!r} here")
+    if orthographic and not traced:
+        raise ValueError(f"{path}: the peers' scenes have a perspective camera")
     if any(render.get("background", [0, 0, 0])):
         raise ValueError(f"{path}: the peers' scenes have a black background")
     scene = Scene(text["image"]["width"], text["image"]["height"], camera["position"], camera["look_at"],
-                  camera.get("up", [0, 0, 1]), camera["fov"], render["ambient"])
-    materials = {}
-    for name, row in text["materials"].items():
-        if row.get("type", "phong") != "phong":
-            raise ValueError(f"{path}: materials.{name}: the peers' materials are phong")
-        terms = [row[term] if term in row else row["color"] for term in ("ambient", "diffuse", "specular")]
-        if any(not isinstance(term, list) for term in terms):
-            raise ValueError(f"{path}: materials.{name}: the peers' colours are plain")
-        materials[name] = Material(*terms, row["shininess"])
+                  camera.get("up", [0, 0, 1]), camera.get("fov"), render.get("ambient", [0, 0, 0]), integrator=integrator,
+                  height_seen=camera["height"] if orthographic else None, environment=text.get("environment", {}).get("color"),
+                  max_depth=render.get("max_depth", 8), rr_depth=render.get("rr_depth", 5),
+                  spp=render.get("pixel_samples", {}).get("count", 16))
+    textures = text.get("textures", {})
+    materials = {name: material(path, row, textures, traced) for name, row in text["materials"].items()}
     folder = os.path.dirname(os.path.abspath(path))
 
     def mesh(row, source):
@@ -162,30 +238,62 @@ def load(path):
         scene.shapes.append(Mesh(file, source.get("normals"), to_world(row, source.get("up", "z")), materials[row["material"]]))
 
     for row in text.get("shapes", []):
-        kind = row["type"]
-        if kind == "mesh":
+        if row["type"] == "mesh":
             mesh(row, row)
-            continue
-        material = materials[row["material"]]
-        if kind == "rectangle":
-            scene.shapes.append(quad(row, material=material))
-        elif kind == "ellipsoid":
-            scene.shapes.append(Ellipsoid(row["center"], row["a"], row["b"], row["c"], material))
-        elif kind == "sphere":
-            r = row["radius"]
-            scene.shapes.append(Ellipsoid(row["center"], [r, 0, 0], [0, r, 0], [0, 0, r], material))
-        elif kind == "triangle":
-            scene.shapes.append(Triangles(row["vertices"], [(0, 1, 2)], material))
-        elif kind == "tetrahedron":
-            scene.shapes.append(Triangles(row["vertices"], [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)], material))
-        elif kind == "plane":
-            scene.shapes.append(Plane(row["point"], unit(row["normal"]), material))
         else:
-            raise ValueError(f"{path}: no peer has shapes of type {kind!r}")
+            scene.shapes.append(shape(path, row, materials[row["material"]]))
     for row in text.get("instances", []):
         mesh(row, text["meshes"][row["mesh"]])
-    for row in text["lights"]:
-        if row["type"] != "rectangle":
+    for row in text.get("lights", []):
+        if row["type"] == "rectangle":
+            scene.lights.append(quad(row, color=row["color"]))
+        elif row["type"] == "point" and traced:
+            scene.lights.append(Point(row["position"], row["color"]))
+        elif row["type"] == "directional" and traced:
+            scene.lights.append(Sun(row["direction"], row["color"]))
+        else:
             raise ValueError(f"{path}: the peers' lights are rectangles, not {row['type']!r}")
-        scene.lights.append(quad(row, color=row["color"]))
+    return scene
+
+
+def shape(path, row, material):
+    kind = row["type"]
+    if kind == "rectangle":
+        return quad(row, material=material)
+    if kind == "disk":
+        n = unit(row["normal"])
+        square = quad({"tangent": [0, 1, 0] if abs(n[0]) > 0.9 else [1, 0, 0], "size": [2 * row["radius"]] * 2} | row)
+        return Disk(square.center, square.u, square.v, material)
+    if kind == "ellipsoid":
+        return Ellipsoid(row["center"], row["a"], row["b"], row["c"], material)
+    if kind == "sphere":
+        r = row["radius"]
+        return Ellipsoid(row["center"], [r, 0, 0], [0, r, 0], [0, 0, r], material)
+    if kind == "triangle":
+        return Triangles(row["vertices"], [(0, 1, 2)], material)
+    if kind == "tetrahedron":
+        a, b, c, d = row["vertices"]
+        if dot(cross(sub(b, a), sub(c, a)), sub(d, a)) < 0:
+            b, c = c, b
+        return Triangles([a, b, c, d], [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)], material)
+    if kind == "plane":
+        return Plane(row["point"], unit(row["normal"]), material)
+    raise ValueError(f"{path}: no peer has shapes of type {kind!r}")
+
+
+def course(path):
+    """A scene in JSON. Its axes stay as they are, with y up: the picture is the same."""
+    with open(path, encoding="utf-8") as file:
+        text = json.load(file)
+    camera, light = text["cam_config"], text["light_config"]
+    scene = Scene(*text["image_resolution"], camera["position"], camera["look_at"], camera["ref_up"], camera["vertical_fov"],
+                  [0, 0, 0], integrator="path", max_depth=text["max_depth"], spp=text["spp"])
+    kinds = {"diffuse": "diffuse", "specular": "conductor"}
+    materials = {row["name"]: Material(kinds[row["type"]], color=row["color"]) for row in text["materials"]}
+    folder = os.path.dirname(os.path.abspath(path))
+    for row in text["objects"]:
+        place = to_world({"scale": row.get("scale", 1), "translate": row.get("translate", [0, 0, 0])}, "z")
+        scene.shapes.append(Mesh(os.path.join(folder, row["obj_file_path"]), "flat", place, materials[row["material_name"]]))
+    scene.lights.append(quad({"center": light["position"], "size": light["size"], "normal": [0, -1, 0], "tangent": [1, 0, 0]},
+                             color=light["radiance"]))
     return scene

@@ -16,6 +16,8 @@ class Work:
     lights: int = 1
     renderers: tuple = ALL
     repeats: int = 3  # of a round
+    integrator: str = "phong"
+    spp: int = 16
 
     def generated(self):
         """The generated scenes that it takes."""
@@ -28,15 +30,22 @@ class Work:
         return dataclasses.replace(self, title=title, size=size)
 
     def rays(self, spp, light_samples):
-        return self.size ** 2 * spp * (1 + light_samples * self.lights)
+        """A path counts as one."""
+        return self.size ** 2 * spp * (1 if self.integrator == "path" else 1 + light_samples * self.lights)
 
 
 CORNELL, ELLIPSOIDS = str(install.ROOT / "scenes/cornell.toml"), str(install.HERE / "ellipsoids20.toml")
+CORNELL_PATH = str(install.ROOT / "scenes/cornell-path.toml")
 NO_POVRAY = ALL[:-1]
+PATHS = ("lavapipe", "mesa-backports", "cpu", "mitsuba", "cycles")
 
 
 def large(title, scene, renderers=NO_POVRAY):
     return Work(f"{title}, 512x512", scene, renderers=renderers, repeats=1)
+
+
+def path(title, scene, size, kind="render"):
+    return Work(f"{title}, {size}x{size}", scene, size, kind, renderers=PATHS, integrator="path", spp=64, repeats=3 if kind == "render" else 1)
 
 
 def build(title, scene):
@@ -63,5 +72,10 @@ LARGE = {
     "build10m": build("the terrain of 9,999,392 triangles", "terrain10m"),
     "terrain10m": large("terrain of 9,999,392 triangles", "terrain10m"),
 }
-WORKS = SMALL | LARGE
-SETS = {"small": list(SMALL), "large": list(LARGE), "all": list(WORKS)}
+PATH = {
+    "path": path("paths in the assignment scene", CORNELL_PATH, 400),
+    "path-rock70k": path("paths around a rock of 69,312 triangles", "path-rock70k", 400),
+    "path-cold": path("paths in the assignment scene, whole process, caches empty", CORNELL_PATH, 400, "cold"),
+}
+WORKS = SMALL | LARGE | PATH
+SETS = {"small": list(SMALL), "large": list(LARGE), "paths": list(PATH), "all": list(WORKS)}

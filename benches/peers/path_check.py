@@ -1,0 +1,209 @@
+#!/usr/bin/env python3
+"""Shows that wgray's path tracer and Mitsuba's compute the same pictures: that each pixel's mean is the same.
+
+    benches/peers/run --install-only                                    once
+    target/peers/venv/bin/python benches/peers/path_check.py            all scenes, on the CPU
+    ... path_check.py --device lavapipe --scenes diffuse,glass --save target/peers/pictures
+    ... path_check.py --wgray none                                      Mitsuba against itself, with other seeds
+    ... path_check.py --wrong 1.02                                      wgray's pictures times 1.02: every scene must fail
+
+The scenes are those of path_scenes.py and scenes/cornell-path.toml. Each is rendered BATCHES times by both, with a seed each
+time, so that mean and variance of every pixel are known. Welch's t-test compares the means at three levels: pixels, blocks of
+8 x 8 pixels and the whole picture, each channel by itself. p-values are corrected for the number of tests of a level (Šidák),
+and the bound of 1 % for the number of levels and scenes, so that a run without faults fails once in a hundred seeds. The
+standard error is taken to be at least 1e-5 of the mean, for the rounding where both are without noise. A scene also fails
+
+    with more than twice as many pixels rejected at 1 % as chance gives
+    if its whole picture, multiplied by --control (1.02), would pass: then the test saw nothing; black pictures fail so too
+    for the course's files: if a block is off by more than 2 %, or the whole by more than 0.5 %
+
+Exit status 1 if any scene fails. --save writes for each scene a picture of ours, Mitsuba's, and red and blue where ours
+is brighter or darker (10 standard errors are full colour).
+"""
+import argparse
+import dataclasses
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.dont_write_bytecode = True
+import install
+os.environ |= install.Peers().mitsuba()[1]  # before the import, which loads LLVM
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import OpenEXR
+from scipy import stats
+
+import path_scenes
+import scenes
+
+LEVEL, BLOCK, ROUNDING = 0.01, 8, 1e-5
+# Mitsuba chooses among lights without regard to their power: with few samples its means are so skewed that t-tests reject more
+MORE_SAMPLES = {"many-lights": 8}
+
+
+@dataclasses.dataclass
+class Means:
+    """The means of a picture's parts over the batches, and their squared standard errors."""
+    mean: np.ndarray
+    square: np.ndarray
+    count: int
+
+
+def means(batches):
+    return Means(batches.mean(0), batches.var(0, ddof=1) / len(batches), len(batches))
+
+
+def blocks(batches):
+    n, height, width, channels = batches.shape
+    h, w = height // BLOCK, width // BLOCK
+    return batches[:, :h * BLOCK, :w * BLOCK].reshape(n, h, BLOCK, w, BLOCK, channels).mean((2, 4))
+
+
+def welch(ours, theirs):
+    """t and the two-sided p-value of each part."""
+    floor = (ROUNDING * (abs(ours.mean) + abs(theirs.mean)) / 2) ** 2 + 1e-18
+    a, b = ours.square, theirs.square
+    free = (a + b) ** 2 / np.maximum(a ** 2 / (ours.count - 1) + b ** 2 / (theirs.count - 1), 1e-300)
+    free = np.where(a + b > floor, np.maximum(free, 1), 1e6)
+    t = (ours.mean - theirs.mean) / np.sqrt(np.maximum(a + b, floor))
+    return t, 2 * stats.t.sf(abs(t), free)
+
+
+def sidak(p):
+    """The lowest p-value, corrected for the number of tests."""
+    return float(-np.expm1(p.size * np.log1p(-min(p.min(), 1 - 1e-16))))
+
+
+def wgray(args, path, seeds, size, spp):
+    pictures = []
+    environment = os.environ | ({"RAYON_NUM_THREADS": str(args.threads)} if args.threads else {})
+    with tempfile.TemporaryDirectory() as folder:
+        out = os.path.join(folder, "out.exr")
+        for seed in seeds:
+            command = [args.wgray, "render", str(path), "--size", "x".join(map(str, size)), "--spp", str(spp), "--seed", str(seed), "--device",
+                       args.device, "--progress", "none", "-q", "-o", out]
+            done = subprocess.run(command, env=environment, capture_output=True, text=True)
+            if done.returncode:
+                raise RuntimeError(f"wgray ended with {done.returncode}: {done.stderr.strip()[-1000:]}")
+            channels = OpenEXR.File(out, separate_channels=True).channels()  # Mitsuba's reader stops for ever where it has one thread
+            pictures.append(np.stack([channels[c].pixels for c in "RGB"], -1).astype(float))
+            os.remove(out)
+    return np.array(pictures)
+
+
+def mitsuba(path, seeds, size, spp):
+    import mitsuba_scenes
+    loaded = mitsuba_scenes.load(scenes.load(path, "path"), size, spp, 1, curved="mesh")
+    return np.array([np.array(mi.render(loaded, spp=spp, seed=seed))[..., :3] for seed in seeds], np.float64)
+
+
+def save(folder, name, ours, theirs, t):
+    """Three pictures side by side, two of them as they would be displayed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    shown = [np.clip(m, 0, 1) ** (1 / 2.2) for m in (ours.mean, theirs.mean)]
+    t = np.clip(t.mean(-1) / 10, -1, 1)
+    signs = 0.5 + np.stack([t, -abs(t), -t], -1) / 2
+    mi.Bitmap((np.concatenate([*shown, signs], 1) * 255).astype(np.uint8)).write(str(folder / f"{name}.png"))
+
+
+def check(args, name, path, bound):
+    """Prints a row of the table; returns whether all is well."""
+    started = time.monotonic()
+    course = str(path).endswith(".json")
+    size, spp = ((args.course_size, args.course_spp) if course else (args.size, args.spp * MORE_SAMPLES.get(name, 1)))
+    count = args.course_batches if course else args.batches
+    try:
+        theirs = mitsuba(path, range(1001, 1001 + count), (size, size), spp)
+        seeds = range(args.seed, args.seed + count)
+        ours = mitsuba(path, seeds, (size, size), spp) if args.wgray == "none" else wgray(args, path, seeds, (size, size), spp)
+    except (RuntimeError, ValueError, OSError) as why:
+        print(f"{name:22} FAILS: {why}", flush=True)
+        return False
+    ours *= args.wrong
+    if not np.isfinite(ours).all() or not np.isfinite(theirs).all():
+        print(f"{name:22} FAILS: not all pixels are finite", flush=True)
+        return False
+    faults, lowest = [], []
+    levels = {"pixels": lambda x: x, "blocks": blocks, "whole": lambda x: x.mean((1, 2))}
+    for level, part in levels.items():
+        a, b = means(part(ours)), means(part(theirs))
+        t, p = welch(a, b)
+        lowest.append(sidak(p))
+        if lowest[-1] < bound:
+            faults.append(level)
+        if level == "pixels":
+            rejected, chance = int((p < LEVEL).sum()), LEVEL * p.size
+            if rejected > 2 * chance:
+                faults.append("rejected")
+            if args.save:
+                save(args.save, name, a, b, t)
+    total, other = (means(x.mean((1, 2, 3))) for x in (ours, theirs))
+    ratio = total.mean / other.mean if other.mean else float("nan")
+    error = np.sqrt(total.square + other.square) / other.mean if other.mean else float("nan")
+    whole = [means(x.mean((1, 2))) for x in (ours * args.control, theirs)]
+    if args.wrong == 1 and sidak(welch(*whole)[1]) >= bound:
+        faults.append("control")
+    a, b = (means(blocks(x).mean(-1)) for x in (ours, theirs))
+    off = abs(a.mean - b.mean) / np.maximum(b.mean, 1e-12)
+    if course and (off.max() > 0.02 or not abs(ratio - 1) <= 0.005):
+        faults.append("2 %")
+    at = np.unravel_index(off.argmax(), off.shape)
+    noise = np.sqrt(a.square + b.square)[at] / max(b.mean[at], 1e-12)
+    print(f"{name:22} {ratio:8.5f} {error:8.5f} {lowest[0]:9.2g} {rejected:6d} {chance:6.0f} {lowest[1]:9.2g} {off.max():7.2%} {noise:7.2%} "
+          f"{lowest[2]:9.2g} {time.monotonic() - started:6.0f}  {'FAILS: ' + ', '.join(faults) if faults else 'good'}", flush=True)
+    return not faults
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", help="names, separated by commas, or course: the three files in JSON; all if absent")
+    parser.add_argument("--wgray", default=str(install.ROOT / "target/release/wgray"), help="the program; none: Mitsuba in its place")
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--size", type=int, default=96)
+    parser.add_argument("--spp", type=int, default=64, help="of one batch")
+    parser.add_argument("--batches", type=int, default=16)
+    parser.add_argument("--course-size", type=int, default=96)
+    parser.add_argument("--course-spp", type=int, default=512)
+    parser.add_argument("--course-batches", type=int, default=48)
+    parser.add_argument("--seed", type=int, default=1, help="wgray's first; Mitsuba's are from 1001")
+    parser.add_argument("--wrong", type=float, default=1, help="a factor of wgray's pictures, which must be found")
+    parser.add_argument("--control", type=float, default=1.02, help="the factor that each scene must be able to tell from 1")
+    parser.add_argument("--variant", default="llvm_ad_rgb")
+    parser.add_argument("--threads", type=int, help="all if absent")
+    parser.add_argument("--save", metavar="FOLDER", type=pathlib.Path)
+    args = parser.parse_args()
+    for name, least in (("size", BLOCK), ("batches", 4), ("course_size", BLOCK), ("course_batches", 4), ("spp", 1), ("course_spp", 1)):
+        if getattr(args, name) < least:
+            parser.error(f"--{name.replace('_', '-')}: {getattr(args, name)} must be at least {least}")
+    if not 0 <= args.seed <= 1000 - max(args.batches, args.course_batches) + 1:
+        parser.error(f"--seed: {args.seed} must leave 1001 and more to Mitsuba")
+
+    mi.set_variant(args.variant)
+    mi.set_log_level(mi.LogLevel.Error)
+    if args.threads:
+        dr.set_thread_count(args.threads)
+    known = {"cornell": install.ROOT / "scenes/cornell-path.toml"} | path_scenes.write(install.FOLDER / "path-scenes")
+    names = list(known)
+    if args.scenes:
+        names = [n for word in args.scenes.split(",") for n in (path_scenes.COURSE if word == "course" else [word])]
+    for name in names:
+        if name not in known:
+            parser.error(f"--scenes: unknown {name!r}: one of course, {', '.join(known)}")
+    bound = -np.expm1(np.log1p(-LEVEL) / (3 * len(names)))
+    print(f"{args.spp} samples x {args.batches} batches (course: {args.course_spp} x {args.course_batches}), device {args.device}, "
+          f"factor {args.wrong}; corrected p-values below {bound:.2g} fail")
+    print(f"{'scene':22} {'ratio':>8} {'+-':>8} {'p pixels':>9} {'at 1 %':>6} {'chance':>6} {'p blocks':>9} {'worst':>7} {'+-':>7} {'p whole':>9} "
+          f"{'s':>6}", flush=True)
+    good = [check(args, name, known[name], bound) for name in names]
+    print(f"{sum(good)} good, {len(good) - sum(good)} failed")
+    sys.exit(not all(good))
+
+
+if __name__ == "__main__":
+    main()
