@@ -63,6 +63,41 @@ fn hidden_by_primitives(surface: Surface, light: Light, block: Block) -> u32 {
     return bits;
 }
 
+// Whether it is so before, or any of these primitives but `goal` cuts the way from a surface to `reach` times `to`.
+fn is_hidden_by_primitives(before: bool, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool {
+    var hidden = before;
+    if (SHADOW_CASTERS & (1u << RECTANGLE)) != 0u {
+        hidden = is_hidden_by(RECTANGLE, hidden, surface, to, reach, goal);
+    }
+    if (SHADOW_CASTERS & (1u << TRIANGLE)) != 0u {
+        hidden = is_hidden_by(TRIANGLE, hidden, surface, to, reach, goal);
+    }
+    if (SHADOW_CASTERS & (1u << ELLIPSOID)) != 0u {
+        hidden = is_hidden_by(ELLIPSOID, hidden, surface, to, reach, goal);
+    }
+    if (SHADOW_CASTERS & (1u << PLANE)) != 0u {
+        hidden = is_hidden_by(PLANE, hidden, surface, to, reach, goal);
+    }
+    if (SHADOW_CASTERS & (1u << DISK)) != 0u {
+        hidden = is_hidden_by(DISK, hidden, surface, to, reach, goal);
+    }
+    return hidden;
+}
+
+fn is_hidden_by(kind: u32, before: bool, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool {
+    let range = counts.primitives[kind];
+    var hidden = before;
+    for (var i = range.x; i < range.y && !hidden; i++) {
+        hidden = is_cut(kind, primitives[i], i, surface, to, reach, goal);
+    }
+    return hidden;
+}
+
+// How many things shine that light is sampled of.
+fn emitter_count() -> u32 {
+    return counts.emitters.y;
+}
+
 // Which of the primitives from `first` to before `end` may hide a light: bit i stands for first + i, up to 32 of them.
 fn shadow_candidates(first: u32, end: u32, cone: Cone) -> u32 {
     var candidates = 0u;

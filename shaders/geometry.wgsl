@@ -21,6 +21,16 @@ fn hidden_samples(surface: Surface, light: Light, block: Block, unlit: u32) -> u
     return hidden_by_tree(bits | unlit, surface, light, block);
 }
 
+// Whether it is so `before`, or anything lies between where rays leave a surface on the viewer's side and `reach` times the vector `to` from there, but for
+// the primitive `goal`. What the surface is of does not, as for `hidden_samples`.
+fn is_hidden(before: bool, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool {
+    let hidden = is_hidden_by_primitives(before, surface, to, reach, goal);
+    if IN_TREE == 0u {
+        return hidden;
+    }
+    return is_hidden_by_tree(hidden, surface, to, reach, goal);
+}
+
 // Whether a hit is on a mesh.
 fn is_on_mesh(hit: Hit) -> bool {
     if (IN_TREE & (1u << INSTANCE)) == 0u {

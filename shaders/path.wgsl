@@ -17,6 +17,11 @@ struct Scattered {
     splits: bool,
 }
 
+// Whether a material mirrors or refracts light, and does nothing else.
+fn is_specular(material: Material) -> bool {
+    return (material.kind == MIRROR) | (material.kind == GLASS);
+}
+
 fn mirrored_path(path: Path, surface: Surface, at: Arrival, material: Material) -> Scattered {
     let onward = reflected_path(path, surface, at, path.throughput * material.tint);
     return Scattered(onward, onward, false);

@@ -1,13 +1,30 @@
-// The samples of a pixel, whatever the integrator.
+// The samples of a pixel, whatever the integrator. An integrator takes a sample's path from surface to surface: `begin_path`, then
+// `advance` until it has `ended`; then `path_value` and `path_layers` say what it adds. So lanes that run in step need not wait for
+// the longest path: each begins its next sample.
 
-// One sample of a pixel: its radiance times its weight, and its weight.
-fn pixel_radiance(pixel: vec2u, sample: u32) -> vec4f {
+// The camera's ray of one sample, and its weight.
+struct CameraSample {
+    ray: Ray,
+    differential: Differential,
+    weight: f32,
+}
+
+fn camera_sample(pixel: vec2u, sample: u32) -> CameraSample {
     let round = sample / PIXEL_SAMPLES;
     let index = sample % PIXEL_SAMPLES;
     let u = sample_square(PIXEL_PATTERN, PIXEL_SIDE, index, round, sample_key(pixel, camera.seed, 0u));
     let at = filtered(u);
     let place = vec2f(pixel) + at.xy;
-    return vec4f(radiance(camera_ray(camera, place), differential_at(place), pixel, sample) * at.z, at.z);
+    return CameraSample(camera_ray(camera, place), differential_at(place), at.z);
+}
+
+// What a pixel's samples show besides their sum, each a sum of weighted colours.
+struct Layers {
+    emission: vec4f,       // light that was not reflected; w the share of the pixel where anything is hit
+    direct: vec4f,         // light that was reflected once
+    indirect: vec4f,       // light that was reflected more often
+    albedo: vec4f,         // the share of light that the surface reflects
+    normal: vec4f,         // the shading normal, outwards
 }
 
 // How the camera's ray changes with its place in the picture.

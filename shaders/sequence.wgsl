@@ -3,10 +3,14 @@
 // Point `index` of Sobol's (0,2)-sequence, Owen-scrambled by hashing: Burley, "Practical Hash-based Owen Scrambling",
 // JCGT 9(4), 2020. Sequences of different keys are independent, since the order of their points is scrambled too.
 fn sobol_sample(index: u32, key: vec2u) -> vec2f {
+    let bits = sobol_bits(index, key);
+    return vec2f(unit_float(bits.x), unit_float(bits.y));
+}
+
+// The same as fractions of 2^32.
+fn sobol_bits(index: u32, key: vec2u) -> vec2u {
     let i = shuffled_index(index, key.x ^ key.y);
-    let x = reverseBits(scramble(i, key.x));
-    let y = reverseBits(scramble(sobol_reversed(i), key.y));
-    return vec2f(unit_float(x), unit_float(y));
+    return vec2u(reverseBits(scramble(i, key.x)), reverseBits(scramble(sobol_reversed(i), key.y)));
 }
 
 // The second coordinate of Sobol's point i as 32 binary digits, the first in the lowest bit; those of the first

@@ -26,6 +26,13 @@ fn shadow_bits(kind: u32, q: Primitive, p: vec3f, wall: bool, light: Light, bloc
     return bits;
 }
 
+// Whether the primitive cuts the segment p + s to, s in (0, reach).
+fn cuts(kind: u32, q: Primitive, p: vec3f, wall: bool, to: vec3f, reach: f32) -> bool {
+    let from_anchor = vector_to_local(q, p - q.anchor);
+    let start = select(ellipsoid_level(q, from_anchor), -1e-30, wall);
+    return blocks(kind, from_anchor - q.middle, vector_to_local(q, to), start, reach);
+}
+
 fn block_sample(block: Block, i: u32) -> vec2f {
     return sample_square(block.pattern, block.side, block.first + i, block.group, block.key);
 }

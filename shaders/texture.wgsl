@@ -185,6 +185,8 @@ fn appearance(spot: Spot, hit: Hit, material: Material, surface: Surface, at: Ar
             look.material.diffuse = select(look.material.diffuse, color, (lookup & FOR_DIFFUSE) != 0u);
             look.material.specular = select(look.material.specular, color, (lookup & FOR_SPECULAR) != 0u);
             look.material.tint = select(look.material.tint, color, (lookup & FOR_TINT) != 0u);
+            look.material.emission = select(look.material.emission, color, (lookup & FOR_EMISSION) != 0u);
+            look.material.roughness = select(look.material.roughness, color.x, (lookup & FOR_ROUGHNESS) != 0u);
             if NORMAL_MAPS == 1u {
                 if (lookup & FOR_NORMAL) != 0u {
                     look.normal = mapped_normal(surface, t, color);

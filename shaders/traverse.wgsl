@@ -16,3 +16,9 @@ fn hidden_by(kind: u32, range: vec2u, surface: Surface, cone: Cone, light: Light
     }
     return bits;
 }
+
+// Whether primitive i, which is q, cuts the way from a surface to `reach` times `to`.
+fn is_cut(kind: u32, q: Primitive, i: u32, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool {
+    let is_wall = i == by_itself(surface.below);
+    return (i != by_itself(surface.above)) & (i != goal) & cuts(kind, q, surface.start, is_wall, to, reach);
+}

@@ -281,3 +281,74 @@ fn hidden_by_mesh(number: u32, may: u32, surface: Surface, light: Light, block: 
     }
     return hidden;
 }
+
+// Whether an item of the tree lies between a surface and `reach` times `to`, but for the primitive `goal`; or `before`.
+fn is_hidden_by_tree(before: bool, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool {
+    var hidden = before;
+    let s = slabs(surface.start, to, item_pad(surface.start));
+    start_walk(&items_walk, octant_of(to));
+    while items_walk.depth > 0u && !hidden {
+        let node = load_node(5u * next_node(&items_walk));
+        var leaves = children_wait(&items_walk, node, children_passed(node, s, reach));
+        while leaves != 0u && !hidden {
+            let items = leaf_items(node, firstTrailingBit(leaves));
+            leaves &= leaves - 1u;
+            for (var k = 0u; k < items.y && !hidden; k++) {
+                let item = load_item(items.x + k);
+                let passed = is_passed(box_passage(item.low, item.high, s), reach);
+                for (var once = passed & ((item.kind & CASTS_SHADOW) != 0u); once; once = false) {
+                    hidden = is_cut_by_item(item, surface, to, reach, goal);
+                }
+            }
+        }
+    }
+    return hidden;
+}
+
+fn is_cut_by_item(item: Item, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool {
+    var cut = false;
+    let i = item.index;
+    for (var once = has_kind(item, INSTANCE); once; once = false) {
+        cut = is_cut_by_mesh(i, surface, to, reach);
+    }
+    for (var once = has_kind(item, RECTANGLE); once; once = false) {
+        cut = is_cut(RECTANGLE, primitives[i], i, surface, to, reach, goal);
+    }
+    for (var once = has_kind(item, TRIANGLE); once; once = false) {
+        cut = is_cut(TRIANGLE, primitives[i], i, surface, to, reach, goal);
+    }
+    for (var once = has_kind(item, ELLIPSOID); once; once = false) {
+        cut = is_cut(ELLIPSOID, primitives[i], i, surface, to, reach, goal);
+    }
+    for (var once = has_kind(item, DISK); once; once = false) {
+        cut = is_cut(DISK, primitives[i], i, surface, to, reach, goal);
+    }
+    return cut;
+}
+
+// Of the triangles of instance `number`; not the one that the surface is of.
+fn is_cut_by_mesh(number: u32, surface: Surface, to: vec3f, reach: f32) -> bool {
+    let i = load_instance(number);
+    let origin = point_to_mesh(i, surface.start);
+    let direction = vector_to_mesh(i, to);
+    let s = slabs(origin, direction, mesh_pad(i, origin));
+    let shear = shear_of(direction);
+    var cut = false;
+    start_walk(&mesh_walk, octant_of(direction));
+    while mesh_walk.depth > 0u && !cut {
+        let node = load_node(i.nodes + 5u * next_node(&mesh_walk));
+        var leaves = children_wait(&mesh_walk, node, children_passed(node, s, reach));
+        while leaves != 0u && !cut {
+            let triangles = leaf_items(node, firstTrailingBit(leaves));
+            leaves &= leaves - 1u;
+            for (var k = 0u; k < triangles.y; k++) {
+                let corners = meshes[i.triangles + triangles.x + k];
+                let found = triangle_crossing(load_position(i, corners.x), load_position(i, corners.y),
+                                              load_position(i, corners.z), origin, shear, s);
+                let own = all(surface.above == vec2u(number + 1u, corners.w));
+                cut |= found.met & !own & (found.t > 0.0) & (found.t < reach);
+            }
+        }
+    }
+    return cut;
+}

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use crate::error::RenderError;
-use crate::film::{Film, Region};
+use crate::film::{Film, Form, Region};
 use crate::pack::{FirstHit, Packed};
 
 /// A scene on a device, with one film at a time.
@@ -16,6 +16,8 @@ use crate::pack::{FirstHit, Packed};
 /// - There is no film at first. [`begin`](Backend::begin) starts an empty one, [`resume`](Backend::resume) goes on from
 ///   one that was read before, by whichever backend. Either takes the place of the film before.
 /// - A film is a region of the picture. It may have no pixels.
+/// - A film has the scene's [form](crate::film::Form): under adaptive sampling moments and looks beside its sums, and where
+///   layers were asked for ([`Packed::with_layers`]) these too. With layers and without, all else has the same bits.
 /// - [`film`](Backend::film) copies the film. It can be read at any time between two calls, as often as one likes, and
 ///   reading changes nothing.
 ///
@@ -27,7 +29,7 @@ use crate::pack::{FirstHit, Packed};
 /// - `poll` never waits for a device. A backend without a device of its own does the work in `poll` or `wait`, and then
 ///   either takes as long as the work does.
 /// - With nothing pending, `poll` returns true and `wait` returns at once.
-/// - Every cut of the work gives the same film, bit for bit: tiles of any shape in any order, and ranges of any length,
+/// - Every cut of the work gives the same film, all of its lists, bit for bit: tiles of any shape in any order, and ranges of any length,
 ///   if every pixel gets each sample once, in ascending order.
 /// - Under adaptive sampling all pixels of the film get their first [`samples_of_all`](Backend::samples_of_all) samples
 ///   before any pixel gets a further one. One range may hold both for the last tile that lacks first ones.
@@ -94,7 +96,7 @@ pub trait Backend {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rules {
     picture: Region,
-    adaptive: bool,
+    form: Form,
     first_look: u32,
 }
 
@@ -110,15 +112,15 @@ impl Rules {
     pub fn of(scene: &Packed) -> Rules {
         Rules {
             picture: Region::whole(scene.camera.width, scene.camera.height),
-            adaptive: scene.adaptive,
+            form: scene.form(),
             first_look: scene.specialization.first_look,
         }
     }
 
-    /// Whether a film has moments and looks.
+    /// What a film has beside its sums.
     #[cfg(feature = "gpu")]
-    pub fn adaptive(&self) -> bool {
-        self.adaptive
+    pub fn form(&self) -> Form {
+        self.form
     }
 
     /// The whole picture.
@@ -134,14 +136,14 @@ impl Rules {
     }
 
     pub fn samples_of_all(&self) -> u32 {
-        match self.adaptive {
+        match self.form.adaptive {
             true => self.first_look,
             false => u32::MAX,
         }
     }
 
     pub fn around(&self, region: Region) -> Region {
-        match self.adaptive {
+        match self.form.adaptive {
             true => region.with_neighbors().within(self.picture),
             false => region,
         }
@@ -149,10 +151,7 @@ impl Rules {
 
     /// A film of a region without any sample.
     pub fn empty_film(&self, region: Region) -> Film {
-        match self.adaptive {
-            true => Film::adaptive(region),
-            false => Film::new(region),
-        }
+        Film::of(region, self.form)
     }
 
     pub fn in_picture(&self, region: Region) -> Result<(), RenderError> {
@@ -170,16 +169,22 @@ impl Rules {
     pub fn resume(&self, film: &Film) -> Result<Started, RenderError> {
         self.in_picture(film.region)?;
         let pixels = film.region.pixels();
-        let further = if self.adaptive { pixels } else { 0 };
-        for (what, found, wanted) in [
-            ("sums", film.sums.len() as u64, pixels),
-            ("moments", film.moments.len() as u64, further),
-            ("first looks", film.looks.len() as u64, further),
-        ] {
+        let of = |there: bool| if there { pixels } else { 0 };
+        let Form { adaptive, layers } = self.form;
+        let with = |there: bool| if there { "with" } else { "without" };
+        let sampling = format!("a scene {} adaptive sampling", with(adaptive));
+        let asked = format!("a scene {} layers", with(layers));
+        let known = [
+            ("sums", pixels, &sampling),
+            ("moments", of(adaptive), &sampling),
+            ("first looks", of(adaptive), &sampling),
+        ];
+        let of_layers = std::iter::repeat(("pixels of a layer", of(layers), &asked));
+        for (list, (what, wanted, scene)) in film.lists().zip(known.into_iter().chain(of_layers)) {
+            let found = list.len() as u64;
             if found != wanted {
                 return Err(RenderError::WrongFilm(format!(
-                    "{found} {what} for {pixels} pixels; a scene {} adaptive sampling has {wanted}",
-                    if self.adaptive { "with" } else { "without" }
+                    "{found} {what} for {pixels} pixels; {scene} has {wanted}"
                 )));
             }
         }
@@ -196,7 +201,7 @@ impl Rules {
             return Ok(false);
         }
         inside("tile", tile, "film", film.region)?;
-        if self.adaptive {
+        if self.form.adaptive {
             let first = samples.end.min(self.first_look).saturating_sub(samples.start);
             let there = film.first_samples + tile.pixels() * u64::from(first);
             if samples.end > self.first_look && there < film.region.pixels() * u64::from(self.first_look) {
@@ -212,7 +217,7 @@ impl Rules {
 
     /// The end of what one kernel can do of a range of samples: first ones or further ones.
     pub fn end_of_part(&self, samples: &Range<u32>) -> u32 {
-        match self.adaptive && samples.start < self.first_look {
+        match self.form.adaptive && samples.start < self.first_look {
             true => samples.end.min(self.first_look),
             false => samples.end,
         }

@@ -78,6 +78,54 @@ impl fmt::Display for Region {
     }
 }
 
+/// What a film has beside its sums.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Form {
+    /// Moments and looks, for adaptive sampling.
+    pub adaptive: bool,
+    /// The layers.
+    pub layers: bool,
+}
+
+impl Form {
+    /// How many lists of pixels such a film has.
+    pub fn lists(self) -> usize {
+        let (adaptive, layers) = (usize::from(self.adaptive), usize::from(self.layers));
+        1 + 2 * adaptive + Layer::ALL.len() * layers
+    }
+
+    /// The bytes of a pixel.
+    pub fn bytes(self) -> usize {
+        self.lists() * size_of::<Vec4>()
+    }
+}
+
+/// What the samples of a pixel show besides their radiance, as the integrator `path` sees it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layer {
+    /// Light that was not reflected; a is the share of the samples whose rays meet anything.
+    Emission,
+    /// Light that was reflected once.
+    Direct,
+    /// Light that was reflected more often.
+    Indirect,
+    /// The share of light that the surface reflects.
+    Albedo,
+    /// The normal that the surface is shaded by, outwards.
+    Normal,
+}
+
+impl Layer {
+    /// All of them, in the order of a film's lists.
+    pub const ALL: [Layer; 5] = [
+        Layer::Emission,
+        Layer::Direct,
+        Layer::Indirect,
+        Layer::Albedo,
+        Layer::Normal,
+    ];
+}
+
 /// The sums of a rectangle of pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
@@ -90,26 +138,62 @@ pub struct Film {
     pub moments: Vec<Vec4>,
     /// Under adaptive sampling what the first samples of the same pixels tell their neighbours, else nothing.
     pub looks: Vec<Vec4>,
+    /// Where layers were asked for, the sums of each [`Layer`] of the same pixels, weighted as the radiances are; else nothing.
+    pub layers: [Vec<Vec4>; Layer::ALL.len()],
 }
 
 impl Film {
-    /// A film without any sample, and without moments.
+    /// A film without any sample, and without moments and layers.
     pub fn new(region: Region) -> Film {
-        Film {
-            region,
-            sums: vec![Vec4::zeroed(); region.pixels() as usize],
-            moments: Vec::new(),
-            looks: Vec::new(),
-        }
+        Film::of(region, Form::default())
     }
 
     /// A film without any sample, for adaptive sampling.
     pub fn adaptive(region: Region) -> Film {
+        let form = Form {
+            adaptive: true,
+            ..Form::default()
+        };
+        Film::of(region, form)
+    }
+
+    /// A film without any sample.
+    pub fn of(region: Region, form: Form) -> Film {
+        let list = |there: bool| match there {
+            true => vec![Vec4::zeroed(); region.pixels() as usize],
+            false => Vec::new(),
+        };
         Film {
-            moments: vec![Vec4::zeroed(); region.pixels() as usize],
-            looks: vec![Vec4::zeroed(); region.pixels() as usize],
-            ..Film::new(region)
+            region,
+            sums: list(true),
+            moments: list(form.adaptive),
+            looks: list(form.adaptive),
+            layers: std::array::from_fn(|_| list(form.layers)),
         }
+    }
+
+    /// Every list of its pixels, also those that are empty: sums, moments, looks, layers.
+    pub fn lists(&self) -> impl Iterator<Item = &Vec<Vec4>> {
+        let Film {
+            region: _,
+            sums,
+            moments,
+            looks,
+            layers,
+        } = self;
+        [sums, moments, looks].into_iter().chain(layers)
+    }
+
+    /// The same, to be changed.
+    pub fn lists_mut(&mut self) -> impl Iterator<Item = &mut Vec<Vec4>> {
+        let Film {
+            region: _,
+            sums,
+            moments,
+            looks,
+            layers,
+        } = self;
+        [sums, moments, looks].into_iter().chain(layers)
     }
 
     /// A part of the film, which must lie in it.
@@ -129,6 +213,7 @@ impl Film {
             sums: of_part(&self.sums),
             moments: of_part(&self.moments),
             looks: of_part(&self.looks),
+            layers: self.layers.each_ref().map(|list| of_part(list)),
         }
     }
 
@@ -147,6 +232,28 @@ impl Film {
     /// 0. It is not what decided on the pixel's samples, which is what its neighbours are like.
     pub fn variance(&self, pixel: usize) -> [f32; 3] {
         variance_of_mean(self.sums[pixel], self.moments[pixel]).to_array()
+    }
+
+    /// Whether it has layers, which a film without pixels has not.
+    pub fn has_layers(&self) -> bool {
+        self.layers.iter().all(|list| !list.is_empty())
+    }
+
+    /// The mean of a layer over a pixel's samples; 0 if there are no samples, or no layers.
+    pub fn layer(&self, layer: Layer, pixel: usize) -> [f32; 3] {
+        let sum = self.layers[layer as usize].get(pixel).copied().unwrap_or_default();
+        mean(sum.xyz().extend(self.sums[pixel].w))
+    }
+
+    /// The share of a pixel's samples whose rays meet anything; 0 if there are no samples, 1 if there are no layers. A filter with
+    /// weights of either sign may take it out of 0 to 1.
+    pub fn alpha(&self, pixel: usize) -> f32 {
+        let all = self.sums[pixel].w;
+        match self.layers[Layer::Emission as usize].get(pixel) {
+            None => 1.0,
+            Some(_) if all == 0.0 => 0.0,
+            Some(sum) => sum.w / all,
+        }
     }
 
     /// The means of all pixels: linear RGB, row by row from the top.

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use crate::backend::Backend;
 use crate::error::RenderError;
-use crate::film::{Film, Region};
+use crate::film::{Film, Form, Region};
 use crate::pack::FirstHit;
 
 /// How long one call of [`Backend::render`] aims to take: long enough to hide what a call costs, short enough for
@@ -25,12 +25,24 @@ pub struct Cut {
 }
 
 impl Default for Cut {
-    /// Bands of 64 MiB.
+    /// Bands of 64 MiB, of 192 MiB under adaptive sampling.
     fn default() -> Cut {
         Cut {
             band_pixels: 4 << 20,
             samples_per_call: None,
             rows_per_call: None,
+        }
+    }
+}
+
+impl Cut {
+    /// [`Cut::default`], and with layers so few pixels that a band is no larger than one under adaptive sampling.
+    pub fn of(form: Form) -> Cut {
+        const LISTS: u64 = 3;
+        let cut = Cut::default();
+        Cut {
+            band_pixels: cut.band_pixels * LISTS / LISTS.max(form.lists() as u64),
+            ..cut
         }
     }
 }

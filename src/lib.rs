@@ -92,7 +92,7 @@ pub use film::Region;
 pub use glam::DVec3;
 #[cfg(feature = "gpu")]
 pub use gpu::{Info, adapters};
-pub use image::{Aov, Pixels};
+pub use image::{Aov, AovSource, Pixels};
 pub use picture::{Channel, Picture};
 pub use render::{Growing, Options, render, render_growing};
 pub use scene::{Description, Overrides, Scene};

@@ -20,7 +20,7 @@ pub struct Picture {
 /// The values of one channel, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Channel {
-    /// Of `R`, `normal.X` and other measures.
+    /// Of `R`, `A`, `normal.X` and other measures.
     Floats(Vec<f32>),
     /// Of `primitive.ID` and `sample_count.N`.
     Whole(Vec<u32>),
@@ -47,7 +47,8 @@ impl Picture {
         &self.device
     }
 
-    /// The pixels in linear RGB, row by row from the top.
+    /// The pixels in linear RGB, row by row from the top. Where the picture has alpha they are weighted by it: those of the
+    /// picture over black.
     pub fn pixels(&self) -> Pixels {
         Pixels {
             width: self.width(),
@@ -56,17 +57,37 @@ impl Picture {
         }
     }
 
-    /// The pixels as a screen and a PNG show them: red, green and blue of 8 bits each, clamped to [0, 1] and raised to the
-    /// power 1/2.2, row by row from the top.
+    /// The share of each pixel that is covered, row by row from the top, if the scene's background is transparent. A filter
+    /// with weights of either sign may take it out of 0 to 1.
+    pub fn alpha(&self) -> Option<Vec<f32>> {
+        let pixels = 0..self.film.sums.len();
+        self.layout.alpha.then(|| pixels.map(|i| self.film.alpha(i)).collect())
+    }
+
+    /// The pixels as a screen and a PNG without alpha show them: red, green and blue of 8 bits each, clamped to [0, 1] and
+    /// raised to the power 1/2.2, row by row from the top. Where the picture has alpha it is over black.
     pub fn rgb8(&self) -> Vec<u8> {
         self.film.means().flat_map(|mean| mean.map(image::encode)).collect()
     }
 
-    /// The values of a channel, by the name that it has in an OpenEXR file: `R`, `G`, `B`, and those of the layers that were
+    /// The pixels as a PNG with alpha has them, row by row from the top: red, green and blue as in [`Picture::rgb8`], but of
+    /// what is there by itself, not weighted by alpha; then alpha, linear, 255 where the picture has none.
+    pub fn rgba8(&self) -> Vec<u8> {
+        let pixel = |(i, mean)| match self.layout.alpha {
+            true => image::straight(mean, self.film.alpha(i)),
+            false => image::straight(mean, 1.0),
+        };
+        self.film.means().enumerate().flat_map(pixel).collect()
+    }
+
+    /// The values of a channel, by the name that it has in an OpenEXR file: `R`, `G`, `B`, `A` with alpha, and those of the layers that were
     /// asked for, such as `depth.Z` or `normal.X`. `None` if there is no such channel.
     pub fn channel(&self, name: &str) -> Option<Channel> {
         if let Some(color) = ["R", "G", "B"].iter().position(|known| *known == name) {
             return Some(Channel::Floats(self.film.means().map(|mean| mean[color]).collect()));
+        }
+        if name == "A" {
+            return self.alpha().map(Channel::Floats);
         }
         let mut channels = self.layout.aovs.iter().flat_map(|aov| aov.channels());
         let channel = channels.find(|channel| channel.name() == name)?;
@@ -84,7 +105,7 @@ impl Picture {
 
     /// Writes the picture to a file whose name ends in `.png`, as a screen shows it, or in `.exr`, with its linear values.
     /// Layers are further channels of an EXR, and files beside a PNG: `NAME.normal.png` and so on. Files appear when they
-    /// are whole, in place of those that have their names.
+    /// are whole, in place of those that have their names. Alpha is a further channel of either.
     ///
     /// # Errors
     ///

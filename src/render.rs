@@ -2,18 +2,17 @@
 
 use std::ops::ControlFlow;
 
-use glam::Vec4;
 use tracing::warn;
 
 use crate::backend::Backend;
 use crate::device::{Device, DeviceInfo, Renderer};
 use crate::error::{Error, RenderError};
-use crate::film::{Film, Region};
-use crate::image::{Aov, Layout};
+use crate::film::{Film, Form, Region};
+use crate::image::{Aov, AovSource, Layout};
 use crate::job::{self, Bands, Cut, Order};
 use crate::pack::{FirstHit, Packed, pack};
 use crate::picture::Picture;
-use crate::scene::{Problem, Scene};
+use crate::scene::{Integrator, Problem, Scene};
 
 /// How a scene is rendered. Size, samples and seed are the scene's, which [`Overrides`](crate::Overrides) can change.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -40,21 +39,41 @@ impl Options {
         let whole = Region::whole(width, height);
         let region = self.crop.unwrap_or(whole);
         let Region { x0, y0, x1, y1 } = region;
+        let integrator = scene.render.integrator;
+        let unknown = self.aovs.iter().find_map(|aov| {
+            let rule = match aov.source(integrator) {
+                AovSource::Adaptive if scene.render.adaptive.is_none() => "is known under adaptive sampling alone",
+                AovSource::Samples if integrator != Integrator::Path => "needs integrator = \"path\"",
+                _ => return None,
+            };
+            Some((aov, rule))
+        });
         let rule = if x0 >= x1 || y0 >= y1 {
             "must have x0 less than x1, and y0 less than y1".to_string()
         } else if x1 > width || y1 > height {
             format!("must lie in the picture of {width} x {height} pixels")
-        } else if let (Some(aov), None) = (self.aovs.iter().find(|aov| aov.is_of_film()), &scene.render.adaptive) {
-            let rule = "is known under adaptive sampling alone";
+        } else if let Some((aov, rule)) = unknown {
             return Err(Problem::of(aov.name(), rule).inside("aov"));
         } else {
             return Ok(region);
         };
         Err(Problem::of("crop", format!("{x0},{y0},{x1},{y1} {rule}")))
     }
+
+    /// The scene as backends read it, with what these options ask for.
+    #[doc(hidden)]
+    pub fn pack(&self, scene: &Scene) -> Packed {
+        let plain = pack(scene);
+        let of_samples = |aov: &Aov| aov.source(plain.integrator) == AovSource::Samples;
+        match self.aovs.iter().any(of_samples) {
+            true => plain.with_layers(),
+            false => plain,
+        }
+    }
 }
 
-/// Renders a scene. The picture is kept in memory, in 16 bytes a pixel.
+/// Renders a scene. The picture is kept in memory, in 16 bytes a pixel; in 80 more where it has alpha, or layers that are means
+/// over the samples.
 ///
 /// Where [`Device::Auto`] finds no adapter, or one that has no room for the scene, the CPU renders. So it does, whatever
 /// device was chosen, where the driver ends long loops early and a single sample has longer ones. A warning by `tracing` says
@@ -65,11 +84,11 @@ impl Options {
 ///
 /// Options that do not fit the scene, no such device, and what its driver refuses.
 pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
-    let packed = pack(scene);
+    let packed = options.pack(scene);
     let mut prepared = Prepared::new(scene, &packed, options)?;
     let region = prepared.layout.region;
     let film = prepared.renderer.work(|backend, _| {
-        let mut whole = empty(region, packed.adaptive)?;
+        let mut whole = empty(region, packed.form())?;
         let mut take = |band: Film| {
             put(&mut whole, &band);
             Ok(())
@@ -78,7 +97,7 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
             backend,
             region,
             packed.pixel_samples,
-            &Cut::default(),
+            &Cut::of(packed.form()),
             &mut |_| true,
             &mut take,
         )?;
@@ -99,14 +118,14 @@ pub fn render_growing(
     options: &Options,
     watch: &mut dyn FnMut(&mut Growing) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Picture, Error> {
-    let packed = pack(scene);
+    let packed = options.pack(scene);
     let mut prepared = Prepared::new(scene, &packed, options)?;
     let (layout, hits) = (&prepared.layout, &prepared.hits);
     let mut failed = None;
     let film = prepared.renderer.work(|backend, device| {
-        let (cut, order) = (Cut::default(), Order::Pixels);
+        let (cut, order) = (Cut::of(packed.form()), Order::Pixels);
         let mut bands = Bands::new(layout.region, packed.pixel_samples, &cut, order, backend.largest_film());
-        let mut whole = empty(layout.region, packed.adaptive)?;
+        let mut whole = empty(layout.region, packed.form())?;
         loop {
             let mut look = |backend: &mut dyn Backend, band: Region, share: f64| {
                 let mut growing = Growing {
@@ -186,7 +205,7 @@ impl<'a> Prepared<'a> {
         let region = options.region(scene).map_err(Error::Option)?;
         let on_cpu = |why: &RenderError| warn!("rendering on the CPU: {why}");
         let mut renderer = Renderer::new(packed, options, Box::new(on_cpu))?;
-        let hits = match options.aovs.iter().any(|aov| !aov.is_of_film()) {
+        let hits = match needs_first_hits(packed, &options.aovs) {
             true => renderer.work(|backend, _| job::first_hits(backend, region))?,
             false => Vec::new(),
         };
@@ -200,6 +219,7 @@ impl<'a> Prepared<'a> {
             picture: (scene.width, scene.height),
             region,
             aovs,
+            alpha: packed.has_alpha(),
             middle_depth: renderer.work(|backend, _| middle_depth(packed, &options.aovs, backend))?,
             most_samples: packed.pixel_samples,
         };
@@ -216,14 +236,12 @@ impl<'a> Prepared<'a> {
     }
 }
 
-fn empty(region: Region, adaptive: bool) -> Result<Film, RenderError> {
-    let lists = if adaptive { 3 } else { 1 };
-    let bytes = region.pixels().saturating_mul(lists * size_of::<Vec4>() as u64);
+fn empty(region: Region, form: Form) -> Result<Film, RenderError> {
+    let bytes = region.pixels().saturating_mul(form.bytes() as u64);
     // Taken and given back: what is not there is an error here, and would end the program later.
     let there = usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
     match there {
-        true if adaptive => Ok(Film::adaptive(region)),
-        true => Ok(Film::new(region)),
+        true => Ok(Film::of(region, form)),
         false => Err(RenderError::Memory(bytes)),
     }
 }
@@ -231,16 +249,18 @@ fn empty(region: Region, adaptive: bool) -> Result<Film, RenderError> {
 /// Puts whole rows of a film into it.
 fn put(whole: &mut Film, band: &Film) {
     let start = (band.region.y0 - whole.region.y0) as usize * whole.region.width() as usize;
-    for (to, from) in [
-        (&mut whole.sums, &band.sums),
-        (&mut whole.moments, &band.moments),
-        (&mut whole.looks, &band.looks),
-    ] {
-        // Without adaptive sampling there are no moments and no looks.
+    for (to, from) in whole.lists_mut().zip(band.lists()) {
+        // Some lists are empty, as the film's form is.
         if let Some(to) = to.get_mut(start..start + from.len()) {
             to.copy_from_slice(from);
         }
     }
+}
+
+/// Whether any of these layers of a scene is of the first hits.
+pub fn needs_first_hits(scene: &Packed, aovs: &[Aov]) -> bool {
+    let mut sources = aovs.iter().map(|aov| aov.source(scene.integrator));
+    sources.any(|source| source == AovSource::FirstHit)
 }
 
 /// The depth that looks half bright in a PNG: that in the middle of the whole picture, or 1 where nothing is.

@@ -40,6 +40,7 @@ fn edges(scene: &str) -> f64 {
 const BEYOND: &[(&str, &str)] = &[
     ("textures.toml", "images and normal maps"),
     ("ground-grid.toml", "an image"),
+    ("cornell-path.toml", "light from surface to surface"),
 ];
 
 /// The scene, small, with grids of samples.
@@ -49,14 +50,14 @@ fn small(description: &Description) -> Description {
     d.image.width = 96;
     d.image.height = (f64::from(d.image.height) / scale) as u32;
     d.render.pixel_samples = SamplesDescription {
-        pattern: Pattern::Grid,
+        pattern: Some(Pattern::Grid),
         count: 4,
     };
     // The oracle knows textures at points, and follows both branches of every path through glass: so do the first two.
     d.render.ray_differentials = false;
     d.render.max_depth = 2;
     d.render.light_samples = SamplesDescription {
-        pattern: Pattern::Grid,
+        pattern: Some(Pattern::Grid),
         count: 16,
     };
     d

@@ -18,7 +18,7 @@ const SIDE: u32 = 64;
 
 fn grid(count: u32) -> SamplesDescription {
     SamplesDescription {
-        pattern: Pattern::Grid,
+        pattern: Some(Pattern::Grid),
         count,
     }
 }
@@ -32,6 +32,7 @@ fn empty(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
         height,
     };
     Description {
+        environment: None,
         image: ImageDescription {
             width: SIDE,
             height: SIDE,
@@ -62,6 +63,7 @@ fn floor(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shini
         specular: factor(specular),
         shininess,
         normal_map: None,
+        emission: None,
     };
     scene.materials.insert("m".into(), MaterialDescription::Phong(phong));
     scene.shapes.push(ShapeDescription::Plane(PlaneDescription {

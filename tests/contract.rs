@@ -1,5 +1,5 @@
 //! The contract of backends (`wgray::backend::Backend`), sentence by sentence, held by one suite: the CPU and the device, the
-//! scene as constants and in buffers, with adaptive sampling and without. Backends that break it are found.
+//! scene as constants and in buffers, with adaptive sampling and layers and without. Backends that break it are found.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use wgray::cpu::Cpu;
 use wgray::error::RenderError;
 use wgray::film::{Film, Region};
 use wgray::pack::{FirstHit, Packed};
-use wgray::scene::AdaptiveDescription;
+use wgray::scene::{AdaptiveDescription, Description};
 
 use crate::pictures::{backend, exact_ways};
 use crate::{patterns, scenes};
@@ -16,8 +16,8 @@ use crate::{patterns, scenes};
 const SIZE: (u32, u32) = (20, 12);
 const SAMPLES: u32 = 40;
 
-/// A small scene, and the same with adaptive sampling.
-fn subjects() -> [Packed; 2] {
+/// A small scene, and the same with adaptive sampling; then both along whole paths, with layers.
+fn subjects() -> [Packed; 4] {
     let mut plain = scenes::scene("cornell.toml");
     (plain.image.width, plain.image.height) = SIZE;
     plain.render.pixel_samples = patterns::samples(wgray::scene::Pattern::Sobol, SAMPLES);
@@ -28,7 +28,18 @@ fn subjects() -> [Packed; 2] {
         error: 0.02,
         max_samples: Some(SAMPLES),
     });
-    [scenes::packed(&plain), scenes::packed(&adaptive)]
+    let paths = [&plain, &adaptive].map(|scene| scenes::packed(&along_paths(scene)).with_layers());
+    let [layered, both] = paths;
+    [scenes::packed(&plain), scenes::packed(&adaptive), layered, both]
+}
+
+/// The scene by the integrator `path`, whose materials are diffuse.
+fn along_paths(scene: &Description) -> Description {
+    let mut scene = scene.clone();
+    scene.render.integrator = wgray::scene::Integrator::Path;
+    scene.render.ambient = wgray::DVec3::ZERO;
+    scene.render.max_depth = 3;
+    scene
 }
 
 fn picture() -> Region {
@@ -41,8 +52,8 @@ fn region(x0: u32, y0: u32, x1: u32, y1: u32) -> Region {
 
 /// A film's bits.
 fn bits(film: &Film) -> (Region, Vec<u32>) {
-    let all = [&film.sums, &film.moments, &film.looks].map(|list| bytemuck::cast_slice(list).to_vec());
-    (film.region, all.concat())
+    let all = film.lists().map(|list| bytemuck::cast_slice(list).to_vec());
+    (film.region, all.collect::<Vec<_>>().concat())
 }
 
 fn film_of(backend: &mut dyn Backend) -> (Region, Vec<u32>) {
@@ -89,9 +100,37 @@ const SENTENCES: &[Sentence] = &[
         let film = b.film().map_err(|e| e.to_string())?;
         hold(film.region == region(2, 3, 7, 9), "another region")?;
         hold(
-            film.sums.iter().all(|sum| *sum == glam::Vec4::ZERO),
+            film.lists().flatten().all(|sum| *sum == glam::Vec4::ZERO),
             "sums of an earlier film",
         )
+    }),
+    ("a film has the scene's form", |packed, make| {
+        let mut b = make();
+        for of in [picture(), region(2, 3, 7, 9)] {
+            b.begin(of).map_err(|e| e.to_string())?;
+            let film = b.film().map_err(|e| e.to_string())?;
+            let lengths = |film: &Film| film.lists().map(Vec::len).collect::<Vec<_>>();
+            hold(
+                lengths(&film) == lengths(&Film::of(of, packed.form())),
+                "lists of another length",
+            )?;
+            hold(
+                film.has_layers() == packed.form().layers,
+                "layers that were not asked for",
+            )?;
+        }
+        Ok(())
+    }),
+    ("with layers and without, all else has the same bits", |packed, make| {
+        let film = whole(&mut *make());
+        let mut plain = packed.clone();
+        plain.specialization.layers = 0;
+        let other = whole(&mut Cpu::new(&plain));
+        let same =
+            |a: &[glam::Vec4], b: &[glam::Vec4]| bytemuck::cast_slice::<_, u32>(a) == bytemuck::cast_slice::<_, u32>(b);
+        hold(same(&film.sums, &other.sums), "other sums")?;
+        hold(same(&film.moments, &other.moments), "other moments")?;
+        hold(same(&film.looks, &other.looks), "other looks")
     }),
     ("reading a film changes nothing", |_, make| {
         let mut b = make();
@@ -131,7 +170,7 @@ const SENTENCES: &[Sentence] = &[
         }
         Ok(())
     }),
-    ("a film of another form is refused", |_, make| {
+    ("a film of another form is refused", |packed, make| {
         let mut b = make();
         let film = whole(&mut *b);
         let before = film_of(&mut *b);
@@ -146,6 +185,21 @@ const SENTENCES: &[Sentence] = &[
             },
             Film {
                 looks: vec![glam::Vec4::ZERO; 3],
+                ..film.clone()
+            },
+            Film {
+                layers: film.layers.clone().map(|mut layer| {
+                    layer.push(glam::Vec4::ZERO);
+                    layer
+                }),
+                ..film.clone()
+            },
+            Film {
+                layers: std::array::from_fn(|i| match (i, packed.form().layers) {
+                    (4, true) => Vec::new(),
+                    (4, false) => film.sums.clone(),
+                    _ => film.layers[i].clone(),
+                }),
                 ..film.clone()
             },
         ] {
@@ -296,7 +350,7 @@ fn every_backend_keeps_to_the_contract() {
     for packed in &subjects() {
         for way in exact_ways() {
             let problems = broken(packed, &|| backend(packed, way));
-            assert_eq!(problems, Vec::<String>::new(), "{way:?}, adaptive {}", packed.adaptive);
+            assert_eq!(problems, Vec::<String>::new(), "{way:?}, {:?}", packed.form());
         }
     }
 }
@@ -318,9 +372,12 @@ enum How {
     TakesASecondCall,
     FirstHitsEndTheFilm,
     TakesFurtherSamplesEarly,
+    ForgetsLayersToGoOnFrom,
+    LeavesLayersAway,
+    ShowsLayersInTheSums,
 }
 
-const WRONGS: [How; 9] = [
+const WRONGS: [How; 12] = [
     How::KeepsTheFilm,
     How::EmptiesTheFilmByReading,
     How::IgnoresAMissingFilm,
@@ -330,6 +387,9 @@ const WRONGS: [How; 9] = [
     How::TakesASecondCall,
     How::FirstHitsEndTheFilm,
     How::TakesFurtherSamplesEarly,
+    How::ForgetsLayersToGoOnFrom,
+    How::LeavesLayersAway,
+    How::ShowsLayersInTheSums,
 ];
 
 impl Backend for Wrong<'_> {
@@ -343,6 +403,10 @@ impl Backend for Wrong<'_> {
     fn resume(&mut self, film: Film) -> Result<(), RenderError> {
         match self.how {
             How::ForgetsTheFilmToGoOnFrom => self.inner.begin(film.region),
+            How::ForgetsLayersToGoOnFrom => self.inner.resume(Film {
+                layers: film.layers.map(|layer| vec![glam::Vec4::ZERO; layer.len()]),
+                ..film
+            }),
             _ => self.inner.resume(film),
         }
     }
@@ -371,7 +435,12 @@ impl Backend for Wrong<'_> {
     }
 
     fn film(&mut self) -> Result<Film, RenderError> {
-        let film = self.inner.film()?;
+        let mut film = self.inner.film()?;
+        match self.how {
+            How::LeavesLayersAway => film.layers = Film::new(film.region).layers,
+            How::ShowsLayersInTheSums if film.has_layers() => film.sums = film.layers[0].clone(),
+            _ => {}
+        }
         if self.how == How::EmptiesTheFilmByReading {
             self.inner.begin(film.region)?;
         }

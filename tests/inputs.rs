@@ -2,9 +2,11 @@
 //! point of it, in its inside, on its edge or past it. Some of these have single numbers replaced by edge values or by
 //! one another, some are brought to halves, so that what is compared is often equal, and some are of all magnitudes.
 
+use bytemuck::Zeroable as _;
 use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3};
 use naga::{Handle, Module, ScalarKind, Type};
 use wgray::cpu::differential::{Arrival, Derivative, Differential};
+use wgray::cpu::diffuse::Angles;
 use wgray::cpu::footprint::Footprint;
 use wgray::cpu::light::Segments;
 use wgray::cpu::mesh::{Spot, face_primitive, shear_of};
@@ -343,6 +345,7 @@ impl Situation {
             primitive: NOTHING,
             color: color(random),
             number: random.below(4),
+            ..Light::zeroed()
         };
         let direction = target - start;
         let face = Face::new(random, center, columns);
@@ -402,6 +405,12 @@ impl Situation {
             "Sphere" => self.sphere(random).write(words),
             "Cone" => cone_to_light(&self.light, self.start.as_vec3()).write(words),
             "Material" => material(random).write(words),
+            "Angles" => Angles {
+                wi: random.between(-0.2, 1.0) as f32,
+                wo: random.unit() as f32,
+                between: random.between(-1.0, 1.0) as f32,
+            }
+            .write(words),
             "Camera" => self.camera(random).write(words),
             "Lobes" => Lobes {
                 diffuse: random.unit() as f32,
@@ -533,6 +542,7 @@ impl Situation {
             "p" => random.pick(&[self.start, self.target]),
             "from_anchor" => self.local + self.primitive.middle.as_dvec3(),
             "to" | "direction" => self.direction,
+            "wi" | "wo" | "normal" => vector(random).normalize(),
             _ => vector(random) * random.magnitude(-2.0, 2.0),
         };
         v.as_vec3()
@@ -666,7 +676,10 @@ fn material(random: &Random) -> Material {
     let exponent = random.pick(&[0, 1, 2, 16, 50, 4096]);
     let mut material: Material = bytemuck::Zeroable::zeroed();
     material.ambient = color(random);
-    material.kind = random.below(4);
+    material.kind = random.below(5);
+    material.roughness = random.unit() as f32;
+    material.absorption = color(random);
+    material.density = random.magnitude(-6.0, 3.0) as f32;
     material.diffuse = color(random);
     material.specular = color(random);
     material.tint = color(random);

@@ -5,8 +5,8 @@ use naga::proc::Layouter;
 use naga::{Expression, Literal, Module, TypeInner};
 use wgray::gpu::compose::{KERNELS, Source, built_in};
 use wgray::pack::{
-    Camera, Counts, Environment, FirstHit, Instance, Item, Light, Material, Node, Primitive, Record, Specialization,
-    Sphere, Texture, Work,
+    Camera, Counts, Emitter, Environment, FirstHit, Instance, Item, Light, Material, Node, Primitive, Record,
+    Specialization, Sphere, Texture, Work,
 };
 
 use wgray::scene::Integrator;
@@ -57,6 +57,7 @@ fn records_have_the_same_layout() {
         size::<Material>(),
         size::<Texture>(),
         size::<Light>(),
+        size::<Emitter>(),
         size::<Counts>(),
         size::<Node>(),
         size::<Item>(),
@@ -111,8 +112,11 @@ fn constants_have_their_values() {
 fn overrides_are_the_fields_of_the_specialization() {
     let constants = Specialization::default().constants();
     let names: Vec<&str> = constants.iter().map(|(name, _)| *name).collect();
-    for kernel in KERNELS {
-        let module = parse(&sources::shaders().compose(kernel, Integrator::Phong, None));
+    for (kernel, integrator) in KERNELS
+        .into_iter()
+        .flat_map(|kernel| Integrator::ALL.map(|i| (kernel, i)))
+    {
+        let module = parse(&sources::shaders().compose(kernel, integrator, None));
         let declared: Vec<_> = module.overrides.iter().filter_map(|(_, o)| o.name.as_deref()).collect();
         assert_eq!(declared, names);
     }

@@ -47,7 +47,10 @@ tangent = [1, 0, 0]
 
 /// What [`FILE`] says.
 fn described() -> Description {
-    let samples = |pattern, count| SamplesDescription { pattern, count };
+    let samples = |pattern, count| SamplesDescription {
+        pattern: Some(pattern),
+        count,
+    };
     Description::new(
         24,
         16,

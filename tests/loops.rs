@@ -115,7 +115,7 @@ fn without_check(shaders: &Shaders) -> Shaders {
 #[test]
 fn long_pictures_are_whole() {
     let mut adaptive = small("cornell.toml", (5, 4), 64, 64);
-    adaptive.render.pixel_samples.pattern = Pattern::Sobol;
+    adaptive.render.pixel_samples.pattern = Some(Pattern::Sobol);
     adaptive.render.adaptive = Some(AdaptiveDescription {
         error: 0.0,
         max_samples: Some(512),

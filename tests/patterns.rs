@@ -39,7 +39,7 @@ fn snake_case(name: &str) -> String {
 pub fn samples(pattern: Pattern, count: u32) -> SamplesDescription {
     let side = count.isqrt();
     SamplesDescription {
-        pattern,
+        pattern: Some(pattern),
         count: if pattern.needs_square() { side * side } else { count },
     }
 }

@@ -78,9 +78,9 @@ pub fn film(backend: &mut dyn Backend, packed: &Packed, region: Region, cut: &Cu
         ..Film::new(region)
     };
     let mut output = |band: Film| {
-        all.sums.extend(band.sums);
-        all.moments.extend(band.moments);
-        all.looks.extend(band.looks);
+        for (list, of_band) in all.lists_mut().zip(band.lists()) {
+            list.extend(of_band);
+        }
         Ok(())
     };
     let result = wgray::job::render(backend, region, packed.pixel_samples, cut, &mut |_| true, &mut output);
@@ -118,16 +118,18 @@ pub fn first_hits(packed: &Packed, way: Way) -> Vec<FirstHit> {
     hits.unwrap_or_else(|error| panic!("{way:?}: {error}"))
 }
 
-/// How many pixels are not the same bits; moments count as further pixels.
+/// How many pixels are not the same bits; moments and layers count as further pixels.
 pub fn differing(a: &Film, b: &Film) -> usize {
-    assert_eq!(
-        (a.region, a.sums.len(), a.moments.len()),
-        (b.region, b.sums.len(), b.moments.len()),
-        "films of different regions"
-    );
+    let form = |film: &Film| (film.region, film.sums.len(), film.moments.len(), film.has_layers());
+    assert_eq!(form(a), form(b), "films of different regions or forms");
     let bits = |sum: &Vec4| sum.to_array().map(f32::to_bits);
-    let records = a.sums.iter().chain(&a.moments).zip(b.sums.iter().chain(&b.moments));
+    let records = of_pictures(a).zip(of_pictures(b));
     records.filter(|(a, b)| bits(a) != bits(b)).count()
+}
+
+/// The records of a film but for its looks, which are the scheduling's own.
+fn of_pictures(film: &Film) -> impl Iterator<Item = &Vec4> {
+    [&film.sums, &film.moments].into_iter().chain(&film.layers).flatten()
 }
 
 /// A part of a film.

@@ -7,15 +7,22 @@ use wgray::cpu::adaptive::{
     variance_of_mean, whole_look,
 };
 use wgray::cpu::camera::{camera_derivative, camera_differential, camera_ray, image_plane_offset};
+use wgray::cpu::dielectric::{Passage, dielectric_sample, eta_of, refracts_inwards, transmittance};
 use wgray::cpu::differential::{
     Arrival, Derivative, Differential, arrival, normal_derivative, reflected_derivative, reflected_differential,
     refracted_derivative, refracted_differential, transferred,
+};
+use wgray::cpu::diffuse::{
+    Angles, angles_at, diffuse_eval, diffuse_pdf, diffuse_sample, rough_diffuse_eval, rough_share,
 };
 use wgray::cpu::disk::{disk_blocks, intersect_disk};
 use wgray::cpu::ellipsoid::{ellipsoid_blocks, ellipsoid_discriminant, ellipsoid_level, intersect_ellipsoid};
 use wgray::cpu::filter::{filter_bin, filter_offset};
 use wgray::cpu::footprint::{Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint};
 use wgray::cpu::light::{Segments, segment, segments_to_light, segments_to_local};
+use wgray::cpu::light_sample::{
+    ellipsoid_area, ellipsoid_cap, ellipsoid_pdf, ellipsoid_sample, power_heuristic, solid_angle_pdf, whole_below,
+};
 use wgray::cpu::math::{
     atan2, cross, dot, exp2, floor, log2, max, min, normalize, positive_zero, power, power_whole, sine,
 };
@@ -25,13 +32,16 @@ use wgray::cpu::mesh::{
     highest, lift, lowest, mesh_pad, normal_from_mesh, permuted, point_to_mesh, shear_of, sheared, spot_by_itself,
     triangle_crossing, turned_to, vector_from_mesh, vector_to_mesh,
 };
+use wgray::cpu::modified_phong::{
+    PhongFactors, modified_phong_eval, modified_phong_pdf, modified_phong_sample, phong_factors, phong_lobe,
+};
 use wgray::cpu::node::{
     children_in_fan, children_passed, far_side, four_in_fan, four_passed, in_order, larger, leaf_items, octant_of,
     passed_bits, smaller, step_length, steps,
 };
 use wgray::cpu::normal_map::mapped_normal;
 use wgray::cpu::path::{
-    Path, Scattered, glass_path, is_usable, mirrored_path, reflected_path, refracted_path, usable_normal,
+    Path, Scattered, glass_path, is_specular, is_usable, mirrored_path, reflected_path, refracted_path, usable_normal,
 };
 use wgray::cpu::phong::{Lobes, is_lit, phong_block, phong_lobes, phong_power, unlit_samples};
 use wgray::cpu::plane::{intersect_plane, plane_blocks};
@@ -52,13 +62,16 @@ use wgray::cpu::rng::{hash4, unit_float};
 use wgray::cpu::sampling::{
     decision_bits, grid_sample, jittered_sample, random_sample, rotated_grid_sample, sample_key, sample_square, wrap,
 };
-use wgray::cpu::sequence::{halton_sample, radical_inverse_3, scramble, shuffled_index, sobol_reversed, sobol_sample};
-use wgray::cpu::shadow::{Block, Cone, block_sample, cone_to_light, may_block, shadow_bits};
+use wgray::cpu::sequence::{
+    halton_sample, radical_inverse_3, scramble, shuffled_index, sobol_bits, sobol_reversed, sobol_sample,
+};
+use wgray::cpu::shadow::{Block, Cone, block_sample, cone_to_light, cuts, may_block, shadow_bits};
 use wgray::cpu::slab::{Fan, Slabs, box_passage, fan, fan_passage, inverse_of, is_passed, slabs};
 use wgray::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
 use wgray::cpu::surface::{Surface, first_hit, largest, surface_at, with_coordinates, with_positive_zeros};
 use wgray::cpu::texel::{gaussian_weight, level_size, near_coordinate, srgb_to_linear, unpacked_color, wrapped_index};
 use wgray::cpu::triangle::{intersect_triangle, triangle_blocks};
+use wgray::cpu::warp::{cap_sample, disk_sample, frame_around, hemisphere_sample, triangle_sample, vector_around};
 use wgray::gpu::Device;
 use wgray::pack::{Camera, FirstHit, Instance, Light, Material, NOTHING, Node, Primitive, Sphere, Texture};
 
@@ -123,6 +136,13 @@ probes! {
     sample_key(pixel: UVec2, seed: u32, purpose: u32) -> UVec2;
     decision_bits(pixel: UVec2, seed: u32, sample: u32, bounce: u32, purpose: u32) -> UVec4;
     sobol_sample(index: u32, key: UVec2) -> Vec2;
+    sobol_bits(index: u32, key: UVec2) -> UVec2;
+    disk_sample(u: Vec2) -> Vec2;
+    triangle_sample(u: Vec2) -> Vec2;
+    frame_around(n: Vec3) -> Tangents;
+    vector_around(n: Vec3, v: Vec3) -> Vec3;
+    hemisphere_sample(n: Vec3, u: Vec2) -> Vec3;
+    cap_sample(p: Vec2, most: f32) -> Vec3;
     sobol_reversed(i: u32) -> u32;
     scramble(digits: u32, seed: u32) -> u32;
     shuffled_index(index: u32, seed: u32) -> u32;
@@ -173,6 +193,7 @@ probes! {
     segment(to: Segments, at: Vec2) -> Vec3;
     shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light, block: Block) -> u32;
     block_sample(block: Block, i: u32) -> Vec2;
+    cuts(kind: u32, q: &Primitive, p: Vec3, wall: bool, to: Vec3, reach: f32) -> bool;
     blocks(kind: u32, o: Vec3, d: Vec3, start: f32, reach: f32) -> bool;
     cone_to_light(light: &Light, p: Vec3) -> Cone;
     may_block(sphere: &Sphere, cone: &Cone) -> bool;
@@ -203,6 +224,29 @@ probes! {
     reflected_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3) -> Path;
     refracted_path(path: Path, surface: Surface, at: Arrival, throughput: Vec3, eta: f32, cosine_i: f32,
                    cosine_t: f32) -> Path;
+    is_specular(material: &Material) -> bool;
+    angles_at(normal: Vec3, wo: Vec3, wi: Vec3) -> Angles;
+    diffuse_eval(material: &Material, angles: Angles) -> Vec3;
+    rough_diffuse_eval(material: &Material, angles: Angles) -> Vec3;
+    rough_share(cosine: f32) -> f32;
+    diffuse_pdf(angles: Angles) -> f32;
+    diffuse_sample(normal: Vec3, u: Vec2) -> Vec3;
+    phong_factors(material: &Material) -> PhongFactors;
+    phong_lobe(material: &Material, angles: Angles) -> f32;
+    modified_phong_eval(material: &Material, angles: Angles) -> Vec3;
+    modified_phong_pdf(material: &Material, angles: Angles) -> f32;
+    modified_phong_sample(material: &Material, normal: Vec3, wo: Vec3, u: Vec2, random: f32) -> Vec3;
+    transmittance(absorption: Vec3, distance: f32) -> Vec3;
+    eta_of(surface: &Surface, material: &Material) -> f32;
+    refracts_inwards(surface: &Surface, material: &Material, normal: Vec3) -> bool;
+    dielectric_sample(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Passage;
+    solid_angle_pdf(density: f32, to: Vec3, normal: Vec3) -> f32;
+    ellipsoid_area(q: &Primitive) -> f32;
+    ellipsoid_cap(level: f32) -> f32;
+    ellipsoid_sample(q: &Primitive, p: Vec3, u: Vec2) -> Vec3;
+    ellipsoid_pdf(q: &Primitive, p: Vec3, wi: Vec3) -> f32;
+    power_heuristic(own: f32, other: f32) -> f32;
+    whole_below(bits: u32, count: u32) -> u32;
     surface_footprint(q: &Primitive, surface: Surface, dx: Vec3, dy: Vec3) -> Footprint;
     uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2;
     texture_footprint(t: &Texture, f: Footprint) -> Footprint;

@@ -8,7 +8,7 @@ use wgray::backend::Backend;
 use wgray::film::{Film, Region};
 use wgray::job::Cut;
 use wgray::pack::{FirstHit, Packed};
-use wgray::scene::{Description, Pattern};
+use wgray::scene::{Description, Integrator, Pattern};
 
 use crate::adapter::{self, KNOWN, allowed, bit_exact, judge};
 use crate::nearly::{EDGES, Nearly};
@@ -67,7 +67,7 @@ pub fn small_scenes() -> Vec<(String, Packed)> {
     let small = |(name, mut d): (String, Description)| {
         let scale = d.image.width.max(d.image.height).div_ceil(100);
         (d.image.width, d.image.height) = (d.image.width / scale, d.image.height / scale);
-        d.render.pixel_samples = patterns::samples(d.render.pixel_samples.pattern, 4);
+        d.render.pixel_samples = patterns::samples(d.render.pixel_samples.pattern(d.render.integrator), 4);
         (name, scenes::packed(&d))
     };
     scenes::descriptions().into_iter().map(small).collect()
@@ -75,7 +75,8 @@ pub fn small_scenes() -> Vec<(String, Packed)> {
 
 /// Every pattern in some scene, every scene with some pattern, with many sizes, seeds and numbers of samples.
 pub fn variations() -> Vec<(String, Packed)> {
-    let (scenes, patterns) = (scenes::descriptions(), patterns::all());
+    let (mut scenes, patterns) = (scenes::descriptions(), patterns::all());
+    scenes.sort_by_key(|(_, d)| d.render.integrator == Integrator::Path); // later, so that the others keep their numbers
     let vary = |i: usize| {
         let (name, d) = &scenes[i % scenes.len()];
         let (size, counts) = (

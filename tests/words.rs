@@ -1,10 +1,13 @@
 //! Values as the 32-bit words of their scalars, in the order of their fields: how they travel to a kernel and back.
 
 use glam::{IVec2, UVec2, UVec3, UVec4, Vec2, Vec3, Vec4};
+use wgray::cpu::dielectric::Passage;
 use wgray::cpu::differential::{Arrival, Derivative, Differential};
+use wgray::cpu::diffuse::Angles;
 use wgray::cpu::footprint::{Ellipse, Footprint};
 use wgray::cpu::light::Segments;
 use wgray::cpu::mesh::{Crossing, Shear, Spot};
+use wgray::cpu::modified_phong::PhongFactors;
 use wgray::cpu::path::{Path, Scattered};
 use wgray::cpu::phong::Lobes;
 use wgray::cpu::primitive::Tangents;
@@ -100,6 +103,9 @@ records! {
     Tangents { u, v }
     Path { ray, differential, throughput, depth, branch, left, wall }
     Scattered { onward, other, splits }
+    Passage { path, passes, eta }
+    Angles { wi, wo, between }
+    PhongFactors { diffuse, specular, diffuse_share }
     Segments { towards, u, v }
     Lobes { diffuse, specular }
     Block { pattern, side, first, count, group, key }

@@ -52,11 +52,6 @@ fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> 
     return sum;
 }
 
-// Whether light is mirrored or refracted.
-fn is_specular(material: Material) -> bool {
-    return (material.kind == MIRROR) | (material.kind == GLASS);
-}
-
 fn scatter(spot: Spot, hit: Hit, path: Path, pixel: vec2u, sample: u32) -> Scattered {
     var surface = surface_of(spot, hit, path.ray);
     let at = arrival_of(spot, hit, surface, path.ray, path.differential);

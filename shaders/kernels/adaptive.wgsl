@@ -3,8 +3,6 @@
 // dispatch is for samples of the first look or for later ones, and these come after all first looks of the film. A
 // pixel's own samples have no say in how many there are of them: a mean of samples that decide on themselves is biased.
 
-@group(0) @binding(1) var<storage, read_write> film: array<vec4f>;
-
 @compute @workgroup_size(8, 8)
 fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {
     if id.x >= work.size.x || id.y >= work.size.y {
@@ -22,13 +20,30 @@ fn adaptive(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_
     if !looks {
         end = samples_wanted(looks_around(place), FIRST_LOOK, bitcast<f32>(SQUARED_ERROR), end);
     }
-    for (var sample = work.samples.x; sample < end; sample++) {
-        let value = pixel_radiance(pixel, sample);
-        look = look_with(look, sum, value);
-        moments = moments_with(moments, sum, value);
-        sum += value;
+    var layers = Layers();
+    if LAYERS != 0u {
+        layers = stored_layers(index, 3u);
+    }
+    var sample = work.samples.x;
+    var path = begin_path(pixel, sample);
+    while sample < end {
+        path = advance(path, pixel);
+        if path.ended {
+            let value = path_value(path);
+            look = look_with(look, sum, value);
+            moments = moments_with(moments, sum, value);
+            sum += value;
+            if LAYERS != 0u {
+                layers = layers_sum(layers, path_layers(path));
+            }
+            sample++;
+            path = begin_path(pixel, sample);
+        }
     }
     film[index] = sum;
+    if LAYERS != 0u {
+        store_layers(layers, index, 3u);
+    }
     film[pixels + index] = moments;
     if looks {
         film[2u * pixels + index] = whole_look(look, sum, moments);

@@ -1,8 +1,6 @@
 // Renders a range of samples of a rectangle of pixels into the film: rgb the sum of weighted radiances, a that of the
 // weights.
-// The sum goes on from the film's own value, one sample after the other, so that every cut of the work gives the same.
-
-@group(0) @binding(1) var<storage, read_write> film: array<vec4f>;
+// Layers, where they are wanted, are further parts of the film. The sum goes on from the film's own value, one sample after the other, so that every cut of the work gives the same.
 
 @compute @workgroup_size(8, 8)
 fn render(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -13,9 +11,26 @@ fn render(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_in
     let place = pixel - work.film_origin;
     let index = place.y * work.film_size.x + place.x;
     var sum = film[index];
-    for (var sample = work.samples.x; sample < work.samples.y; sample++) {
-        sum += pixel_radiance(pixel, sample);
+    var layers = Layers();
+    if LAYERS != 0u {
+        layers = stored_layers(index, 1u);
+    }
+    var sample = work.samples.x;
+    var path = begin_path(pixel, sample);
+    while sample < work.samples.y {
+        path = advance(path, pixel);
+        if path.ended {
+            sum += path_value(path);
+            if LAYERS != 0u {
+                layers = layers_sum(layers, path_layers(path));
+            }
+            sample++;
+            path = begin_path(pixel, sample);
+        }
     }
     film[index] = sum;
+    if LAYERS != 0u {
+        store_layers(layers, index, 1u);
+    }
     sign(local);
 }

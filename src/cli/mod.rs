@@ -134,6 +134,7 @@ fn option(problem: &Problem) -> Usage {
     };
     let hint = match name {
         "adaptive" if problem.message.contains("pixel_samples") => ", as with --pixel-pattern sobol",
+        "aov" if problem.message.contains("integrator") => ", as with --integrator path",
         "aov" => "; --adaptive 0 gives all pixels the most samples",
         _ => "",
     };

@@ -15,9 +15,9 @@ use wgray::error::RenderError;
 use wgray::film::{Region, mean};
 use wgray::image::{self, Aov, Band, Format, Layout, Pending};
 use wgray::job::{self, Bands, Cut, Order};
-use wgray::pack::{Packed, pack};
-use wgray::render::{Options, middle_depth};
-use wgray::scene::{Overrides, Pattern};
+use wgray::pack::Packed;
+use wgray::render::{Options, middle_depth, needs_first_hits};
+use wgray::scene::{Integrator, Overrides, Pattern};
 
 use super::outputs::Outputs;
 use super::progress::{self, Mode, Progress};
@@ -66,6 +66,14 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
 
+    /// What light is simulated, in place of the scene's: phong, direct light; path, light from surface to surface
+    #[arg(long, value_name = "INTEGRATOR", value_parser = integrator_parser())]
+    integrator: Option<Integrator>,
+
+    /// Most bounces of a path, in place of the scene's
+    #[arg(long, value_name = "N")]
+    max_depth: Option<u32>,
+
     /// Folder that pictures and meshes named by the scene must lie in, if not the scene's own
     #[arg(long, value_name = "DIR")]
     asset_root: Option<PathBuf>,
@@ -94,7 +102,9 @@ pub struct Args {
     /// .Y, .Z, outwards, and shading_normal; depth.Z, along the ray, 0 where nothing is; uv.U, .V; instance.ID, the shape's
     /// number; primitive.ID, that or a triangle's number in its mesh; barycentric.U, .V. Beside a PNG they are
     /// further files, NAME.normal.png and so on: normals moved to 0..1, depth bright where near (half bright at the picture's middle), fractions of texture coordinates in
-    /// red and green, shapes in colours. Under adaptive sampling also what it is like: sample_count.N; variance.R, .G, .B
+    /// red and green, shapes in colours. Under --integrator path also means over the samples: albedo, emission, direct and
+    /// indirect .R, .G, .B, the last three of which are the picture together, shown as it is beside a PNG; and
+    /// shading_normal with normal maps. Under adaptive sampling also what it is like: sample_count.N; variance.R, .G, .B
     /// of the pixel's value. Beside a PNG counts are shown on a logarithmic scale, variances by their square root
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = aov_parser())]
     aov: Vec<Aov>,
@@ -120,6 +130,13 @@ fn pattern_parser() -> impl clap::builder::TypedValueParser<Value = Pattern> {
     PossibleValuesParser::new(Pattern::ALL.map(Pattern::name)).try_map(|name| {
         let found = Pattern::ALL.into_iter().find(|pattern| pattern.name() == name);
         found.ok_or(format!("no such pattern: {name}"))
+    })
+}
+
+fn integrator_parser() -> impl clap::builder::TypedValueParser<Value = Integrator> {
+    PossibleValuesParser::new(Integrator::ALL.map(Integrator::name)).try_map(|name| {
+        let found = Integrator::ALL.into_iter().find(|integrator| integrator.name() == name);
+        found.ok_or(format!("no such integrator: {name}"))
     })
 }
 
@@ -188,6 +205,8 @@ impl Plan {
             seed: args.seed,
             pixel_pattern: args.pixel_pattern,
             adaptive: args.adaptive,
+            integrator: args.integrator,
+            max_depth: args.max_depth,
             asset_root: args.asset_root,
         };
         let progress = if args.quiet { Mode::None } else { args.progress };
@@ -204,7 +223,7 @@ impl Plan {
         };
         let region = options.region(&scene).map_err(|problem| super::option(&problem))?;
         let plan = Plan {
-            scene: progress::named(progress, "building trees", || pack(&scene)),
+            scene: progress::named(progress, "building trees", || options.pack(&scene)),
             format: outputs.format,
             region,
             options,
@@ -286,6 +305,7 @@ fn write_picture(
         picture: (plan.scene.camera.width, plan.scene.camera.height),
         region: plan.region,
         aovs: plan.options.aovs.clone(),
+        alpha: plan.scene.has_alpha(),
         middle_depth: match plan.format {
             Format::Png => renderer.work(|backend, _| middle_depth(&plan.scene, &plan.options.aovs, backend))?,
             Format::Exr => 1.0,
@@ -298,7 +318,7 @@ fn write_picture(
     let mut strange = 0;
     let mut camera_rays = 0;
     image::save(files, plan.format, &layout, &mut |sink| {
-        let (cut, most) = (Cut::default(), renderer.largest_film());
+        let (cut, most) = (Cut::of(plan.scene.form()), renderer.largest_film());
         let mut bands = Bands::new(plan.region, plan.scene.pixel_samples, &cut, Order::Rows, most);
         let mut watch = |_: &mut dyn Backend, _: Region, share: f64| {
             progress.update(share);
@@ -314,7 +334,7 @@ fn write_picture(
                 true => film.sample_counts().map(u64::from).sum(),
                 false => film.region.pixels() * u64::from(plan.scene.pixel_samples),
             };
-            let hits = match plan.options.aovs.iter().any(|aov| !aov.is_of_film()) {
+            let hits = match needs_first_hits(&plan.scene, &plan.options.aovs) {
                 true => renderer.work(|backend, _| job::first_hits(backend, film.region))?,
                 false => Vec::new(),
             };

@@ -14,8 +14,8 @@ use super::primitive::Tangents;
 use super::ray::{Hit, Ray, by_itself};
 use super::shadow::Block;
 use super::surface::{Surface, first_hit, surface_at, with_coordinates};
-use super::traverse::{closest_primitive, hidden_by_primitives};
-use super::tree::{closest_in_tree, hidden_by_tree};
+use super::traverse::{closest_primitive, hidden_by_primitives, is_hidden_by_primitives};
+use super::tree::{closest_in_tree, hidden_by_tree, is_hidden_by_tree};
 use crate::pack::{FirstHit, Instance, Light, Material, NO_SHADOW, NOTHING, NOWHERE, Packed, SOME_SHADOWS};
 
 pub fn closest_hit(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
@@ -32,6 +32,14 @@ pub fn hidden_samples(scene: &Packed, surface: &Surface, light: &Light, block: B
         return bits;
     }
     hidden_by_tree(scene, bits | unlit, surface, light, block)
+}
+
+pub fn is_hidden(scene: &Packed, before: bool, surface: &Surface, to: Vec3, reach: f32, goal: u32) -> bool {
+    let hidden = before || is_hidden_by_primitives(scene, surface, to, reach, goal);
+    if scene.specialization.in_tree == 0 {
+        return hidden;
+    }
+    hidden || is_hidden_by_tree(scene, surface, to, reach, goal)
 }
 
 pub fn is_on_mesh(hit: Hit) -> bool {

@@ -6,17 +6,22 @@
 
 pub mod adaptive;
 pub mod camera;
+pub mod dielectric;
 pub mod differential;
+pub mod diffuse;
 pub mod disk;
 pub mod ellipsoid;
+pub mod emitter;
 pub mod filter;
 pub mod footprint;
 pub mod geometry;
 pub mod integrators;
 pub mod light;
+pub mod light_sample;
 pub mod lobes;
 pub mod math;
 pub mod mesh;
+pub mod modified_phong;
 pub mod node;
 pub mod normal_map;
 pub mod path;
@@ -42,5 +47,6 @@ pub mod traverse;
 pub mod tree;
 pub mod triangle;
 pub mod walk;
+pub mod warp;
 
 pub use renderer::Cpu;

@@ -7,7 +7,7 @@ use super::math::{dot, max};
 use super::ray::Ray;
 use super::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
 use super::surface::Surface;
-use crate::pack::{Material, SPLITS};
+use crate::pack::{GLASS, MIRROR, Material, SPLITS};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Path {
@@ -25,6 +25,10 @@ pub struct Scattered {
     pub onward: Path,
     pub other: Path,
     pub splits: bool,
+}
+
+pub fn is_specular(material: &Material) -> bool {
+    (material.kind == MIRROR) | (material.kind == GLASS)
 }
 
 pub fn mirrored_path(path: Path, surface: Surface, at: Arrival, material: &Material) -> Scattered {

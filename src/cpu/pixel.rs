@@ -5,23 +5,58 @@ use glam::{UVec2, Vec2, Vec3, Vec4};
 use super::camera::{camera_differential, camera_ray};
 use super::differential::Differential;
 use super::filter::{filter_bin, filter_offset};
-use super::integrators::phong;
+use super::integrators::{path, phong};
+use super::ray::Ray;
 use super::sampling::{sample_key, sample_square};
 use crate::pack::Packed;
 use crate::scene::Integrator;
 
-pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> Vec4 {
+/// One sample of a pixel: its radiance times its weight, and its weight; and where layers are wanted its part of these.
+pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> (Vec4, Layers) {
+    match scene.integrator {
+        Integrator::Phong => {
+            let start = camera_sample(scene, pixel, sample);
+            let found = phong::radiance(scene, start.ray, start.differential, pixel, sample);
+            ((found * start.weight).extend(start.weight), Layers::default())
+        }
+        Integrator::Path => {
+            let mut state = path::begin_path(scene, pixel, sample);
+            while !state.ended {
+                state = path::advance(scene, state, pixel);
+            }
+            (path::path_value(&state), path::path_layers(&state))
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraSample {
+    pub ray: Ray,
+    pub differential: Differential,
+    pub weight: f32,
+}
+
+pub fn camera_sample(scene: &Packed, pixel: UVec2, sample: u32) -> CameraSample {
     let s = &scene.specialization;
     let (round, index) = (sample / s.pixel_samples, sample % s.pixel_samples);
     let key = sample_key(pixel, scene.camera.seed, 0);
     let u = sample_square(s.pixel_pattern, s.pixel_side, index, round, key);
     let at = filtered(scene, u);
     let place = pixel.as_vec2() + at.truncate();
-    let (ray, differential) = (camera_ray(&scene.camera, place), differential_at(scene, place));
-    let radiance = match scene.integrator {
-        Integrator::Phong => phong::radiance(scene, ray, differential, pixel, sample),
-    };
-    (radiance * at.z).extend(at.z)
+    CameraSample {
+        ray: camera_ray(&scene.camera, place),
+        differential: differential_at(scene, place),
+        weight: at.z,
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Layers {
+    pub emission: Vec4,
+    pub direct: Vec4,
+    pub indirect: Vec4,
+    pub albedo: Vec4,
+    pub normal: Vec4,
 }
 
 pub fn differential_at(scene: &Packed, place: Vec2) -> Differential {

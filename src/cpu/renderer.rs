@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use super::adaptive::{look_with, moments_with, samples_wanted, whole_look};
 use super::geometry::pixel_first_hit;
-use super::pixel::pixel_radiance;
+use super::pixel::{Layers, pixel_radiance};
 use crate::backend::{Backend, Rules, Started};
 use crate::error::RenderError;
-use crate::film::{Film, Region};
+use crate::film::{Film, Layer, Region};
 use crate::pack::{FirstHit, Packed};
 
 /// A scene on the CPU. A call does its work in [`Backend::poll`] or [`Backend::wait`], on the current pool of threads.
@@ -122,39 +122,83 @@ fn add_samples(scene: &Packed, film: &mut Film, tile: Region, samples: Range<u32
         sums,
         moments,
         looks,
+        layers,
     } = film;
     let region = *region;
-    let sums = runs(region, sums, tile);
-    if !scene.adaptive {
-        sums.into_par_iter().for_each(|(first, sums)| {
-            for (x, sum) in (first.x..).zip(sums) {
-                for sample in samples.clone() {
-                    *sum += pixel_radiance(scene, UVec2::new(x, first.y), sample);
-                }
-            }
-        });
-        return;
+    let first_looks = scene.adaptive && samples.start < scene.specialization.first_look;
+    let (looks_to_read, looks_to_write) = match first_looks {
+        true => (&[][..], &mut looks[..]),
+        false => (&looks[..], &mut [][..]),
+    };
+    let runs = |records| runs(region, records, tile).into_iter();
+    let sums = runs(sums);
+    let mut parts: Vec<Run> = sums
+        .map(|(first, sums)| Run {
+            first,
+            sums,
+            moments: &mut [],
+            looks: &mut [],
+            layers: Default::default(),
+        })
+        .collect();
+    for (part, (_, moments)) in parts.iter_mut().zip(runs(moments)) {
+        part.moments = moments;
     }
-    let both = sums.into_par_iter().zip(runs(region, moments, tile));
-    if samples.start < scene.specialization.first_look {
-        let all = both.zip(runs(region, looks, tile));
-        all.for_each(|(((first, sums), (_, moments)), (_, looks))| {
-            for (((x, sum), moments), look) in (first.x..).zip(sums).zip(moments).zip(looks) {
-                first_look(scene, UVec2::new(x, first.y), samples.clone(), sum, moments, look);
+    for (part, (_, looks)) in parts.iter_mut().zip(runs(looks_to_write)) {
+        part.looks = looks;
+    }
+    for (i, layer) in layers.iter_mut().enumerate() {
+        for (part, (_, layer)) in parts.iter_mut().zip(runs(layer)) {
+            part.layers[i] = layer;
+        }
+    }
+    parts.into_par_iter().for_each(|mut run| {
+        for x in 0..run.sums.len() {
+            let pixel = UVec2::new(run.first.x + x as u32, run.first.y);
+            if !scene.adaptive {
+                for sample in samples.clone() {
+                    let (value, layers) = pixel_radiance(scene, pixel, sample);
+                    run.sums[x] += value;
+                    run.add_layers(x, layers);
+                }
+            } else if first_looks {
+                first_look(scene, pixel, samples.clone(), &mut run, x);
+            } else {
+                let looks = looks_around(looks_to_read, region, pixel);
+                further_samples(scene, pixel, samples.clone(), &mut run, x, looks);
             }
-        });
-    } else {
-        both.for_each(|((first, sums), (_, moments))| {
-            for ((x, sum), moments) in (first.x..).zip(sums).zip(moments) {
-                let pixel = UVec2::new(x, first.y);
-                let looks = looks_around(looks, region, pixel);
-                further_samples(scene, pixel, samples.clone(), sum, moments, looks);
+        }
+    });
+}
+
+/// A piece of a row of a film: its lists, which are empty where the film's are, or where they are only read.
+struct Run<'a> {
+    first: UVec2,
+    sums: &'a mut [Vec4],
+    moments: &'a mut [Vec4],
+    looks: &'a mut [Vec4],
+    layers: [&'a mut [Vec4]; Layer::ALL.len()],
+}
+
+impl Run<'_> {
+    fn add_layers(&mut self, x: usize, found: Layers) {
+        let Layers {
+            emission,
+            direct,
+            indirect,
+            albedo,
+            normal,
+        } = found;
+        let found = [emission, direct, indirect, albedo, normal];
+        for (layer, found) in self.layers.iter_mut().zip(found) {
+            if let Some(sum) = layer.get_mut(x) {
+                *sum += found;
             }
-        });
+        }
     }
 }
 
-/// The records of a tile's pixels, of a film's region, in pieces of a row, each with its first pixel.
+/// The records of a tile's pixels, of a film's region, in pieces of a row, each with its first pixel; none of an empty list.
 fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut [Vec4])> {
     let rows = records.chunks_mut(region.width() as usize).enumerate();
     let rows = rows.skip((tile.y0 - region.y0) as usize).take(tile.height() as usize);
@@ -167,24 +211,26 @@ fn runs(region: Region, records: &mut [Vec4], tile: Region) -> Vec<(UVec2, &mut 
 }
 
 /// What `shaders/kernels/adaptive.wgsl` does to a pixel at first.
-fn first_look(scene: &Packed, pixel: UVec2, samples: Range<u32>, sum: &mut Vec4, moments: &mut Vec4, look: &mut Vec4) {
+fn first_look(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize) {
     for sample in samples {
-        let value = pixel_radiance(scene, pixel, sample);
-        *look = look_with(*look, *sum, value);
-        *moments = moments_with(*moments, *sum, value);
-        *sum += value;
+        let (value, layers) = pixel_radiance(scene, pixel, sample);
+        run.looks[x] = look_with(run.looks[x], run.sums[x], value);
+        run.moments[x] = moments_with(run.moments[x], run.sums[x], value);
+        run.sums[x] += value;
+        run.add_layers(x, layers);
     }
-    *look = whole_look(*look, *sum, *moments);
+    run.looks[x] = whole_look(run.looks[x], run.sums[x], run.moments[x]);
 }
 
 /// What it does to a pixel later on.
-fn further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, sum: &mut Vec4, moments: &mut Vec4, looks: Vec4) {
+fn further_samples(scene: &Packed, pixel: UVec2, samples: Range<u32>, run: &mut Run, x: usize, looks: Vec4) {
     let s = &scene.specialization;
     let end = samples_wanted(looks, s.first_look, f32::from_bits(s.squared_error), samples.end);
     for sample in samples.start..end {
-        let value = pixel_radiance(scene, pixel, sample);
-        *moments = moments_with(*moments, *sum, value);
-        *sum += value;
+        let (value, layers) = pixel_radiance(scene, pixel, sample);
+        run.moments[x] = moments_with(run.moments[x], run.sums[x], value);
+        run.sums[x] += value;
+        run.add_layers(x, layers);
     }
 }
 

@@ -5,10 +5,15 @@ use glam::{UVec2, Vec2};
 use super::rng::unit_float;
 
 pub fn sobol_sample(index: u32, key: UVec2) -> Vec2 {
+    let bits = sobol_bits(index, key);
+    Vec2::new(unit_float(bits.x), unit_float(bits.y))
+}
+
+pub fn sobol_bits(index: u32, key: UVec2) -> UVec2 {
     let i = shuffled_index(index, key.x ^ key.y);
     let x = scramble(i, key.x).reverse_bits();
     let y = scramble(sobol_reversed(i), key.y).reverse_bits();
-    Vec2::new(unit_float(x), unit_float(y))
+    UVec2::new(x, y)
 }
 
 pub fn sobol_reversed(i: u32) -> u32 {

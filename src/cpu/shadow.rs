@@ -38,6 +38,13 @@ pub fn shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light,
     bits
 }
 
+#[inline(always)] // compiled for each kind
+pub fn cuts(kind: u32, q: &Primitive, p: Vec3, wall: bool, to: Vec3, reach: f32) -> bool {
+    let from_anchor = vector_to_local(q, p - q.anchor);
+    let start = if wall { -1e-30 } else { ellipsoid_level(q, from_anchor) };
+    blocks(kind, from_anchor - q.middle, vector_to_local(q, to), start, reach)
+}
+
 pub fn block_sample(block: Block, i: u32) -> Vec2 {
     sample_square(block.pattern, block.side, block.first + i, block.group, block.key)
 }

@@ -14,8 +14,8 @@ use super::surface::Surface;
 
 use super::texel::{gaussian_weight, level_size, near_coordinate, unpacked_color, wrapped_index};
 use crate::pack::{
-    EWA, FLOAT, FOR_AMBIENT, FOR_DIFFUSE, FOR_NORMAL, FOR_SPECULAR, FOR_TINT, LINES, Material, NEAREST, Packed,
-    TEXTURE_NUMBER, TRILINEAR, Texture,
+    EWA, FLOAT, FOR_AMBIENT, FOR_DIFFUSE, FOR_EMISSION, FOR_NORMAL, FOR_ROUGHNESS, FOR_SPECULAR, FOR_TINT, LINES,
+    Material, NEAREST, Packed, TEXTURE_NUMBER, TRILINEAR, Texture,
 };
 
 pub fn texture_color(scene: &Packed, t: &Texture, surface: Footprint) -> Vec3 {
@@ -210,6 +210,12 @@ pub fn appearance(
             }
             if lookup & FOR_TINT != 0 {
                 look.material.tint = color;
+            }
+            if lookup & FOR_EMISSION != 0 {
+                look.material.emission = color;
+            }
+            if lookup & FOR_ROUGHNESS != 0 {
+                look.material.roughness = color.x;
             }
             if lookup & FOR_NORMAL != 0 {
                 look.normal = mapped_normal(surface, t, color);

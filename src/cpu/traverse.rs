@@ -2,11 +2,13 @@
 
 use std::ops::Range;
 
+use glam::Vec3;
+
 use super::primitive::intersect;
 use super::ray::{Hit, Ray, by_itself, closer, no_hit};
-use super::shadow::{Block, Cone, cone_to_light, may_block, shadow_bits};
+use super::shadow::{Block, Cone, cone_to_light, cuts, may_block, shadow_bits};
 use super::surface::Surface;
-use crate::pack::{DISK, ELLIPSOID, Light, PLANE, Packed, RECTANGLE, TRIANGLE};
+use crate::pack::{DISK, ELLIPSOID, Light, PLANE, Packed, Primitive, RECTANGLE, TRIANGLE};
 
 /// Calls a function with each kind of primitives as a constant, so that it is compiled for each.
 macro_rules! for_each_kind {
@@ -43,6 +45,21 @@ pub fn hidden_by_primitives(scene: &Packed, surface: &Surface, light: &Light, bl
         bits |= hidden_by(scene, kind, range, surface, &cone, light, block);
     });
     bits
+}
+
+pub fn is_hidden_by_primitives(scene: &Packed, surface: &Surface, to: Vec3, reach: f32, goal: u32) -> bool {
+    for_each_kind!(scene.shadow_casters(), |kind, range| for i in range {
+        if is_cut(kind, &scene.primitives[i], i as u32, surface, to, reach, goal) {
+            return true;
+        }
+    });
+    false
+}
+
+#[inline(always)] // compiled for each kind
+pub fn is_cut(kind: u32, q: &Primitive, i: u32, surface: &Surface, to: Vec3, reach: f32, goal: u32) -> bool {
+    let is_wall = i == by_itself(surface.below);
+    (i != by_itself(surface.above)) & (i != goal) && cuts(kind, q, surface.start, is_wall, to, reach)
 }
 
 #[inline(always)] // compiled for each kind

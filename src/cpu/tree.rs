@@ -13,12 +13,16 @@ use super::samples::{LEVEL, Samples};
 use super::shadow::{Block, shadow_bits};
 use super::slab::{Slabs, box_passage, is_passed, slabs};
 use super::surface::{Surface, largest};
+use super::traverse::is_cut;
 use super::walk::{self, Line, Nearest};
 use crate::pack::tree::{Aabb, Node};
 use crate::pack::{
     CASTS_SHADOW, DISK, ELLIPSOID, FAR, INSTANCE, Instance, Item, Light, NOTHING, Packed, PackedMesh, RECTANGLE,
     SOME_SHADOWS, TRIANGLE,
 };
+
+/// So few items are looked at one by one: a ray passes most of a small tree's nodes.
+const FEW_ITEMS: usize = 4;
 
 fn item_pad(scene: &Packed, origin: Vec3) -> f32 {
     scene.counts.room.x * (largest(origin) + scene.counts.room.y)
@@ -29,6 +33,12 @@ pub fn closest_in_tree(scene: &Packed, before: Hit, ray: Ray, left: UVec2, wall:
     let mut hit = before;
     let pad = item_pad(scene, ray.origin);
     let s = slabs(ray.origin, ray.direction, pad);
+    if scene.items.len() <= FEW_ITEMS {
+        for item in &scene.items {
+            hit = closest_of_item(scene, hit, item, ray, s, left, wall);
+        }
+        return hit;
+    }
     let line = Line::new(ray.origin, ray.direction, pad);
     let nodes: &[Node] = cast_slice(&scene.nodes);
     walk::leaves(*LEVEL, nodes, &line, hit.t, |items, _| {
@@ -226,4 +236,47 @@ fn hidden_by_groups(scene: &Packed, i: &Instance, mesh: &PackedMesh, segments: &
             hidden
         },
     )
+}
+
+/// Whether an item of the tree lies between a surface and `reach` times `to`, but for the primitive `goal`.
+pub fn is_hidden_by_tree(scene: &Packed, surface: &Surface, to: Vec3, reach: f32, goal: u32) -> bool {
+    let pad = item_pad(scene, surface.start);
+    let s = slabs(surface.start, to, pad);
+    let cuts = |item: &Item| {
+        let casts = item.kind & CASTS_SHADOW != 0;
+        casts
+            && is_passed(box_passage(item.low, item.high, s), reach)
+            && is_cut_by_item(scene, item, surface, to, reach, goal)
+    };
+    if scene.items.len() <= FEW_ITEMS {
+        return scene.items.iter().any(cuts);
+    }
+    let line = Line::new(surface.start, to, pad);
+    let mut hidden = false;
+    walk::leaves(*LEVEL, cast_slice(&scene.nodes), &line, reach, |items, limit| {
+        hidden |= scene.items[items].iter().any(cuts);
+        if hidden { f32::NEG_INFINITY } else { limit }
+    });
+    hidden
+}
+
+fn is_cut_by_item(scene: &Packed, item: &Item, surface: &Surface, to: Vec3, reach: f32, goal: u32) -> bool {
+    let i = item.index;
+    let cut = |kind| is_cut(kind, &scene.primitives[i as usize], i, surface, to, reach, goal);
+    match item.kind & 0xff {
+        INSTANCE => is_cut_by_mesh(scene, i, surface, to, reach),
+        RECTANGLE => cut(RECTANGLE),
+        TRIANGLE => cut(TRIANGLE),
+        ELLIPSOID => cut(ELLIPSOID),
+        _ => cut(DISK),
+    }
+}
+
+fn is_cut_by_mesh(scene: &Packed, number: u32, surface: &Surface, to: Vec3, reach: f32) -> bool {
+    let i = &scene.instances[number as usize];
+    let origin = point_to_mesh(i, surface.start);
+    let line = Line::new(origin, vector_to_mesh(i, to), mesh_pad(i, origin));
+    let own = surface.above;
+    let skip = if own.x == number + 1 { own.y } else { NOTHING };
+    walk::any(*LEVEL, &walked(&scene.meshes[i.mesh as usize]), &line, skip, reach)
 }

@@ -167,10 +167,7 @@ impl Canvas {
         self.gpu.set_camera(&self.scene.camera)?;
         self.gpu.begin(region)?;
         if self.compare {
-            self.cpu = match self.scene.adaptive {
-                true => Film::adaptive(region),
-                false => Film::new(region),
-            };
+            self.cpu = Film::of(region, self.scene.form());
         }
         let samples = if scale > self.finest {
             1

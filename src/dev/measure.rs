@@ -22,7 +22,7 @@ const ROUNDS: usize = 7;
 /// No picture takes so long.
 const LONGEST: Duration = Duration::from_secs(120);
 /// The expression in `kernels/render.wgsl` that is changed, so that the picture changes and no cache knows the kernel.
-const PLACE: &str = "pixel_radiance(pixel, sample)";
+const PLACE: &str = "path_value(path)";
 
 /// Times from one kind of change.
 #[derive(Clone, Debug, PartialEq)]

@@ -132,7 +132,7 @@ impl Sources {
         let scene = scene
             .map_err(|error| Diagnostic::scene(&error, &text))
             .map(|(scene, described)| {
-                let packed = pack(&scene);
+                let packed = pack(&scene).without_layers(); // no view shows them
                 Arc::new(Loaded {
                     camera: described.camera,
                     scene,

@@ -6,7 +6,9 @@ use std::fmt::Write;
 use bytemuck::cast_slice;
 use glam::UVec4;
 
-use crate::pack::{BLOCK, Field as _, Instance, Item, Light, MOST_OUTSIDE, Material, Node, Packed, Record, Texture};
+use crate::pack::{
+    BLOCK, Emitter, Field as _, Instance, Item, Light, MOST_OUTSIDE, Material, Node, Packed, Record, Texture,
+};
 
 /// Scenes of more materials, lights and textures are read from buffers: compiling grows with every one of them, faster than
 /// in proportion.
@@ -14,7 +16,7 @@ pub const MOST_RECORDS: usize = 512;
 
 /// [`bake`], if the scene is small enough.
 pub fn bake_if_small(packed: &Packed) -> Option<String> {
-    let records = packed.materials.len() + packed.lights.len() + packed.textures.len();
+    let records = packed.materials.len() + packed.lights.len() + packed.textures.len() + packed.emitters.len();
     (packed.primitives.len() <= MOST_OUTSIDE && records <= MOST_RECORDS).then(|| bake(packed))
 }
 
@@ -87,12 +89,32 @@ pub fn bake(packed: &Packed) -> String {
             }
         },
     );
+    write_function(
+        &mut out,
+        "is_hidden_by_primitives(before: bool, surface: Surface, to: vec3f, reach: f32, goal: u32) -> bool",
+        "var hidden = before;",
+        "hidden",
+        |body| {
+            for (kind, range) in packed.shadow_casters() {
+                for i in range {
+                    let record = &records[i];
+                    let _ = writeln!(
+                        body,
+                        "    hidden |= is_cut({kind}u, {record}, {i}u, surface, to, reach, goal);"
+                    );
+                }
+            }
+        },
+    );
+    let emitters = packed.emitters.len();
+    let _ = writeln!(out, "fn emitter_count() -> u32 {{\n    return {emitters}u;\n}}");
     let lights = packed.counts.lights.constant();
     let _ = writeln!(out, "fn light_counts() -> vec2u {{\n    return {lights};\n}}");
     write_table(&mut out, "load_primitive", &packed.primitives);
     write_table(&mut out, "load_material", &packed.materials);
     write_table(&mut out, "load_light", &packed.lights);
     write_table(&mut out, "load_texture", &packed.textures);
+    write_table(&mut out, "load_emitter", &packed.emitters);
     out
 }
 
@@ -102,6 +124,7 @@ pub fn tables() -> String {
     from_rows::<Material>(&mut out, "load_material", "records", "0u");
     from_rows::<Light>(&mut out, "load_light", "records", "counts.tables.x");
     from_rows::<Texture>(&mut out, "load_texture", "records", "counts.tables.y");
+    from_rows::<Emitter>(&mut out, "load_emitter", "records", "counts.emitters.x");
     out
 }
 
@@ -115,12 +138,13 @@ pub fn tree_tables() -> String {
     out
 }
 
-/// The rows of a scene's materials, lights and textures.
+/// The rows of a scene's materials, lights, textures and emitters.
 pub fn rows(packed: &Packed) -> Vec<UVec4> {
     let bytes = [
         cast_slice(&packed.materials),
         cast_slice(&packed.lights),
         cast_slice::<_, u8>(&packed.textures),
+        cast_slice(&packed.emitters),
     ];
     bytemuck::pod_collect_to_vec(&bytes.concat())
 }

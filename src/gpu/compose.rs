@@ -3,10 +3,8 @@
 use std::ops::Range;
 use std::{fs, io, path::Path};
 
-use glam::Vec4;
-
 use super::bake::{tables, tree_tables};
-use crate::pack::{self, FirstHit, Specialization};
+use crate::pack::{self, Specialization};
 use crate::scene::Integrator;
 
 /// The file of quotients and square roots by software.
@@ -27,6 +25,7 @@ pub static SHARED: &[File] = files![
     "rng.wgsl",
     "sampling.wgsl",
     "sequence.wgsl",
+    "warp.wgsl",
     "ray.wgsl",
     "rectangle.wgsl",
     "triangle.wgsl",
@@ -42,6 +41,10 @@ pub static SHARED: &[File] = files![
     "differential.wgsl",
     "specular.wgsl",
     "path.wgsl",
+    "diffuse.wgsl",
+    "modified_phong.wgsl",
+    "dielectric.wgsl",
+    "light_sample.wgsl",
     "footprint.wgsl",
     "procedural.wgsl",
     "texel.wgsl",
@@ -65,19 +68,29 @@ static KERNEL: &[File] = files![
 ];
 /// What takes samples of a pixel.
 static SAMPLES: &[File] = files!["texture.wgsl", "pixel.wgsl"];
-static PHONG: &[File] = files!["integrators/phong.wgsl"];
+static PHONG: &[File] = files!["integrators/whole.wgsl", "integrators/phong.wgsl"];
+static PATH: &[File] = files!["emitter.wgsl", "integrators/path.wgsl"];
 /// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.
 static FROM_BUFFERS: &[File] = files!["buffers.wgsl"];
 /// The texels in one buffer.
 static TEXELS: &[File] = files!["texels.wgsl"];
-static RENDER_FILE: &[File] = files!["kernels/render.wgsl"];
-static ADAPTIVE_FILE: &[File] = files!["kernels/adaptive.wgsl"];
+static RENDER_FILE: &[File] = files!["film.wgsl", "kernels/render.wgsl"];
+static ADAPTIVE_FILE: &[File] = files!["film.wgsl", "kernels/adaptive.wgsl"];
 static FIRST_HITS_FILE: &[File] = files!["kernels/first_hits.wgsl"];
 
 /// Every file of `shaders/`.
 pub fn built_in() -> impl Iterator<Item = File> {
-    let scene = [ROUNDING_FILE, SHARED, KERNEL, SAMPLES, PHONG, FROM_BUFFERS, TEXELS];
-    let kernels = [RENDER_FILE, ADAPTIVE_FILE, FIRST_HITS_FILE];
+    let scene = [
+        ROUNDING_FILE,
+        SHARED,
+        KERNEL,
+        SAMPLES,
+        PHONG,
+        PATH,
+        FROM_BUFFERS,
+        TEXELS,
+    ];
+    let kernels = [RENDER_FILE, &ADAPTIVE_FILE[1..], FIRST_HITS_FILE];
     scene.into_iter().chain(kernels).flatten().copied()
 }
 
@@ -91,8 +104,6 @@ pub struct Kernel {
     pub files: &'static [&'static [File]],
     /// Whether it asks an integrator for radiance.
     pub integrates: bool,
-    /// The size in bytes of what it writes for a pixel.
-    pub record: usize,
 }
 
 /// Accumulates samples in the film.
@@ -100,21 +111,18 @@ pub static RENDER: Kernel = Kernel {
     entry_point: "render",
     files: &[KERNEL, SAMPLES, RENDER_FILE],
     integrates: true,
-    record: size_of::<Vec4>(),
 };
 /// Accumulates samples as long as a pixel needs them.
 pub static ADAPTIVE: Kernel = Kernel {
     entry_point: "adaptive",
     files: &[KERNEL, SAMPLES, ADAPTIVE_FILE],
     integrates: true,
-    record: size_of::<[Vec4; 3]>(),
 };
 /// Writes what the ray through each pixel's centre meets first.
 pub static FIRST_HITS: Kernel = Kernel {
     entry_point: "first_hits",
     files: &[KERNEL, FIRST_HITS_FILE],
     integrates: false,
-    record: size_of::<FirstHit>(),
 };
 /// Every kernel.
 pub static KERNELS: [&Kernel; 3] = [&RENDER, &ADAPTIVE, &FIRST_HITS];
@@ -123,6 +131,7 @@ pub static KERNELS: [&Kernel; 3] = [&RENDER, &ADAPTIVE, &FIRST_HITS];
 fn integrator_files(integrator: Integrator) -> &'static [File] {
     match integrator {
         Integrator::Phong => PHONG,
+        Integrator::Path => PATH,
     }
 }
 

@@ -167,7 +167,10 @@ impl Sides<'_> {
             let stores = AddressSpace::Storage {
                 access: StorageAccess::LOAD | StorageAccess::STORE,
             };
-            let there = |variable: &GlobalVariable| variable.binding == known.binding || variable.name == known.name;
+            let there = |variable: &GlobalVariable| {
+                let bound = variable.binding.is_some(); // one of that name may be private
+                variable.binding == known.binding || (bound && variable.name == known.name)
+            };
             if known.space == stores && !own.global_variables.iter().any(|(_, variable)| there(variable)) {
                 let file = self.file_with(right.global_variables.get_span(handle));
                 let ty = type_name(right, known.ty);

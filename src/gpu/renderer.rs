@@ -16,7 +16,7 @@ use super::scene::SceneBuffers;
 use super::texels::TexelParts;
 use crate::backend::{Backend, Rules, Started};
 use crate::error::RenderError;
-use crate::film::{Film, Region};
+use crate::film::{Film, Form, Region};
 use crate::pack::{Camera, FirstHit, Packed, Specialization, Work};
 use crate::scene::Integrator;
 
@@ -119,6 +119,9 @@ impl Rows {
     }
 }
 
+/// The size in bytes of a first hit.
+const FIRST_HITS_RECORD: usize = size_of::<FirstHit>();
+
 /// Rounds of the loop that proves a pixel whole: more than the single one of a loop that is cut short.
 const PROOF: UVec2 = UVec2::new(0, 4);
 
@@ -186,7 +189,7 @@ impl Gpu {
         self.idle()?;
         let texels = TexelParts::of(&self.device.info, packed)?;
         let same_kernel = self.kernels.baked.is_none()
-            && (self.kernels.constants, self.rules.adaptive()) == (packed.specialization, packed.adaptive)
+            && (self.kernels.constants, self.rules.form()) == (packed.specialization, packed.form())
             && (self.kernels.integrator, self.kernels.texels) == (packed.integrator, texels);
         if same_kernel {
             self.film = None;
@@ -209,8 +212,8 @@ impl Gpu {
         self.device.checked(|| self.scene.set_camera(&self.device, camera))
     }
 
-    fn target(&self, kernel: &Kernel, region: Region) -> Result<Target, RenderError> {
-        let size = region.pixels().max(1) * kernel.record as u64; // a binding cannot be empty
+    fn target(&self, record: usize, region: Region) -> Result<Target, RenderError> {
+        let size = region.pixels().max(1) * record as u64; // a binding cannot be empty
         self.device.checked(|| {
             let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
             let buffer = self.device.buffer(size, usage);
@@ -368,7 +371,7 @@ impl Gpu {
             Some(pipeline) => pipeline,
             None => self.kernels.compile(&self.device, &FIRST_HITS)?,
         };
-        let target = self.target(&FIRST_HITS, region)?;
+        let target = self.target(FIRST_HITS_RECORD, region)?;
         let receipt = self.dispatch(&pipeline, &target, region, 0..0, |_| ())?;
         self.first_hits = Some(pipeline);
         self.device.wait_for(&receipt)?;
@@ -394,6 +397,16 @@ fn receipt_to_read(device: &Device) -> wgpu::Buffer {
     device.buffer(RECEIPT, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
 }
 
+/// A film of the records that a kernel has written: its lists, one after the other, but for those that it does not have.
+fn film_of(region: Region, form: Form, records: &[Vec4]) -> Film {
+    let mut film = Film::of(region, form);
+    let lists = film.lists_mut().filter(|list| !list.is_empty());
+    for (list, records) in lists.zip(records.chunks(region.pixels() as usize)) {
+        list.copy_from_slice(records);
+    }
+    film
+}
+
 /// The workgroups of a tile, along each side.
 fn groups(tile: Region) -> [u32; 2] {
     [tile.width(), tile.height()].map(|pixels| pixels.div_ceil(WORKGROUP))
@@ -404,10 +417,7 @@ impl Backend for Gpu {
         self.idle()?;
         let started = self.rules.begin(region)?;
         self.film = None; // before the next one: the two together may not fit
-        let film = match self.rules.adaptive() {
-            true => self.target(&ADAPTIVE, region)?,
-            false => self.target(&RENDER, region)?,
-        };
+        let film = self.target(self.rules.form().bytes(), region)?;
         self.film = Some((film, started));
         Ok(())
     }
@@ -419,7 +429,7 @@ impl Backend for Gpu {
         let result = match &self.film {
             Some((target, _)) => self.device.checked(|| {
                 let mut at = 0;
-                for list in [&film.sums, &film.moments, &film.looks] {
+                for list in film.lists() {
                     self.device.queue.write_buffer(&target.buffer, at, cast_slice(list));
                     at += size_of_val(list.as_slice()) as u64;
                 }
@@ -465,16 +475,8 @@ impl Backend for Gpu {
             return Ok(self.rules.empty_film(region));
         }
         let result = self.device.download(&film.buffer);
-        let mut sums: Vec<Vec4> = self.or_lost(result)?;
-        let pixels = region.pixels() as usize;
-        let mut moments = sums.split_off(pixels);
-        let looks = moments.split_off(pixels.min(moments.len()));
-        Ok(Film {
-            region,
-            sums,
-            moments,
-            looks,
-        })
+        let records: Vec<Vec4> = self.or_lost(result)?;
+        Ok(film_of(region, self.rules.form(), &records))
     }
 
     fn first_hits(&mut self, region: Region) -> Result<Vec<FirstHit>, RenderError> {
@@ -498,10 +500,11 @@ impl Backend for Gpu {
     fn largest_film(&self) -> u64 {
         let info = &self.device.info;
         let bytes = info.largest_binding.min(info.largest_buffer);
-        if !self.rules.adaptive() {
-            return bytes / FIRST_HITS.record as u64;
+        let form = self.rules.form();
+        let most = bytes / form.bytes().max(FIRST_HITS_RECORD) as u64;
+        if !form.adaptive {
+            return most;
         }
-        let most = bytes / ADAPTIVE.record as u64;
         let picture = self.rules.picture();
         let beside = 2 * (u64::from(picture.width()) + u64::from(picture.height())) + 4;
         match picture.pixels() <= most {

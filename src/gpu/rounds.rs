@@ -1,6 +1,7 @@
 //! How many samples of a pixel one call may have, so that software Vulkan runs it whole.
 
 use crate::pack::{BLOCK, LEAVES, Packed};
+use crate::scene::Integrator;
 
 /// After so many rounds of all its loops together, Mesa 22.3's software Vulkan ends every loop of an invocation. Rounds
 /// are counted for all lanes of a vector: a round that any of them needs counts.
@@ -10,6 +11,13 @@ const CANDIDATES: f64 = 4.0;
 
 /// Rounds of a walk through the trees, about: nodes, leaves, triangles.
 const ROUNDS_OF_TREE: f64 = 150.0;
+
+/// Bounces of a path on which it may end at random, at most, nearly always, where surfaces reflect 95 % of the light: 0.95^100 is
+/// 0.6 %.
+const LONGEST_ROULETTE: u32 = 100;
+
+/// Rounds of a lookup in a texture, about.
+const ROUNDS_OF_LOOKUP: f64 = 8.0;
 
 /// The most samples of a call that are likely to run whole. It is an estimate: few primitives may hide a light, or all.
 /// A call that is cut short nevertheless is repeated with fewer samples, so that too much costs time alone; too little
@@ -30,6 +38,12 @@ fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
     let (of_hit, of_lists) = if baked { (0.0, lists) } else { (all, lists + casters) };
     let in_tree = if s.in_tree == 0 { 0.0 } else { ROUNDS_OF_TREE };
     let of_hit = of_hit + in_tree;
+    if packed.integrator == Integrator::Path {
+        // Each bounce is a round, with a ray to go on, one to a light, and the loops of textures.
+        let to_light = if baked { in_tree } else { casters + in_tree };
+        let bounces = f64::from(s.bounces.min(s.rr_depth.saturating_add(LONGEST_ROULETTE)));
+        return 1.0 + (bounces + 1.0) * (1.0 + of_hit + to_light + f64::from(s.lookups) * ROUNDS_OF_LOOKUP);
+    }
     let block = |samples: u32| {
         let shadows = CANDIDATES.min(casters) * (1.0 + f64::from(samples)) + in_tree * f64::from(samples);
         let lobes = f64::from(samples) * (2.0 + f64::from(s.exponent_bits));
@@ -75,6 +89,20 @@ mod tests {
         };
         assert!(changed(|s| s.light_samples = 256) < plain);
         assert!(changed(|s| s.bounces = 8) < plain);
+        // Of paths, more bounces.
+        let path = |depth: u32| {
+            let text = format!(
+                "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }}\n\
+                 render = {{ integrator = 'path', max_depth = {depth}, rr_depth = 8 }}\n"
+            );
+            samples_per_call(&pack(&Scene::parse(&text, "s").unwrap()), false)
+        };
+        assert!(
+            path(0) > path(5) && path(5) > path(100) && path(1024) > 100,
+            "{} {}",
+            path(5),
+            path(1024)
+        );
         // the ends of the ranges
         assert_eq!(changed(|s| s.light_samples = 65_536), 1);
         assert!(samples_per_call(&scene(70_000, 0), false) > 1, "they are in the tree");

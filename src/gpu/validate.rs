@@ -152,6 +152,7 @@ mod tests {
         }
     }
 
+    const FILM: &str = "film.wgsl";
     const RENDER: &str = "kernels/render.wgsl";
     const FIRST_HITS: &str = "kernels/first_hits.wgsl";
     const ADAPTIVE: &str = "kernels/adaptive.wgsl";
@@ -222,30 +223,23 @@ mod tests {
     fn bindings_must_be_what_the_program_binds() {
         let film = "@group(0) @binding(1) var<storage, read_write> film: array<vec4f>;";
         says(
-            &[(RENDER, "@binding(1)", "@binding(40)")],
-            &["kernels/render.wgsl: `film` must be at @group(0) @binding(1)"],
+            &[(FILM, "@binding(1)", "@binding(40)")],
+            &["film.wgsl: `film` must be at @group(0) @binding(1)"],
+        );
+        says(
+            &[(FILM, film, "var<private> film: array<vec4f, 9>;")],
+            &["film.wgsl:1:1: @group(0) @binding(1) .. `var<storage, read_write>` film: array<vec4<f32>> is missing"],
         );
         says(
             &[
-                (RENDER, film, ""),
-                (RENDER, "film[index] = sum;", ""),
-                (RENDER, "film[index]", "vec4f()"),
-            ],
-            &[
-                "kernels/render.wgsl:1:1: @group(0) @binding(1) .. `var<storage, read_write>` film: array<vec4<f32>> is missing",
-            ],
-        );
-        says(
-            &[
-                (RENDER, "array<vec4f>", "array<vec2f>"),
+                (FIRST_HITS, "array<FirstHit>", "array<vec4f>"),
                 (
-                    RENDER,
-                    "var sum = film[index]",
-                    "var sum = vec4f(film[index], 0.0, 0.0)",
+                    FIRST_HITS,
+                    "= pixel_first_hit(pixel);",
+                    "= vec4f(pixel_first_hit(pixel).depth);",
                 ),
-                (RENDER, "= sum;", "= sum.xy;"),
             ],
-            &["kernels/render.wgsl: `film[]` is `vec2<f32>` and must be `vec4<f32>`"],
+            &["kernels/first_hits.wgsl: `hits[]` is `vec4<f32>` and must be `FirstHit`"],
         );
         says(
             &[("bindings.wgsl", "", "@group(0) @binding(30) var<uniform> more: vec4f;")],

@@ -1,17 +1,20 @@
-//! What a picture can show besides radiance ("arbitrary output variables"): the first hit through each pixel's centre, and
-//! what adaptive sampling knows of the pixel.
+//! What a picture can show besides radiance ("arbitrary output variables"): the first hit through each pixel's centre, what
+//! adaptive sampling knows of the pixel, and means over its samples.
 
 use glam::Vec3;
 
 use super::{Band, Layout};
+use crate::film::Layer;
 use crate::pack::{FirstHit, NOTHING};
+use crate::scene::Integrator;
 
 /// A value of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aov {
     /// The outward normal.
     Normal,
-    /// The normal that it is shaded by, without normal maps, outwards.
+    /// The normal that it is shaded by, outwards: without normal maps that of the first hit; under the integrator `path` the
+    /// mean over the samples, with normal maps, which is shorter than 1 where they differ.
     ShadingNormal,
     /// The distance along the ray.
     Depth,
@@ -23,10 +26,29 @@ pub enum Aov {
     Instance,
     /// The barycentric coordinates, of its second and third vertex, in a mesh's triangle.
     Barycentric,
+    /// The share of light that the surfaces reflect, those seen in mirrors and through glass too.
+    Albedo,
+    /// Light that was reflected once.
+    Direct,
+    /// Light that was reflected more often. Emission, direct and indirect light together are the picture.
+    Indirect,
+    /// Light that was not reflected: of what shines itself, and of the environment.
+    Emission,
     /// The number of samples.
     SampleCount,
     /// The variance of the pixel's value, as [`Film::variance`](crate::film::Film::variance) estimates it.
     Variance,
+}
+
+/// Where a value of a pixel comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AovSource {
+    /// The first hit of the ray through the pixel's centre.
+    FirstHit,
+    /// The mean over the pixel's samples, weighted as the picture is; there under the integrator `path` alone.
+    Samples,
+    /// What adaptive sampling knows of the pixel; there under adaptive sampling alone.
+    Adaptive,
 }
 
 /// One channel of a layer.
@@ -35,6 +57,10 @@ pub enum Channel {
     Float(&'static str, fn(&FirstHit) -> f32),
     /// A whole number for each first hit.
     Whole(&'static str, fn(&FirstHit) -> u32),
+    /// A part of the mean of the film's layer.
+    Mean(&'static str, Layer, usize),
+    /// A part of the shading normal: of its mean where the film has layers, else of each first hit.
+    ShadingNormal(&'static str, usize),
     /// The number of samples.
     Count(&'static str),
     /// The variance of a colour channel.
@@ -44,9 +70,8 @@ pub enum Channel {
 impl Channel {
     pub fn name(&self) -> &'static str {
         match self {
-            Channel::Float(name, _) | Channel::Whole(name, _) | Channel::Count(name) | Channel::Variance(name, _) => {
-                name
-            }
+            Channel::Float(name, _) | Channel::Whole(name, _) | Channel::Count(name) => name,
+            Channel::Mean(name, ..) | Channel::ShadingNormal(name, _) | Channel::Variance(name, _) => name,
         }
     }
 
@@ -59,6 +84,11 @@ impl Channel {
         match self {
             Channel::Float(_, value) => value(&band.hits[i]).to_ne_bytes(),
             Channel::Whole(_, value) => value(&band.hits[i]).to_ne_bytes(),
+            Channel::Mean(_, layer, part) => band.film.layer(*layer, i)[*part].to_ne_bytes(),
+            Channel::ShadingNormal(_, part) if band.film.has_layers() => {
+                band.film.layer(Layer::Normal, i)[*part].to_ne_bytes()
+            }
+            Channel::ShadingNormal(_, part) => band.hits[i].shading_normal[*part].to_ne_bytes(),
             Channel::Count(_) => band.film.sample_count(i).to_ne_bytes(),
             Channel::Variance(_, channel) => band.film.variance(i)[*channel].to_ne_bytes(),
         }
@@ -67,7 +97,7 @@ impl Channel {
 
 impl Aov {
     /// All of them.
-    pub const ALL: [Aov; 9] = [
+    pub const ALL: [Aov; 13] = [
         Aov::Normal,
         Aov::ShadingNormal,
         Aov::Depth,
@@ -75,13 +105,34 @@ impl Aov {
         Aov::Primitive,
         Aov::Instance,
         Aov::Barycentric,
+        Aov::Albedo,
+        Aov::Direct,
+        Aov::Indirect,
+        Aov::Emission,
         Aov::SampleCount,
         Aov::Variance,
     ];
 
-    /// Whether it is a value of the film, there under adaptive sampling alone; else it is one of the first hit.
-    pub fn is_of_film(self) -> bool {
-        matches!(self, Aov::SampleCount | Aov::Variance)
+    /// Where its values come from in pictures by an integrator. By another one there may be none.
+    pub fn source(self, integrator: Integrator) -> AovSource {
+        match self {
+            Aov::SampleCount | Aov::Variance => AovSource::Adaptive,
+            Aov::Albedo | Aov::Direct | Aov::Indirect | Aov::Emission => AovSource::Samples,
+            Aov::ShadingNormal if integrator == Integrator::Path => AovSource::Samples,
+            Aov::Normal | Aov::ShadingNormal | Aov::Depth | Aov::Uv => AovSource::FirstHit,
+            Aov::Primitive | Aov::Instance | Aov::Barycentric => AovSource::FirstHit,
+        }
+    }
+
+    /// The layer of the film that it shows as a picture of light.
+    pub(crate) fn light(self) -> Option<Layer> {
+        match self {
+            Aov::Albedo => Some(Layer::Albedo),
+            Aov::Direct => Some(Layer::Direct),
+            Aov::Indirect => Some(Layer::Indirect),
+            Aov::Emission => Some(Layer::Emission),
+            _ => None,
+        }
     }
 
     /// The name in options, files and layers.
@@ -94,6 +145,10 @@ impl Aov {
             Aov::Primitive => "primitive",
             Aov::Instance => "instance",
             Aov::Barycentric => "barycentric",
+            Aov::Albedo => "albedo",
+            Aov::Direct => "direct",
+            Aov::Indirect => "indirect",
+            Aov::Emission => "emission",
             Aov::SampleCount => "sample_count",
             Aov::Variance => "variance",
         }
@@ -101,6 +156,10 @@ impl Aov {
 
     /// The channels of an EXR layer.
     pub(crate) fn channels(self) -> Vec<Channel> {
+        let colors = |names: [&'static str; 3], layer| {
+            let channels = names.into_iter().zip(0..);
+            channels.map(|(name, part)| Channel::Mean(name, layer, part)).collect()
+        };
         match self {
             Aov::Normal => vec![
                 Channel::Float("normal.X", |hit| hit.normal.x),
@@ -108,9 +167,9 @@ impl Aov {
                 Channel::Float("normal.Z", |hit| hit.normal.z),
             ],
             Aov::ShadingNormal => vec![
-                Channel::Float("shading_normal.X", |hit| hit.shading_normal.x),
-                Channel::Float("shading_normal.Y", |hit| hit.shading_normal.y),
-                Channel::Float("shading_normal.Z", |hit| hit.shading_normal.z),
+                Channel::ShadingNormal("shading_normal.X", 0),
+                Channel::ShadingNormal("shading_normal.Y", 1),
+                Channel::ShadingNormal("shading_normal.Z", 2),
             ],
             Aov::Depth => vec![Channel::Float("depth.Z", |hit| hit.depth)],
             Aov::Uv => vec![
@@ -123,6 +182,10 @@ impl Aov {
                 Channel::Float("barycentric.U", |hit| hit.barycentric.x),
                 Channel::Float("barycentric.V", |hit| hit.barycentric.y),
             ],
+            Aov::Albedo => colors(["albedo.R", "albedo.G", "albedo.B"], Layer::Albedo),
+            Aov::Direct => colors(["direct.R", "direct.G", "direct.B"], Layer::Direct),
+            Aov::Indirect => colors(["indirect.R", "indirect.G", "indirect.B"], Layer::Indirect),
+            Aov::Emission => colors(["emission.R", "emission.G", "emission.B"], Layer::Emission),
             Aov::SampleCount => vec![Channel::Count("sample_count.N")],
             Aov::Variance => vec![
                 Channel::Variance("variance.R", 0),
@@ -132,12 +195,21 @@ impl Aov {
         }
     }
 
-    /// The colour of pixel `i` of a band in a PNG, before rounding to 8 bits; black where nothing is hit. The normal is
+    /// The colour of pixel `i` of a band in a PNG, before rounding to 8 bits; black where nothing is hit. Albedo and light are
+    /// linear: they take the display's curve, as the picture does; all else is shown as it is. The normal is
     /// moved from [-1, 1] to [0, 1]; the depth d is `1 / (1 + (d / middle)^4)`, near is bright; of texture coordinates the
     /// fraction is shown in red and green; a shape has a colour by its number. Sample counts are
     /// `log(count) / log(most)`, variances the standard error to the power 1/2.2.
     pub fn color(self, band: Band, i: usize, layout: &Layout) -> Vec3 {
+        let film = band.film;
+        if let Some(layer) = self.light() {
+            return film.layer(layer, i).into();
+        }
         match self {
+            // The mean of the samples' colours: where some of them hit nothing it is darker.
+            Aov::ShadingNormal if film.has_layers() => {
+                Vec3::from(film.layer(Layer::Normal, i)) * 0.5 + 0.5 * film.alpha(i)
+            }
             Aov::SampleCount => {
                 let [count, most] = [band.film.sample_count(i), layout.most_samples].map(|n| n.max(1) as f32);
                 Vec3::splat(count.ln() / most.max(2.0).ln())
@@ -147,7 +219,7 @@ impl Aov {
         }
     }
 
-    /// The colour of a first hit in a PNG, before rounding to 8 bits, as [`Aov::color`] gives it. A layer of the film has that
+    /// The colour of a first hit in a PNG, before rounding to 8 bits, as [`Aov::color`] gives it. A layer of another source has that
     /// of [`Aov::Primitive`].
     pub(crate) fn color_of_hit(self, hit: &FirstHit, middle_depth: f32) -> Vec3 {
         if hit.shape == NOTHING {

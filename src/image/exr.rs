@@ -22,7 +22,7 @@ use crate::film::mean;
 /// Rows that are compressed together; the format fixes it for [`Compression::ZIP16`].
 const BLOCK_ROWS: usize = 16;
 
-/// Writes the radiance as R, G, B and the AOVs as further channels of the same part. The display window is the whole
+/// Writes the radiance as R, G, B, its alpha as A, by which the colours are weighted as the format has it, and the AOVs as further channels of the same part. The display window is the whole
 /// picture, the data window the region.
 pub fn write(
     file: &mut Pending,
@@ -57,12 +57,16 @@ pub fn write(
 /// Where a channel's samples come from.
 enum Column {
     Radiance(usize),
+    Alpha,
     Aov(Channel),
 }
 
 /// The channels by name, in the order of the file, which is that of the alphabet.
 fn columns(layout: &Layout) -> Vec<(&'static str, Column)> {
     let mut columns: Vec<_> = ["R", "G", "B"].into_iter().zip((0..).map(Column::Radiance)).collect();
+    if layout.alpha {
+        columns.push(("A", Column::Alpha));
+    }
     for channel in layout.aovs.iter().flat_map(|aov| aov.channels()) {
         columns.push((channel.name(), Column::Aov(channel)));
     }
@@ -150,6 +154,7 @@ fn line(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>) 
         for i in pixels.clone() {
             bytes.extend(match column {
                 Column::Radiance(channel) => mean(band.film.sums[i])[*channel].to_ne_bytes(),
+                Column::Alpha => band.film.alpha(i).to_ne_bytes(),
                 Column::Aov(channel) => channel.bytes(band, i),
             });
         }
@@ -164,7 +169,7 @@ fn plain(error: Error) -> io::Error {
     }
 }
 
-/// Reads the channels R, G and B of an EXR file's first layer.
+/// Reads the channels R, G and B of an EXR file's first layer. Others are left out: colours with alpha are those over black.
 ///
 /// # Errors
 ///

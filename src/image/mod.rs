@@ -14,19 +14,20 @@ use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::pack::FirstHit;
 
-pub use aov::Aov;
+pub use aov::{Aov, AovSource};
 pub use difference::{Difference, difference};
 pub use exr::read_exr;
 pub use file::Pending;
 pub use output::Output;
-pub use png::{encode, in_memory};
+pub use png::{encode, in_memory, straight};
 
 /// A kind of picture file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// RGB of 8 bits a channel, clamped to [0, 1] and raised to the power 1/2.2. Every [`Aov`] is a file of its own.
+    /// RGB of 8 bits a channel, clamped to [0, 1] and raised to the power 1/2.2, and alpha where the picture has it, which is
+    /// linear. Every [`Aov`] is a file of its own.
     Png,
-    /// RGB of 32-bit floats, linear; [`Aov`]s are further layers.
+    /// RGB of 32-bit floats, linear, and alpha where the picture has it; [`Aov`]s are further layers.
     Exr,
 }
 
@@ -49,6 +50,8 @@ pub struct Layout {
     pub region: Region,
     /// What is written besides the radiance.
     pub aovs: Vec<Aov>,
+    /// Whether the picture has alpha, by which its colours are weighted. The film has layers then.
+    pub alpha: bool,
     /// The distance that is half bright in a PNG of the depth.
     pub middle_depth: f32,
     /// The number of samples that is bright in a PNG of their counts.
@@ -60,7 +63,7 @@ pub struct Layout {
 pub struct Band<'a> {
     /// The radiance.
     pub film: &'a Film,
-    /// The first hits of the same pixels; empty where the layout has no [`Aov`] of them.
+    /// The first hits of the same pixels; empty where the layout has no [`Aov`] of them ([`AovSource::FirstHit`]).
     pub hits: &'a [FirstHit],
 }
 

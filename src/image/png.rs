@@ -18,6 +18,14 @@ pub fn encode(linear: f32) -> u8 {
     quantize(f64::from(linear.clamp(0.0, 1.0)).powf(DISPLAY))
 }
 
+/// A pixel of a picture with alpha as a PNG has it: red, green and blue of what is there by itself, and the share that it
+/// covers, linear. Where nothing is it is black.
+pub fn straight([r, g, b]: [f32; 3], alpha: f32) -> [u8; 4] {
+    let by_itself = |value: f32| if alpha > 0.0 { encode(value / alpha) } else { 0 };
+    let share = quantize(f64::from(alpha.clamp(0.0, 1.0)));
+    [by_itself(r), by_itself(g), by_itself(b), share]
+}
+
 /// The nearest of 256 steps from 0 to 1; halves go up.
 fn quantize(value: f64) -> u8 {
     (value * 255.0 + 0.5) as u8 // the conversion saturates, and takes NaN to 0
@@ -30,7 +38,7 @@ fn quantize(value: f64) -> u8 {
 /// Sizes that do not fit the number of bytes.
 pub fn in_memory(width: u32, height: u32, rgb: &[u8]) -> io::Result<Vec<u8>> {
     let mut file = Vec::new();
-    let mut png = rgb8(&mut file, width, height);
+    let mut png = png8(&mut file, (width, height), ColorType::Rgb);
     png.set_compression(Compression::Fast);
     png.write_header()
         .and_then(|mut writer| writer.write_image_data(rgb))
@@ -38,9 +46,9 @@ pub fn in_memory(width: u32, height: u32, rgb: &[u8]) -> io::Result<Vec<u8>> {
     Ok(file)
 }
 
-fn rgb8<W: Write>(file: W, width: u32, height: u32) -> Encoder<'static, W> {
+fn png8<W: Write>(file: W, (width, height): (u32, u32), color: ColorType) -> Encoder<'static, W> {
     let mut png = Encoder::new(file, width, height);
-    png.set_color(ColorType::Rgb);
+    png.set_color(color);
     png.set_depth(BitDepth::Eight);
     png
 }
@@ -54,7 +62,11 @@ pub fn write(
     let mut writers = Vec::new();
     let contents = [None].into_iter().chain(layout.aovs.iter().copied().map(Some));
     for (file, content) in files.iter_mut().zip(contents) {
-        let mut png = rgb8(file, layout.region.width(), layout.region.height());
+        let color = match layout.alpha && content.is_none() {
+            true => ColorType::Rgba,
+            false => ColorType::Rgb,
+        };
+        let mut png = png8(file, (layout.region.width(), layout.region.height()), color);
         if content.is_none() {
             png.set_source_gamma(ScaledFloat::new(DISPLAY as f32));
         }
@@ -67,7 +79,7 @@ pub fn write(
     render(&mut |band| {
         for (stream, content) in &mut streams {
             let bytes = match &*content {
-                None => radiance(band),
+                None => radiance(band, layout.alpha),
                 Some(aov) => colors(band, *aov, layout),
             };
             stream.write_all(&bytes)?;
@@ -83,18 +95,22 @@ pub fn write(
     Ok(())
 }
 
-fn radiance(band: Band) -> Vec<u8> {
-    band.film
-        .sums
-        .par_iter()
-        .flat_map_iter(|sum| mean(*sum).map(encode))
-        .collect()
+fn radiance(band: Band, alpha: bool) -> Vec<u8> {
+    let sums = &band.film.sums;
+    if alpha {
+        let color = |i| straight(mean(sums[i]), band.film.alpha(i));
+        return (0..sums.len()).into_par_iter().flat_map_iter(color).collect();
+    }
+    sums.par_iter().flat_map_iter(|sum| mean(*sum).map(encode)).collect()
 }
 
 fn colors(band: Band, aov: Aov, layout: &Layout) -> Vec<u8> {
     let color = |i| {
         let color = aov.color(band, i, layout).to_array();
-        color.map(|value| quantize(f64::from(value)))
+        color.map(|value| match aov.light() {
+            Some(_) => encode(value),
+            None => quantize(f64::from(value)),
+        })
     };
     (0..band.film.sums.len()).into_par_iter().flat_map_iter(color).collect()
 }

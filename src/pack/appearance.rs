@@ -7,11 +7,14 @@ use glam::{DVec3, UVec4, Vec3};
 
 use super::pyramid::pyramid;
 use super::{
-    CHECKER, CLAMP, EWA, FLOAT, FOR_AMBIENT, FOR_DIFFUSE, FOR_NORMAL, FOR_SPECULAR, FOR_TINT, GLASS, LINEAR8, LINES,
-    MIRROR, MIRRORED, Material, NEAREST, PHONG, REPEAT, SRGB8, TRILINEAR, Texture,
+    CHECKER, CLAMP, DIFFUSE, EWA, FLOAT, FOR_AMBIENT, FOR_DIFFUSE, FOR_EMISSION, FOR_NORMAL, FOR_ROUGHNESS,
+    FOR_SPECULAR, FOR_TINT, GLASS, LINEAR8, LINES, MIRROR, MIRRORED, Material, NEAREST, PHONG, REPEAT, SRGB8,
+    TRILINEAR, Texture,
 };
 use crate::pack::BILINEAR;
-use crate::scene::{self, Color, Encoding, Image, Scene, Texels, TextureFilter, TextureKind, Wrap};
+use crate::scene::{
+    self, Color, Encoding, Image, Integrator, Reflection, Scene, Texels, TextureFilter, TextureKind, Value, Wrap,
+};
 
 /// The records of a scene's materials and of the textures that they use.
 #[derive(Default)]
@@ -43,8 +46,8 @@ impl Appearances {
         appearances
     }
 
-    /// Most lookups of a material, and of one of mirrors or glass.
-    pub fn lookups(&self) -> (u32, u32) {
+    /// Most lookups of a material, and of one of mirrors or glass; of any, twice, where all are looked up in one place.
+    pub fn lookups(&self, integrator: Integrator) -> (u32, u32) {
         let most = |specular: bool| {
             let materials = self
                 .materials
@@ -53,7 +56,11 @@ impl Appearances {
             let lookups = materials.map(|m| m.lookups.to_array().iter().filter(|lookup| **lookup != 0).count());
             lookups.max().unwrap_or(0) as u32
         };
-        (most(false), most(true))
+        let (others, specular) = (most(false), most(true));
+        match integrator {
+            Integrator::Path => (others.max(specular), others.max(specular)),
+            _ => (others, specular),
+        }
     }
 
     pub fn has_normal_maps(&self) -> bool {
@@ -90,15 +97,17 @@ impl Appearances {
                 }
             },
         };
-        let mut record = match material {
-            scene::Material::Phong {
+        let mut record = match &material.reflection {
+            Reflection::Phong {
                 ambient,
                 diffuse,
                 specular,
                 shininess,
-                ..
             } => Material {
-                ambient: color(ambient, FOR_AMBIENT),
+                ambient: match scene.render.integrator {
+                    Integrator::Path => Vec3::ZERO, // without effect
+                    _ => color(ambient, FOR_AMBIENT),
+                },
                 kind: PHONG,
                 diffuse: color(diffuse, FOR_DIFFUSE),
                 shininess: *shininess as f32,
@@ -106,19 +115,43 @@ impl Appearances {
                 exponent: *shininess as u32,
                 ..bytemuck::Zeroable::zeroed()
             },
-            scene::Material::Mirror { tint, .. } => Material {
+            Reflection::Mirror { tint } | Reflection::Conductor { color: tint } => Material {
                 kind: MIRROR,
                 tint: color(tint, FOR_TINT),
                 ..bytemuck::Zeroable::zeroed()
             },
-            scene::Material::Glass { ior, tint, .. } => Material {
+            Reflection::Glass { ior, tint } => Material {
                 kind: GLASS,
                 tint: color(tint, FOR_TINT),
                 ior: *ior as f32,
                 ..bytemuck::Zeroable::zeroed()
             },
+            Reflection::Dielectric {
+                ior,
+                color: tint,
+                absorption,
+            } => Material {
+                kind: GLASS,
+                tint: color(tint, FOR_TINT),
+                ior: *ior as f32,
+                absorption: absorption.as_vec3(),
+                ..bytemuck::Zeroable::zeroed()
+            },
+            Reflection::Diffuse {
+                color: albedo,
+                roughness,
+            } => Material {
+                kind: DIFFUSE,
+                diffuse: color(albedo, FOR_DIFFUSE),
+                roughness: match *roughness {
+                    Value::Plain(roughness) => roughness as f32,
+                    Value::Texture(i) => color(&Color::Texture(i), FOR_ROUGHNESS).x,
+                },
+                ..bytemuck::Zeroable::zeroed()
+            },
         };
-        if let Some(map) = material.normal_map() {
+        record.emission = color(&material.emission, FOR_EMISSION);
+        if let Some(map) = material.normal_map {
             lookups.add(self.texture(scene, map.texture, Some(map.strength)), FOR_NORMAL);
         }
         record.lookups = lookups.0;
@@ -232,7 +265,7 @@ struct Lookups(UVec4);
 impl Lookups {
     fn add(&mut self, texture: u32, purpose: u32) {
         let same = |lookup: u32| lookup == 0 || lookup & super::TEXTURE_NUMBER == texture;
-        // There are four purposes, so that there is always a place.
+        // No material has more than four, so that there is always a place.
         if let Some(i) = (0..4).find(|i| same(self.0[*i])) {
             self.0[i] |= texture | purpose;
         }

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::extent_tree::{Extent, ExtentTree};
 use super::{ELLIPSOID, Primitive};
-use crate::scene::{Geometry, Light, Material, Parallelogram, Scene, Shadows};
+use crate::scene::{Geometry, Integrator, Light, Parallelogram, Reflection, Scene, Shadows};
 
 /// How far beyond a plane a point counts as on it, relative to the coordinates: the rounding of its record.
 const TOLERANCE: f64 = 1e-6;
@@ -18,13 +18,14 @@ pub fn can_cast_shadow(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
     let things = Things::of(scene);
     let blocking = primitives.iter().map(|p| match scene.shapes.get(p.shape as usize) {
         Some(shape) => casts_shadow(scene, shape.material) && things.blocks(p, MOST_NODES),
-        None => false, // a light
+        // A light: under the path tracer it hides what is behind it.
+        None => scene.render.integrator == Integrator::Path && things.blocks(p, MOST_NODES),
     });
     blocking.collect()
 }
 
 pub fn casts_shadow(scene: &Scene, material: usize) -> bool {
-    let is_glass = matches!(scene.materials[material], Material::Glass { .. });
+    let is_glass = matches!(scene.materials[material].reflection, Reflection::Glass { .. });
     scene.render.shadows == Shadows::Opaque || !is_glass
 }
 

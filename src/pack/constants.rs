@@ -50,6 +50,15 @@ constants! {
     pub const MIRROR: u32 = 2;
     /// [`Material::kind`]: clear glass.
     pub const GLASS: u32 = 3;
+    /// [`Material::kind`]: a diffuse surface.
+    pub const DIFFUSE: u32 = 4;
+    /// The bits of the kinds of materials that mirror or refract, and do nothing else.
+    pub const SPECULAR_KINDS: u32 = 1 << MIRROR | 1 << GLASS;
+
+    /// [`Light::kind`](super::Light::kind), behind the kinds of primitives and instances: light from one point.
+    pub const POINT: u32 = 6;
+    /// [`Light::kind`](super::Light::kind): light from infinitely far away.
+    pub const DIRECTIONAL: u32 = 7;
 
     /// Glass splits a path at the first so many bounces.
     pub const SPLITS: u32 = 2;
@@ -95,6 +104,10 @@ constants! {
     pub const FOR_TINT: u32 = 0x800_0000;
     /// In [`Material::lookups`]: gives the normal.
     pub const FOR_NORMAL: u32 = 0x1000_0000;
+    /// In [`Material::lookups`]: gives [`Material::emission`].
+    pub const FOR_EMISSION: u32 = 0x2000_0000;
+    /// In [`Material::lookups`]: its red gives [`Material::roughness`].
+    pub const FOR_ROUGHNESS: u32 = 0x4000_0000;
 
     /// [`Pattern::Grid`].
     pub const GRID: u32 = 0;

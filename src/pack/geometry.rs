@@ -93,7 +93,7 @@ pub fn trees(scene: &Scene, primitives: &[(u32, &Primitive, bool)], casts: impl 
 
 /// The meshes of which any instance has a normal map.
 fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
-    let has_map = |material: &usize| scene.materials[*material].normal_map().is_some();
+    let has_map = |material: &usize| scene.materials[*material].normal_map.is_some();
     let mesh = |shape: &Shape| match &shape.geometry {
         Geometry::Mesh { mesh, materials, .. } if materials.iter().any(has_map) => Some(Arc::as_ptr(mesh)),
         _ => None,

@@ -37,6 +37,10 @@ records! {
         pub background: Vec3,
         /// 1 / (samples of an area light).
         pub light_weight: f32,
+        /// Radiance that comes from everywhere, under the integrator `path`.
+        pub radiance: Vec3,
+        /// Where shadow rays to a point of a surface end, as a multiple of the way.
+        pub reach: f32,
     }
 
     /// Any primitive: local = (x, y, z) (p - anchor) - middle, by the rows of the inverse linear map.
@@ -75,9 +79,9 @@ records! {
     pub struct Material {
         /// [`PHONG`]: factor of the ambient light.
         pub ambient: Vec3,
-        /// [`PHONG`], [`EMITTER`], [`MIRROR`] or [`GLASS`].
+        /// [`PHONG`], [`EMITTER`], [`MIRROR`], [`GLASS`] or [`DIFFUSE`].
         pub kind: u32,
-        /// [`PHONG`]: factor of the diffuse term.
+        /// [`PHONG`]: factor of the diffuse term. [`DIFFUSE`]: the share of light that is reflected.
         pub diffuse: Vec3,
         /// [`PHONG`]: exponent of the specular term.
         pub shininess: f32,
@@ -89,10 +93,15 @@ records! {
         pub tint: Vec3,
         /// [`GLASS`]: index of refraction of what is behind the surface, relative to what is before it.
         pub ior: f32,
-        /// [`EMITTER`]: the light's colour.
+        /// [`EMITTER`]: the light's colour. Under the integrator `path`, of any kind: the radiance that it sends out.
         pub emission: Vec3,
-        /// [`EMITTER`]: which of the lights it is.
-        pub light: u32,
+        /// Under `path`, of what shines: how densely samples of light lie on it, per area, or on an ellipsoid how likely they are on
+        /// it, by its area as `ellipsoid_area` gives that. Else 0.
+        pub density: f32,
+        /// [`GLASS`]: how strongly light is absorbed behind the surface, per length.
+        pub absorption: Vec3,
+        /// [`DIFFUSE`]: 0 to 1.
+        pub roughness: f32,
         /// Lookups in textures: a texture's number and the bits of what it is for, 0 for none.
         pub lookups: UVec4,
     }
@@ -125,7 +134,8 @@ records! {
         pub levels: u32,
     }
 
-    /// A light: the points center + a u + b v for a, b in -1..=1.
+    /// A light: the points center + a u + b v for a, b in -1..=1. Under the integrator `path` there is one for each primitive that
+    /// shines, and (a, b) are as its kind has them.
     pub struct Light {
         /// The middle; the direction to a directional light.
         pub center: Vec3,
@@ -143,6 +153,28 @@ records! {
         pub color: Vec3,
         /// Its number in the scene file.
         pub number: u32,
+        /// Unit normal of a flat one, on the side that shines.
+        pub normal: Vec3,
+        /// Under `path` the primitive's kind, [`POINT`] or [`DIRECTIONAL`].
+        pub kind: u32,
+        /// Under `path`: [`Material::density`] of what shines; of a light without extent how likely its samples are.
+        pub density: f32,
+        /// 1 where the normal's side shines alone, else 2.
+        pub sides: u32,
+        /// 0.
+        pub unused: UVec2,
+    }
+
+    /// A thing that shines, in the table by which one is chosen: it stands for itself up to the threshold, for another one above.
+    pub struct Emitter {
+        /// 0 to 1.
+        pub threshold: f32,
+        /// The number of the other one.
+        pub other: u32,
+        /// 0 for a light, else one more than the number of a mesh's instance.
+        pub instance: u32,
+        /// The number of the light, or where the triangle is in its mesh.
+        pub index: u32,
     }
 
     /// How many records a scene has, and where they are; read where the scene is in buffers.
@@ -156,6 +188,8 @@ records! {
         pub tables: UVec2,
         /// The rows, behind the nodes of the scene's tree, where its items, x, instances, y, and groups' words, z, start.
         pub tree: UVec4,
+        /// The row where the table of emitters starts, x, and how many there are, y.
+        pub emitters: UVec4,
         /// How much larger items' boxes count, relative to the coordinates, x; and the largest coordinate of any, y.
         pub room: Vec4,
     }

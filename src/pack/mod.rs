@@ -4,6 +4,7 @@ mod appearance;
 mod blocking;
 mod bounds;
 mod constants;
+mod emitters;
 mod extent_tree;
 pub mod filter;
 mod geometry;
@@ -20,17 +21,20 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
-use glam::{DMat3, DVec3, UVec2, UVec4, Vec4};
+use glam::{DMat3, DVec3, UVec2, UVec4, Vec3, Vec4};
 
 use self::appearance::Appearances;
 pub use self::constants::*;
+use self::emitters::Shining;
 pub use self::geometry::MOST_OUTSIDE;
 pub use self::layout::*;
 pub use self::mesh::PackedMesh;
 pub use self::record::{Field, Record};
 pub use self::specialization::Specialization;
+use crate::film::Form;
 use crate::scene::{
-    self, Geometry, Integrator, Parallelogram, Pattern, PixelFilter, PixelFilterKind, Projection, Samples, Scene,
+    self, Geometry, Integrator, Parallelogram, Pattern, PixelFilter, PixelFilterKind, Projection, Reflection, Samples,
+    Scene,
 };
 
 /// How far shadow rays to a directional light go: beyond any scene, yet small enough to be squared.
@@ -71,8 +75,11 @@ pub struct Packed {
     pub group_words: Vec<u32>,
     /// The materials of the scene, then one for each area light.
     pub materials: Vec<Material>,
-    /// The lights, rectangles first; each knows the primitive that shines, whose material knows the light.
+    /// The lights, rectangles first; each knows the primitive that shines. Under the integrator `path` every primitive that
+    /// shines is one.
     pub lights: Vec<Light>,
+    /// Under the integrator `path`, what light is sampled of: the table by which one is chosen.
+    pub emitters: Vec<Emitter>,
     /// How many there are of all these, and where.
     pub counts: Counts,
     /// The textures that materials look up.
@@ -90,10 +97,40 @@ pub struct Packed {
 }
 
 impl Packed {
-    /// Samples of light at every hit, over all lights; a point or directional light counts 1.
+    /// Samples of light at every hit, over all lights; a point or directional light counts 1. Under the integrator `path` one of all.
     pub fn light_samples(&self) -> u64 {
+        if self.integrator == Integrator::Path {
+            return u64::from(!self.emitters.is_empty());
+        }
         let (area_lights, lights) = (self.counts.lights.x, self.counts.lights.y);
         u64::from(area_lights) * u64::from(self.specialization.light_samples) + u64::from(lights - area_lights)
+    }
+
+    /// The same scene, and a film that has layers. Without effect under another integrator than `path`, which alone has them.
+    #[must_use]
+    pub fn with_layers(mut self) -> Packed {
+        self.specialization.layers = (self.integrator == Integrator::Path).into();
+        self
+    }
+
+    /// The same scene, and a film without layers. The colours are the same.
+    #[must_use]
+    pub fn without_layers(mut self) -> Packed {
+        self.specialization.layers = 0;
+        self
+    }
+
+    /// Whether the picture has alpha: its background is transparent.
+    pub fn has_alpha(&self) -> bool {
+        self.specialization.alpha != 0
+    }
+
+    /// What its film has beside the sums.
+    pub fn form(&self) -> Form {
+        Form {
+            adaptive: self.adaptive,
+            layers: self.specialization.layers != 0,
+        }
     }
 
     /// Whether another scene is the same, seen by whatever camera.
@@ -112,6 +149,7 @@ impl Packed {
             group_words,
             materials,
             lights,
+            emitters,
             counts,
             textures,
             texels,
@@ -126,8 +164,14 @@ impl Packed {
         };
         (origin, environment, counts, specialization)
             == (&other.origin, &other.environment, &other.counts, &other.specialization)
-            && (primitives, bounds, materials, lights)
-                == (&other.primitives, &other.bounds, &other.materials, &other.lights)
+            && (primitives, bounds, materials, lights, emitters)
+                == (
+                    &other.primitives,
+                    &other.bounds,
+                    &other.materials,
+                    &other.lights,
+                    &other.emitters,
+                )
             && (textures, texels, filter_table) == (&other.textures, &other.texels, &other.filter_table)
             && (integrator, pixel_samples, adaptive) == (&other.integrator, &other.pixel_samples, &other.adaptive)
             && (nodes, items, instances, group_words)
@@ -181,17 +225,33 @@ pub fn pack(scene: &Scene) -> Packed {
     order.sort_by_key(|(primitive, blocking)| (is_in_tree(primitive), primitive.kind, !blocking));
     let outside = order.partition_point(|(primitive, _)| !is_in_tree(primitive));
     let area_lights = lights.iter().filter(|light| has_area(light)).count();
-    connect_lights(&mut lights[..area_lights], &mut materials, &order, scene.shapes.len());
+    connect_lights(&mut lights[..area_lights], &order, scene.shapes.len());
     let in_tree: Vec<_> = (outside as u32..)
         .zip(&order[outside..])
         .map(|(i, (p, casts))| (i, p, *casts))
         .collect();
     let trees = geometry::trees(scene, &in_tree, |material| blocking::casts_shadow(scene, material));
+    let is_path = scene.render.integrator == Integrator::Path;
+    let shining = match is_path {
+        true => emitters::emitters(scene, &mut materials, &lights[area_lights..], &order, &trees),
+        false => Shining::default(),
+    };
+    let (area_lights, lights) = match is_path {
+        true => (0, shining.lights),
+        false => (area_lights, lights),
+    };
     let kinds_in_tree = trees.items.iter().fold(0, |bits, item| bits | 1 << (item.kind & 0xff));
     let counts = Counts {
         tree: trees.rows().into(),
         room: trees.room,
-        ..counts(&order[..outside], area_lights, lights.len(), materials.len())
+        ..counts(
+            &order[..outside],
+            area_lights,
+            lights.len(),
+            materials.len(),
+            &appearances,
+            shining.emitters.len(),
+        )
     };
     let kinds = |end: fn(UVec4) -> u32| {
         let kinds = (0..).zip(counts.primitives);
@@ -215,22 +275,28 @@ pub fn pack(scene: &Scene) -> Packed {
         light_side: side(light_samples),
         light_samples: light_samples.count,
         filter_bins: filter_table.len() as u32,
-        first_look: adaptive.map_or(pixels.count, |adaptive| first_look(pixels.count, adaptive.max_samples)),
+        first_look: adaptive.map_or(pixels.count, |adaptive| {
+            first_look(scene.render.integrator, pixels.count, adaptive.max_samples)
+        }),
         squared_error: adaptive
             .map_or(0.0, |adaptive| (adaptive.error * adaptive.error) as f32)
             .to_bits(),
         exponent_bits,
-        bounces: if scene.materials.iter().any(is_specular) {
+        bounces: if is_path || scene.materials.iter().any(is_specular) {
             scene.render.max_depth
         } else {
             0
         },
         differentials: (scene.render.ray_differentials && appearances.needs_footprints()).into(),
-        lookups: appearances.lookups().0,
-        specular_lookups: appearances.lookups().1,
+        lookups: appearances.lookups(scene.render.integrator).0,
+        specular_lookups: appearances.lookups(scene.render.integrator).1,
         normal_maps: appearances.has_normal_maps().into(),
         texture_kinds: appearances.kinds(),
         texel_formats: appearances.formats(),
+        ..match is_path {
+            true => of_paths(scene, &materials, &shining.emitters, &lights),
+            false => Specialization::default(),
+        }
     };
     let primitives: Vec<Primitive> = order.into_iter().map(|(primitive, _)| primitive).collect();
     Packed {
@@ -242,6 +308,11 @@ pub fn pack(scene: &Scene) -> Packed {
             shadow_epsilon: scene.render.shadow_epsilon.max(LEAST_EPSILON) as f32,
             background: scene.render.background.as_vec3(),
             light_weight: 1.0 / light_samples.count as f32,
+            radiance: scene
+                .environment
+                .as_ref()
+                .map_or(Vec3::ZERO, |environment| environment.color.as_vec3()),
+            reach: reach(scene.render.shadow_epsilon),
         },
         bounds: primitives.iter().map(bounds::sphere).collect(),
         primitives,
@@ -252,6 +323,7 @@ pub fn pack(scene: &Scene) -> Packed {
         group_words: trees.group_words,
         materials,
         lights,
+        emitters: shining.emitters,
         counts,
         textures: appearances.textures,
         texels: appearances.texels,
@@ -264,7 +336,14 @@ pub fn pack(scene: &Scene) -> Packed {
 
 /// How many primitives of each kind there are, of those that are sorted by kind and by whether they cast shadows; and how
 /// many rows the tables of records have.
-fn counts(order: &[(Primitive, bool)], area_lights: usize, lights: usize, materials: usize) -> Counts {
+fn counts(
+    order: &[(Primitive, bool)],
+    area_lights: usize,
+    lights: usize,
+    materials: usize,
+    appearances: &Appearances,
+    emitters: usize,
+) -> Counts {
     let mut first = 0;
     let primitives = std::array::from_fn(|kind| {
         let of_kind = order[first as usize..]
@@ -278,17 +357,20 @@ fn counts(order: &[(Primitive, bool)], area_lights: usize, lights: usize, materi
         range
     });
     let rows = |count: usize, size: usize| (count * size / size_of::<UVec4>()) as u32;
-    let of_materials = rows(materials, size_of::<Material>());
+    let of_lights = rows(materials, size_of::<Material>());
+    let of_textures = of_lights + rows(lights, size_of::<Light>());
+    let of_emitters = of_textures + rows(appearances.textures.len(), size_of::<Texture>());
     Counts {
         primitives,
         lights: UVec2::new(area_lights as u32, lights as u32),
-        tables: UVec2::new(of_materials, of_materials + rows(lights, size_of::<Light>())),
+        tables: UVec2::new(of_lights, of_textures),
+        emitters: UVec4::new(of_emitters, emitters as u32, 0, 0),
         ..Counts::zeroed()
     }
 }
 
-/// Tells the lights that have an area which primitives shine, and the materials of these which lights they are.
-fn connect_lights(lights: &mut [Light], materials: &mut [Material], order: &[(Primitive, bool)], shapes: usize) {
+/// Tells the lights that have an area which primitives shine.
+fn connect_lights(lights: &mut [Light], order: &[(Primitive, bool)], shapes: usize) {
     let mut of_number: BTreeMap<u32, u32> = BTreeMap::new();
     for (i, light) in (0..).zip(&*lights) {
         of_number.insert(light.number, i);
@@ -297,16 +379,18 @@ fn connect_lights(lights: &mut [Light], materials: &mut [Material], order: &[(Pr
         let number = primitive.shape.checked_sub(shapes as u32);
         if let Some(light) = number.and_then(|number| of_number.get(&number)) {
             lights[*light as usize].primitive = i;
-            materials[primitive.material as usize].light = *light;
         }
     }
 }
 
 /// The samples that adaptive sampling gives all pixels before it decides on more: a round, or as many as it takes for an
-/// estimate of the variance.
-fn first_look(round: u32, most: u32) -> u32 {
-    const LEAST: u32 = 16;
-    LEAST.next_multiple_of(round).max(round).min(most)
+/// estimate of the variance. Where light bounces, some of it is rarely found, and few samples do not know of it.
+fn first_look(integrator: Integrator, round: u32, most: u32) -> u32 {
+    let least: u32 = match integrator {
+        Integrator::Phong => 16,
+        Integrator::Path => 64,
+    };
+    least.next_multiple_of(round).max(round).min(most)
 }
 
 /// Whether a filter is the pixel itself: the same weight for all samples inside.
@@ -354,13 +438,17 @@ pub fn pack_camera(camera: &scene::Camera, origin: DVec3, width: u32, height: u3
 }
 
 fn is_specular(material: &scene::Material) -> bool {
-    matches!(material, scene::Material::Mirror { .. } | scene::Material::Glass { .. })
+    match material.reflection {
+        Reflection::Phong { .. } | Reflection::Diffuse { .. } => false,
+        Reflection::Mirror { .. } | Reflection::Glass { .. } => true,
+        Reflection::Conductor { .. } | Reflection::Dielectric { .. } => true,
+    }
 }
 
 /// Bits of the largest shininess, if all are whole numbers so small that squaring beats the general power.
 fn exponent_bits(described: &[scene::Material], packed: &[Material]) -> u32 {
     let whole = described.iter().all(|material| {
-        if let scene::Material::Phong { shininess, .. } = material {
+        if let Reflection::Phong { shininess, .. } = &material.reflection {
             return shininess.fract() == 0.0 && *shininess <= 4096.0;
         }
         true
@@ -369,8 +457,39 @@ fn exponent_bits(described: &[scene::Material], packed: &[Material]) -> u32 {
     if whole { u32::BITS - largest.leading_zeros() } else { 0 }
 }
 
+/// What the integrator `path` takes as constants, of itself.
+fn of_paths(scene: &Scene, materials: &[Material], emitters: &[Emitter], lights: &[Light]) -> Specialization {
+    let any = |test: fn(&Material) -> bool| u32::from(materials.iter().any(test));
+    let has_lookup = |purpose: u32| {
+        let mut lookups = materials.iter().flat_map(|material| material.lookups.to_array());
+        u32::from(lookups.any(|lookup| lookup & purpose != 0))
+    };
+    let meshes_shine = emitters.iter().any(|emitter| emitter.instance != 0);
+    Specialization {
+        materials: materials.iter().fold(0, |bits, material| bits | 1 << material.kind),
+        rough: any(|material| material.roughness > 0.0) | has_lookup(FOR_ROUGHNESS),
+        absorption: any(|material| material.absorption != Vec3::ZERO),
+        shines: any(|material| material.density > 0.0),
+        emitters: emitters.len().min(2) as u32,
+        emitter_kinds: lights.iter().fold(u32::from(meshes_shine) << INSTANCE, |bits, light| {
+            bits | 1 << light.kind
+        }),
+        emission_textures: has_lookup(FOR_EMISSION),
+        rr_depth: scene.render.rr_depth,
+        most_indirect: scene.render.clamp.map_or(0, |clamp| (clamp as f32).to_bits()),
+        alpha: scene.render.alpha.into(),
+        layers: scene.render.alpha.into(),
+        ..Specialization::default()
+    }
+}
+
+/// Where shadow rays to a point of a light end, as a multiple of the way.
+fn reach(shadow_epsilon: f64) -> f32 {
+    (1.0 - shadow_epsilon.max(BEFORE_LIGHT)) as f32
+}
+
 fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
-    let reach = (1.0 - shadow_epsilon.max(BEFORE_LIGHT)) as f32;
+    let reach = reach(shadow_epsilon);
     let unit = Light {
         finite: 1.0,
         reach,
@@ -389,6 +508,7 @@ fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
         scene::Light::Point { position, color } => Light {
             center: position.as_vec3(),
             color: color.as_vec3(),
+            kind: POINT,
             ..unit
         },
         scene::Light::Directional { direction, color } => Light {
@@ -396,6 +516,7 @@ fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
             finite: 0.0,
             reach: DISTANT,
             color: color.as_vec3(),
+            kind: DIRECTIONAL,
             ..unit
         },
     }

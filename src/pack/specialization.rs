@@ -51,7 +51,7 @@ specialization! {
     squared_error = "SQUARED_ERROR",
     /// Bits of the largest shininess if all are whole numbers, else 0.
     exponent_bits = "EXPONENT_BITS",
-    /// Most bounces of a path, 0 where nothing mirrors or refracts.
+    /// Most bounces of a path; under the integrator `phong` 0 where nothing mirrors or refracts.
     bounces = "BOUNCES",
     /// 1 where rays carry differentials, else 0.
     differentials = "DIFFERENTIALS",
@@ -65,4 +65,26 @@ specialization! {
     texture_kinds = "TEXTURE_KINDS",
     /// Bit i is set if texels are of format i.
     texel_formats = "TEXEL_FORMATS",
+    /// Under the integrator `path`, as all below: bit i is set if there are materials of kind i.
+    materials = "MATERIALS",
+    /// 1 if any diffuse material is rough, else 0.
+    rough = "ROUGH",
+    /// 1 if anything absorbs light that passes through it, else 0.
+    absorption = "ABSORPTION",
+    /// 1 if any surface shines, else 0.
+    shines = "SHINES",
+    /// 0 where no light can be sampled, 1 where there is one emitter, else 2.
+    emitters = "EMITTERS",
+    /// Bit i is set if there are lights of kind i, that of [`INSTANCE`](super::INSTANCE) if meshes shine.
+    emitter_kinds = "EMITTER_KINDS",
+    /// 1 if a texture says how anything shines, else 0.
+    emission_textures = "EMISSION_TEXTURES",
+    /// From which bounce on paths end at random.
+    rr_depth = "RR_DEPTH",
+    /// The bits, as an f32, of the largest component of a sample of indirect light; 0 for no such limit.
+    most_indirect = "MOST_INDIRECT",
+    /// 1 where the background is transparent, else 0.
+    alpha = "ALPHA",
+    /// 1 where the film has layers, else 0.
+    layers = "LAYERS",
 }

@@ -1,8 +1,7 @@
 //! Scene files in JSON, as a course on path tracing has them: `docs/scene-format.md` has their keys. They become a
-//! [`Description`] like any other: with +Z up, where theirs is +Y, and with direct light in place of paths.
+//! [`Description`] like any other, with +Z up, where theirs is +Y.
 
 use std::collections::BTreeMap;
-use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -13,19 +12,13 @@ use toml::Value;
 use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
 use super::validate::{light, point};
 use super::{
-    ColorDescription, Description, LightDescription, MaterialDescription, MeshDescription, MirrorDescription, Pattern,
-    PerspectiveDescription, PhongDescription, RectangleLightDescription, RenderDescription, SamplesDescription, Scale,
-    Up, parse,
+    ColorDescription, ConductorDescription, Description, DiffuseDescription, Integrator, LightDescription,
+    MaterialDescription, MeshDescription, PerspectiveDescription, RectangleLightDescription, RenderDescription,
+    SamplesDescription, Scale, Up, parse,
 };
 
 /// The largest file in bytes: what is made of it takes many times its memory.
 const LARGEST: usize = 4 << 20;
-/// The ambient light as a part of the light's colour: it stands for the light that surfaces give each other.
-const AMBIENT: f64 = 0.1;
-
-/// What a user should know of every such scene.
-pub(super) const NOTE: &str = "it asks for paths of light from surface to surface, and is rendered with direct light, \
-                               mirrors and a constant ambient light instead";
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -120,10 +113,12 @@ pub(super) fn read(text: &str, origin: &str) -> Result<Description, SceneError> 
 /// The error of a text whose description has a bad value at the problem's path, or which has one there itself.
 pub(super) fn invalid(text: &str, origin: &str, problem: Problem) -> SceneError {
     let key = key_in_file(text, &problem.key);
+    // There it has another name.
+    let message = problem.message.replace("\"conductor\"", "\"specular\"");
     SceneError::Invalid {
         origin: origin.to_owned(),
         line: place(text, begin(text, &key)).0,
-        problem: Problem { key, ..problem },
+        problem: Problem { key, message },
     }
 }
 
@@ -187,7 +182,7 @@ fn read_json(text: &str) -> Result<Course, Broken> {
         let message = format!("{} must be an object: {{ \"spp\": ... }}", cut(&one_line(text)));
         return Err(Broken::Value(Problem::new(message)));
     };
-    parse::read(table).map_err(|problem| {
+    parse::read_for(table, Integrator::Path).map_err(|problem| {
         // It is told in TOML's words.
         let shown = find(text, &problem.key).filter(|value| value.starts_with('{'));
         let message = match (problem.message.rsplit_once(" must be "), shown) {
@@ -213,9 +208,7 @@ fn check(course: &Course) -> Result<(), Problem> {
         ..
     } = course;
     camera(cam_config).validate().at("camera")?;
-    light(&self::rectangle(light_config, light_config.radiance).into())
-        .at(0)
-        .at("lights")?;
+    light(&self::rectangle(light_config).into()).at(0).at("lights")?;
     for (i, object) in objects.iter().enumerate() {
         point(object.translate).at("translate").at(i).at("shapes")?;
     }
@@ -238,8 +231,8 @@ fn camera(camera: &Camera) -> super::CameraDescription {
 }
 
 /// A light in the file's coordinates.
-fn rectangle(light: &Light, color: DVec3) -> RectangleLightDescription {
-    RectangleLightDescription::new(light.position, light.size, DVec3::NEG_Y, DVec3::X, color)
+fn rectangle(light: &Light) -> RectangleLightDescription {
+    RectangleLightDescription::new(light.position, light.size, DVec3::NEG_Y, DVec3::X, light.radiance)
 }
 
 /// A vector with +Y up as one with +Z up: what [`Up::Y`] does to meshes.
@@ -257,8 +250,6 @@ fn description(course: &Course) -> Result<Description, Problem> {
         materials,
         objects,
     } = course;
-    let color = arriving(light_config, cam_config.look_at);
-    let samples = |pattern, count| SamplesDescription { pattern, count };
     let mut scene = Description::new(
         *width,
         *height,
@@ -270,28 +261,21 @@ fn description(course: &Course) -> Result<Description, Problem> {
         }),
     )
     .with_render(RenderDescription {
-        ambient: color * AMBIENT,
+        integrator: Integrator::Path,
         max_depth: *max_depth,
-        pixel_samples: samples(Pattern::Grid, *spp),
-        // As in a path tracer, each of a pixel's samples meets another point of the light.
-        light_samples: samples(Pattern::Sobol, 1),
+        pixel_samples: SamplesDescription::new(*spp),
         ..RenderDescription::default()
     })
     .with_light(LightDescription::from(RectangleLightDescription {
         center: turned(light_config.position),
         normal: turned(DVec3::NEG_Y),
-        ..rectangle(light_config, color)
+        ..rectangle(light_config)
     }));
     for Material { name, kind, color } in materials {
+        let color = ColorDescription::Plain(*color);
         let material = match kind {
-            Kind::Diffuse => MaterialDescription::from(PhongDescription {
-                specular: Some(ColorDescription::Plain(DVec3::ZERO)),
-                ..PhongDescription::new(ColorDescription::Plain(*color))
-            }),
-            Kind::Specular => MaterialDescription::from(MirrorDescription {
-                tint: ColorDescription::Plain(*color),
-                normal_map: None,
-            }),
+            Kind::Diffuse => MaterialDescription::from(DiffuseDescription::new(color)),
+            Kind::Specular => MaterialDescription::from(ConductorDescription::new(color)),
         };
         scene = scene.with_material(name, material);
     }
@@ -304,13 +288,6 @@ fn description(course: &Course) -> Result<Description, Problem> {
         });
     }
     Ok(scene)
-}
-
-/// The colour of a light without falloff in place of one with: what a white diffuse surface at a point would reflect that
-/// faces a disk of the light's area, turned to it (the form factor area / (area + pi distance²)).
-fn arriving(light: &Light, at: DVec3) -> DVec3 {
-    let area = light.size[0] * light.size[1];
-    light.radiance * (area / (area + PI * light.position.distance_squared(at)))
 }
 
 /// The path in the file of a value that is at a path of its description. A path of the file stays.
@@ -351,10 +328,14 @@ fn key_in_file(text: &str, key: &KeyPath) -> KeyPath {
                 .chain(rest.iter().map(renamed))
                 .collect()
         }
-        ("materials", [Segment::Key(name), ..]) => {
+        ("materials", [Segment::Key(name), rest @ ..]) => {
             let course = read_json(text).ok();
             let index = course.and_then(|course| course.materials.iter().position(|material| material.name == *name));
-            vec!["materials".into(), index.unwrap_or_default().into(), "color".into()]
+            let key = match rest {
+                [Segment::Key(key)] if key == "type" => "type",
+                _ => "color",
+            };
+            vec!["materials".into(), index.unwrap_or_default().into(), key.into()]
         }
         ("shapes", rest) => [Segment::from("objects")]
             .into_iter()

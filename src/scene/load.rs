@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use super::course;
 use super::error::{At, Problem, SceneError};
 use super::parse::{NOT_UTF8, invalid, syntax_error};
-use super::validate::{adaptive, adaptive_error, sample_count, side};
-use super::{AdaptiveDescription, Assets, Description, Pattern, SamplesDescription, Scene};
+use super::validate::{LIGHT_SAMPLES, adaptive, adaptive_error, max_depth, sample_count, side};
+use super::{AdaptiveDescription, Assets, Description, Integrator, Pattern, SamplesDescription, Scene};
 
 /// The largest scene file in bytes: far above what anyone writes, far below what fills the memory.
 const LARGEST_FILE: u64 = 64 << 20;
@@ -30,6 +30,10 @@ pub struct Overrides {
     pub pixel_pattern: Option<Pattern>,
     /// The error that adaptive sampling aims at, 0 to 1; the most samples stay.
     pub adaptive: Option<f64>,
+    /// What light is simulated.
+    pub integrator: Option<Integrator>,
+    /// The most bounces of a path, 1 to 64, or 0 to 1024 where the integrator is [`Integrator::Path`].
+    pub max_depth: Option<u32>,
     /// The folder that files named by the scene must lie in, instead of the scene's own.
     pub asset_root: Option<PathBuf>,
 }
@@ -41,26 +45,31 @@ impl Overrides {
             description.image.height = side(height).at("size")?;
         }
         let render = &mut description.render;
-        if let Some(pattern) = self.pixel_pattern {
-            render.pixel_samples.pattern = pattern;
+        let integrator = self.integrator.unwrap_or(render.integrator);
+        render.integrator = integrator;
+        if let Some(depth) = self.max_depth {
+            render.max_depth = max_depth(depth, integrator).at("max_depth")?;
         }
-        set_count(&mut render.pixel_samples, self.pixel_samples).at("pixel_samples")?;
-        set_count(&mut render.light_samples, self.light_samples).at("light_samples")?;
+        if let Some(pattern) = self.pixel_pattern {
+            render.pixel_samples.pattern = Some(pattern);
+        }
+        set_count(&mut render.pixel_samples, self.pixel_samples, integrator).at("pixel_samples")?;
+        set_count(&mut render.light_samples, self.light_samples, integrator).at("light_samples")?;
         render.seed = self.seed.unwrap_or(render.seed);
         if let Some(error) = self.adaptive {
             adaptive_error(error).at("adaptive")?;
             let max_samples = (render.adaptive.as_ref()).and_then(|adaptive| adaptive.max_samples);
             let description = AdaptiveDescription { error, max_samples };
-            adaptive(&description, &render.pixel_samples).at("adaptive")?;
+            adaptive(&description, &render.pixel_samples, integrator).at("adaptive")?;
             render.adaptive = Some(description);
         }
         Ok(())
     }
 }
 
-fn set_count(samples: &mut SamplesDescription, count: Option<u32>) -> Result<(), Problem> {
+fn set_count(samples: &mut SamplesDescription, count: Option<u32>, integrator: Integrator) -> Result<(), Problem> {
     if let Some(count) = count {
-        samples.count = sample_count(samples.pattern, count)?;
+        samples.count = sample_count(samples.pattern(integrator), count)?;
     }
     Ok(())
 }
@@ -147,15 +156,18 @@ fn parse_beside(
     if let Some(root) = &overrides.asset_root {
         assets.root.clone_from(root);
     }
-    match (description.validate_and_list(&assets, files), is_course) {
-        (Ok(mut scene), true) => {
-            scene.notes.insert(0, course::NOTE.to_owned());
-            Ok(scene)
-        }
-        (Ok(scene), false) => Ok(scene),
-        (Err(problem), true) => Err(course::invalid(text, origin, problem)),
-        (Err(problem), false) => Err(invalid(text, origin, problem)),
+    let mut scene = description
+        .validate_and_list(&assets, files)
+        .map_err(|problem| match is_course {
+            true => course::invalid(text, origin, problem),
+            false => invalid(text, origin, problem),
+        })?;
+    // The count may be the default, and yet somebody asked for it.
+    let is_asked = overrides.light_samples.is_some() && scene.render.integrator == Integrator::Path;
+    if is_asked && !scene.notes.iter().any(|note| note == LIGHT_SAMPLES) {
+        scene.notes.push(LIGHT_SAMPLES.to_owned());
     }
+    Ok(scene)
 }
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
@@ -193,6 +205,8 @@ light_samples = { pattern = 'random', count = 5 }
             seed: Some(3),
             pixel_pattern: None,
             adaptive: None,
+            integrator: None,
+            max_depth: None,
             asset_root: None,
         };
         let scene = Scene::parse_with(SCENE, "s.toml", &overrides).unwrap();
@@ -203,6 +217,48 @@ light_samples = { pattern = 'random', count = 5 }
         let render = scene.render;
         assert_eq!((scene.width, scene.height, render.seed), (4, 3, 0));
         assert_eq!((render.pixel_samples.count, render.light_samples.count), (16, 5));
+    }
+
+    #[test]
+    fn an_integrator_brings_its_own_ranges() {
+        let load = |integrator, max_depth| {
+            let overrides = Overrides {
+                integrator,
+                max_depth,
+                ..Overrides::default()
+            };
+            Scene::parse_with(SCENE, "s.toml", &overrides).map(|scene| scene.render)
+        };
+        let (phong, path) = (Some(Integrator::Phong), Some(Integrator::Path));
+        for (integrator, depth) in [
+            (None, 1),
+            (None, 64),
+            (phong, 1),
+            (phong, 64),
+            (path, 0),
+            (path, 64),
+            (path, 1024),
+        ] {
+            let render = load(integrator, Some(depth)).unwrap();
+            assert_eq!(render.integrator, integrator.unwrap_or(Integrator::Phong));
+            assert_eq!(render.max_depth, depth);
+        }
+        assert_eq!(load(path, None).unwrap().max_depth, 8);
+        let told = |integrator, depth| load(integrator, Some(depth)).unwrap_err().to_string();
+        assert_eq!(told(None, 0), "max_depth: 0 must be from 1 to 64");
+        assert_eq!(told(phong, 65), "max_depth: 65 must be from 1 to 64");
+        assert_eq!(told(path, 1025), "max_depth: 1025 must be from 0 to 1024");
+        // The pattern of the samples is the integrator's, if none is said.
+        let samples = |integrator| {
+            let overrides = Overrides {
+                integrator,
+                pixel_samples: Some(8),
+                ..Overrides::default()
+            };
+            Scene::parse_with(SCENE, "s.toml", &overrides)
+        };
+        assert_eq!(samples(path).unwrap().render.pixel_samples.pattern, Pattern::Sobol);
+        assert!(samples(phong).is_err());
     }
 
     #[test]

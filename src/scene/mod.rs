@@ -29,7 +29,7 @@ pub use description::*;
 pub use error::{KeyPath, Problem, SceneError};
 pub use image_file::Assets;
 pub use load::Overrides;
-pub use texture::{Color, Encoding, Image, NormalMap, Texels, Texture, TextureFilter, TextureKind, Wrap};
+pub use texture::{Color, Encoding, Image, NormalMap, Texels, Texture, TextureFilter, TextureKind, Value, Wrap};
 
 /// A checked scene. Lengths have no unit; colours are linear RGB; angles are radians.
 ///
@@ -53,6 +53,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// The materials' names.
     pub material_names: Vec<String>,
+    /// What surrounds the scene, where that shines. Under [`Integrator::Phong`] there is none.
+    pub environment: Option<Environment>,
     /// The lights, in file order.
     pub lights: Vec<Light>,
     /// The shapes, in file order, and then the instances of meshes, in theirs.
@@ -104,23 +106,31 @@ pub enum Projection {
 pub struct Render {
     /// What light is simulated.
     pub integrator: Integrator,
-    /// The ambient light that every Phong material reflects by its ambient colour.
+    /// The ambient light that every Phong material reflects by its ambient colour; black under [`Integrator::Path`].
     pub ambient: DVec3,
-    /// Radiance of rays that leave the scene.
+    /// Radiance of rays that leave the scene; under [`Integrator::Path`] that of the environment.
     pub background: DVec3,
     /// How far above a surface rays start at least, relative to the largest coordinate there.
     pub shadow_epsilon: f64,
-    /// Whether glass casts shadows.
+    /// Whether glass casts shadows; under [`Integrator::Path`] always [`Shadows::Opaque`].
     pub shadows: Shadows,
-    /// Most bounces of a path by mirrors and glass.
+    /// Most bounces of a path. Under [`Integrator::Phong`] those by mirrors and glass, 1 to 64; under [`Integrator::Path`] all
+    /// of them, 0 to 1024: with 0 only what shines is seen, with 1 direct light too.
     pub max_depth: u32,
+    /// From which bounce on a path may end at random, 0 to 1024. For [`Integrator::Path`] alone.
+    pub rr_depth: u32,
+    /// The largest component of what one sample of indirect light, of two bounces or more, may add to a pixel's sample:
+    /// greater than 0, to 1e6. For [`Integrator::Path`] alone.
+    pub clamp: Option<f64>,
+    /// Whether the background is transparent in the picture. For [`Integrator::Path`] alone.
+    pub alpha: bool,
     /// Whether textures are filtered over the footprint of each ray, or at its point alone.
     pub ray_differentials: bool,
     /// Seed of all random patterns.
     pub seed: u32,
     /// Samples of every pixel's area.
     pub pixel_samples: Samples,
-    /// Samples of every area light, at every hit.
+    /// Samples of every area light, at every hit; without effect under [`Integrator::Path`].
     pub light_samples: Samples,
     /// What a pixel's samples are weighted by.
     pub filter: PixelFilter,
@@ -128,12 +138,28 @@ pub struct Render {
     pub adaptive: Option<Adaptive>,
 }
 
-/// What light is simulated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+/// What light is simulated. In a file the names are in snake case: `"path"`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Integrator {
     /// Direct light and Phong's reflection model, the formula in the scene format's page.
     Phong,
+    /// Paths of light from surface to surface.
+    Path,
+}
+
+impl Integrator {
+    /// All of them.
+    pub const ALL: [Integrator; 2] = [Integrator::Phong, Integrator::Path];
+
+    /// The name in files and options.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Integrator::Phong => "phong",
+            Integrator::Path => "path",
+        }
+    }
 }
 
 /// Whether glass casts shadows. In a file the names are in snake case: `"opaque"`.
@@ -177,10 +203,30 @@ pub struct PixelFilter {
     pub radius: f64,
 }
 
+/// What surrounds a scene, infinitely far away.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Environment {
+    /// The radiance that comes from everywhere.
+    pub color: DVec3,
+}
+
 /// A surface's appearance.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Material {
+pub struct Material {
+    /// What it does to light that arrives.
+    pub reflection: Reflection,
+    /// The radiance that it sends out by itself, on both sides; black under [`Integrator::Phong`].
+    pub emission: Color,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMap>,
+}
+
+/// What a surface does to light that arrives.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Reflection {
     /// Phong's reflection model.
     Phong {
         /// Factor of the ambient light.
@@ -191,15 +237,11 @@ pub enum Material {
         specular: Color,
         /// Exponent of the specular term, greater than 0.
         shininess: f64,
-        /// What bends its normals.
-        normal_map: Option<NormalMap>,
     },
     /// A mirror.
     Mirror {
         /// Factor of the reflected light.
         tint: Color,
-        /// What bends its normals.
-        normal_map: Option<NormalMap>,
     },
     /// Clear glass, by Fresnel's equations.
     Glass {
@@ -207,45 +249,56 @@ pub enum Material {
         ior: f64,
         /// Factor of the light that passes the surface, on the way in and on the way out.
         tint: Color,
-        /// What bends its normals.
-        normal_map: Option<NormalMap>,
     },
-}
-
-impl Material {
-    /// What bends its normals.
-    pub fn normal_map(&self) -> Option<NormalMap> {
-        match self {
-            Material::Phong { normal_map, .. }
-            | Material::Mirror { normal_map, .. }
-            | Material::Glass { normal_map, .. } => *normal_map,
-        }
-    }
+    /// A surface that is equally bright from everywhere if it is smooth. For [`Integrator::Path`] alone, as all below.
+    Diffuse {
+        /// The share of the light that it reflects, 0 to 1.
+        color: Color,
+        /// How rough it is, 0 to 1.
+        roughness: Value,
+    },
+    /// Polished metal.
+    Conductor {
+        /// The share of the light that it reflects, 0 to 1.
+        color: Color,
+    },
+    /// Clear glass or liquid, by Fresnel's equations.
+    Dielectric {
+        /// Index of refraction of what is on the side away from the outward normal, relative to the other side.
+        ior: f64,
+        /// Factor of the light that passes the surface, on the way in and on the way out, 0 to 1.
+        color: Color,
+        /// How much light it swallows on the way through it, for each unit of length: of every component x, exp(-x) is left
+        /// after a length of 1.
+        absorption: DVec3,
+    },
 }
 
 /// A source of light.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Light {
-    /// A rectangle whose both sides shine, seen by the camera as its plain colour, casting no shadow.
+    /// A rectangle that casts no shadow under [`Integrator::Phong`]: both of its sides shine, seen by the camera as its plain
+    /// colour. Under [`Integrator::Path`] the side of its normal, u x v, shines, and it hides what is behind it.
     Rectangle {
         /// Its place and size.
         rectangle: Parallelogram,
-        /// Its colour.
+        /// Its colour: under [`Integrator::Path`] its radiance.
         color: DVec3,
     },
     /// A point, not seen by the camera.
     Point {
         /// Where it is.
         position: DVec3,
-        /// Its colour, without falloff.
+        /// Its colour: under [`Integrator::Path`] its intensity, power for each unit of solid angle, which falls off with the
+        /// square of the distance; else without falloff.
         color: DVec3,
     },
     /// Light from infinitely far away, not seen by the camera.
     Directional {
         /// Unit vector in which the light travels.
         direction: DVec3,
-        /// Its colour.
+        /// Its colour: under [`Integrator::Path`] the irradiance of a surface that faces it.
         color: DVec3,
     },
 }

@@ -14,6 +14,20 @@ pub enum Color {
     Texture(usize),
 }
 
+impl Color {
+    /// No light.
+    pub const BLACK: Color = Color::Plain(DVec3::ZERO);
+}
+
+/// A number of a material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// One number for all of the surface.
+    Plain(f64),
+    /// The red of a texture: index into [`Scene::textures`](super::Scene::textures).
+    Texture(usize),
+}
+
 /// A texture in tangent space that gives normals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalMap {

@@ -15,7 +15,7 @@ fn assert_failed(place: &Place, ran: &Ran, code: i32, message: &str) {
 #[test]
 fn wrong_command_lines_exit_with_2() {
     let place = Place::new();
-    let cases: [(&[&str], &str); 30] = [
+    let cases: [(&[&str], &str); 37] = [
         (&["--size", "64"], "--size"),
         (&["--size", "64x"], "--size"),
         (&["--size", "0x64"], "--size: 0 must be from 1 to 65536"),
@@ -53,6 +53,19 @@ fn wrong_command_lines_exit_with_2() {
         (
             &["--pixel-pattern", "grid", "--adaptive", "0.1"],
             "--adaptive: the pattern of pixel_samples",
+        ),
+        (&["--integrator", "paths"], "[possible values: phong, path]"),
+        (&["--max-depth", "0"], "--max-depth: 0 must be from 1 to 64"),
+        (&["--max-depth", "65"], "--max-depth: 65 must be from 1 to 64"),
+        (
+            &["--integrator", "path", "--max-depth", "1025"],
+            "--max-depth: 1025 must be from 0 to 1024",
+        ),
+        (&["--max-depth", "-1"], "--max-depth"),
+        (&["--max-depth", "deep"], "--max-depth"),
+        (
+            &["--integrator", "path", "--pixel-pattern", "grid", "--spp", "5"],
+            "--pixel-samples: 5 must be a square number",
         ),
         (&["--progress", "loud"], "--progress"),
         (&["-q", "-v"], "cannot be used with"),
@@ -141,6 +154,40 @@ fn bad_scenes_exit_with_3_and_name_file_line_key_value_and_rule() {
                 ran.stderr
             );
         }
+    }
+}
+
+/// What only paths have is refused where another integrator is asked for, in the words of the file.
+#[test]
+fn an_integrator_in_the_option_needs_a_scene_for_it() {
+    let place = Place::new();
+    let scene = place.path("small.toml");
+    for (from, to, message) in [
+        (
+            "[render]",
+            "[render]\nintegrator = 'path'\nalpha = true",
+            "small.toml:5: render.alpha: needs integrator = \"path\"",
+        ),
+        (
+            "[render]",
+            "[render]\nintegrator = 'path'\nmax_depth = 65",
+            "small.toml:5: render.max_depth: 65 must be from 1 to 64",
+        ),
+        (
+            "[materials.gray]",
+            "[environment]\ncolor = [1, 1, 1]\n[materials.gray]",
+            "small.toml:8: environment: needs integrator = \"path\"",
+        ),
+        (
+            "\"phong\"",
+            "\"diffuse\"",
+            "small.toml:9: materials.gray.type: \"diffuse\" needs integrator = \"path\"",
+        ),
+    ] {
+        assert!(SCENE.contains(from), "{from}");
+        std::fs::write(&scene, SCENE.replacen(from, to, 1)).unwrap();
+        let ran = place.run(&["render", "small.toml", "--integrator", "phong"]);
+        assert_failed(&place, &ran, 3, message);
     }
 }
 

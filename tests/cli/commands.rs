@@ -53,6 +53,8 @@ fn help_and_version_are_no_errors() {
         "--pixel-samples",
         "--light-samples",
         "--seed",
+        "--integrator",
+        "--max-depth",
         "--crop",
         "--device",
         "--threads",

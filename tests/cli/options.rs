@@ -30,6 +30,52 @@ fn options_stand_in_for_the_scenes_values() {
 }
 
 #[test]
+fn bounces_are_as_many_as_the_option_says() {
+    let place = Place::new();
+    // With one bounce light enters the ball, and does not leave it.
+    let ball = SCENE.replacen("material = \"gray\"", "material = \"glass\"", 1);
+    let ball = ball.replace(
+        "[materials.gray]",
+        "[materials.glass]\ntype = \"glass\"\nior = 1.5\n[materials.gray]",
+    );
+    place.write("ball.toml", &ball);
+    place.write("other.toml", &ball.replace("[render]", "[render]\nmax_depth = 1"));
+    place.quietly(&["render", "ball.toml", "-o", "plain.exr"]);
+    place.quietly(&["render", "ball.toml", "-o", "option.exr", "--max-depth", "1"]);
+    place.quietly(&["render", "other.toml", "-o", "other.exr"]);
+    assert_eq!(place.read("option.exr"), place.read("other.exr"));
+    assert_ne!(place.read("option.exr"), place.read("plain.exr"));
+}
+
+/// What the integrator of an option ignores is told, as it is of a scene's own.
+#[test]
+fn an_integrator_stands_in_for_the_scenes() {
+    let place = Place::new();
+    let path = SCENE.replace("[render]", "[render]\nintegrator = \"path\"\nmax_depth = 0");
+    place.write("path.toml", &path);
+    let option = ["--integrator", "path", "--max-depth", "0", "--device", "cpu"];
+    let ran = place.run(&[&["render", "small.toml", "-o", "option.exr"], &option[..]].concat());
+    assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
+    let told: Vec<&str> = ran.stderr.lines().collect();
+    assert_eq!(told.len(), 2, "{}", ran.stderr);
+    assert!(
+        told[0].starts_with("warning: small.toml: render.ambient: without effect"),
+        "{}",
+        told[0]
+    );
+    assert!(
+        told[1].starts_with("warning: small.toml: render.light_samples: without effect"),
+        "{}",
+        told[1]
+    );
+    place.quietly(&["render", "path.toml", "-q", "-o", "file.exr", "--device", "cpu"]);
+    assert_eq!(place.read("option.exr"), place.read("file.exr"));
+    let checked = place.run(&["check", "path.toml"]);
+    assert_eq!(checked.code, 0);
+    assert_eq!(checked.stderr, ran.stderr.replace("small.toml", "path.toml"));
+}
+
+#[test]
 fn a_crop_has_the_pixels_of_the_whole() {
     let place = Place::new();
     place.quietly(&["render", "small.toml", "-o", "whole.exr"]);

@@ -1,6 +1,7 @@
 //! What a render writes: pictures, layers and figures.
 
 use wgray::cpu::Cpu;
+use wgray::film::Region;
 use wgray::image::{difference, encode, read_exr};
 use wgray::job::{self, Cut};
 
@@ -191,6 +192,150 @@ fn adaptive_sampling_and_its_layers_are_those_of_the_library() {
             "{pixel:?} for {count}"
         );
     }
+}
+
+/// The small scene, along paths, before a transparent background.
+fn path_scene(settings: &str) -> String {
+    SCENE
+        .replace("[render]", &format!("[render]\nintegrator = \"path\"\n{settings}"))
+        .replace("ambient = [0.1, 0.1, 0.1]\n", "")
+        .replace("light_samples = { pattern = \"grid\", count = 4 }\n", "")
+        .replace("type = \"plane\"", "type = \"rectangle\"\nsize = [3, 3]")
+        .replace("point = [0, 0, 0]", "center = [0, 0, 0]")
+        .replace("\"phong\"", "\"diffuse\"\nemission = [0.1, 0.2, 0.7]")
+}
+
+#[test]
+fn layers_of_paths_are_those_of_the_film() {
+    const NAMES: [&str; 5] = ["emission", "direct", "indirect", "albedo", "shading_normal"];
+    let place = Place::new();
+    let inner = Region {
+        x0: 1,
+        y0: 1,
+        x1: 9,
+        y1: 6,
+    };
+    for (alpha, region) in [(false, Region::whole(10, 6)), (true, inner)] {
+        let text = path_scene(if alpha { "alpha = true" } else { "" });
+        place.write("path.toml", &text);
+        let scene = parse(&text).with_layers();
+        let film = film(&mut Cpu::new(&scene), &scene, region, &Cut::default());
+        let hits = job::first_hits(&mut Cpu::new(&scene), region).unwrap();
+        for device in ["gpu", "cpu"] {
+            if device == "gpu" && !crate::adapter::device().is_some_and(crate::adapter::bit_exact) {
+                continue;
+            }
+            let (names, region) = ([&NAMES[..], &["depth"]].concat().join(","), region.to_string());
+            let options = ["-o", "out.exr", "--aov", &names, "--crop", &region, "--device", device];
+            place.quietly(&[&["render", "path.toml"], &options[..]].concat());
+            let image = exr::prelude::read_first_flat_layer_from_file(place.path("out.exr")).unwrap();
+            let channels = &image.layer_data.channel_data.list;
+            assert_eq!(channels.len(), if alpha { 20 } else { 19 });
+            let mut seen = Vec::new();
+            for channel in channels {
+                let exr::prelude::FlatSamples::F32(found) = &channel.sample_data else {
+                    panic!("{}: no floats", channel.name);
+                };
+                let name = channel.name.to_string();
+                let (layer, part) = name.split_once('.').unwrap_or(("", &name));
+                let i = ["R", "G", "B", "X", "Y", "Z"].iter().position(|known| *known == part);
+                let of = NAMES.iter().position(|known| *known == layer);
+                let expected: Vec<f32> = (0..film.sums.len())
+                    .map(|pixel| match (name.as_str(), of, i) {
+                        ("A", ..) => film.layers[0][pixel].w / film.sums[pixel].w,
+                        ("depth.Z", ..) => hits[pixel].depth,
+                        (_, Some(of), Some(i)) => film.layers[of][pixel][i % 3] / film.sums[pixel].w,
+                        (_, None, Some(i)) => film.sums[pixel][i] / film.sums[pixel].w,
+                        _ => panic!("{name}: what is this?"),
+                    })
+                    .collect();
+                assert_eq!(found.to_vec(), expected, "{name}, {device}");
+                assert!(
+                    !seen.contains(&expected),
+                    "{name} is another channel's: the comparison cannot fail"
+                );
+                seen.push(expected);
+            }
+        }
+    }
+}
+
+#[test]
+fn layers_of_paths_are_refused_without_paths() {
+    let place = Place::new();
+    for name in ["albedo", "direct", "indirect", "emission"] {
+        let names = format!("depth,{name}");
+        let ran = place.run(&["render", "small.toml", "-o", "out.exr", "--aov", &names]);
+        let message = format!("error: --aov {name}: needs integrator = \"path\", as with --integrator path\n");
+        assert_eq!((ran.code, ran.stderr), (2, message));
+    }
+    assert_eq!(place.files(), [""; 0]);
+    place.quietly(&["render", "small.toml", "-o", "out.exr", "--aov", "shading_normal"]);
+}
+
+#[test]
+fn layers_of_paths_are_pictures_beside_a_png() {
+    let place = Place::new();
+    let text = path_scene("alpha = true");
+    place.write("path.toml", &text);
+    place.quietly(&[
+        "render",
+        "path.toml",
+        "-o",
+        "out.png",
+        "--aov",
+        "albedo,direct,indirect,emission,shading_normal",
+        "--device",
+        "cpu",
+    ]);
+    let film = reference(&parse(&text));
+    let layers = ["emission", "direct", "indirect", "albedo"];
+    for (list, name) in film.layers.iter().zip(layers) {
+        let expected: Vec<u8> = list
+            .iter()
+            .zip(&film.sums)
+            .flat_map(|(light, sum)| [0, 1, 2].map(|i| encode(light[i] / sum.w)))
+            .collect();
+        assert_eq!(
+            read_png(&place.path(&format!("out.{name}.png"))),
+            (10, 6, expected),
+            "{name}"
+        );
+    }
+    // Each sample's normal has a colour, or none where nothing is hit; these are mixed.
+    let (_, _, normals) = read_png(&place.path("out.shading_normal.png"));
+    for (i, found) in normals.chunks(3).enumerate() {
+        let (sum, share) = (film.layers[4][i] / film.sums[i].w, film.alpha(i));
+        for (part, found) in found.iter().enumerate() {
+            let expected = (sum[part] * 0.5 + share * 0.5) * 255.0;
+            assert!(
+                (f32::from(*found) - expected).abs() <= 0.51,
+                "pixel {i}: {found} for {expected}"
+            );
+        }
+    }
+    let picture = image::open(place.path("out.png")).unwrap();
+    let image::DynamicImage::ImageRgba8(picture) = picture else {
+        panic!("no alpha");
+    };
+    let (mut none, mut some, mut all) = (0, 0, 0);
+    for (i, (pixel, sum)) in picture.pixels().zip(&film.sums).enumerate() {
+        let (mean, alpha) = (sum.truncate() / sum.w, film.alpha(i));
+        let color = |value: f32| if alpha == 0.0 { 0 } else { encode(value / alpha) };
+        let expected = [mean.x, mean.y, mean.z].map(color);
+        assert_eq!(
+            (&pixel.0[..3], pixel.0[3]),
+            (&expected[..], (alpha * 255.0).round() as u8),
+            "pixel {i}"
+        );
+        match alpha {
+            0.0 => none += 1,
+            1.0 => all += 1,
+            // Colours that were weighted would be darker.
+            _ => some += usize::from(pixel.0[..3] != [mean.x, mean.y, mean.z].map(encode)),
+        }
+    }
+    assert!(none > 5 && some > 3 && all > 5, "{none}, {some}, {all}");
 }
 
 #[test]

@@ -65,7 +65,7 @@ tangent = [1, 0, 0]
 /// A shader whose picture depends on every line.
 pub const KERNEL: &str = "shaders/kernels/render.wgsl";
 /// What it adds up.
-pub const RADIANCE: &str = "pixel_radiance(pixel, sample)";
+pub const RADIANCE: &str = "path_value(path)";
 
 /// A scene and shaders in a folder of their own.
 pub struct Files {

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use wgray::mesh::{Mesh, MeshError, Normals};
-use wgray::scene::{Color, Material, Scene};
+use wgray::scene::{Color, Reflection, Scene};
 
 use super::load;
 use super::readers::in_all_formats;
@@ -421,13 +421,12 @@ fn check_mtl(folder: &std::path::Path, mtl: &[u8]) -> bool {
     match Scene::parse(scene, &origin) {
         Ok(scene) => {
             for material in &scene.materials {
-                let Material::Phong {
+                let Reflection::Phong {
                     ambient,
                     diffuse,
                     specular,
                     shininess,
-                    ..
-                } = material
+                } = &material.reflection
                 else {
                     panic!("{material:?}")
                 };

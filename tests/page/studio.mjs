@@ -63,7 +63,7 @@ tangent = [1, 0, 0]
 `;
 
 const KERNEL = "shaders/kernels/render.wgsl";
-const RADIANCE = "pixel_radiance(pixel, sample)";
+const RADIANCE = "path_value(path)";
 
 // A scene and shaders in a folder, and the program that watches them.
 export class Studio {
@@ -97,11 +97,11 @@ export class Studio {
   }
 
   breakShader() {
-    this.edit(KERNEL, RADIANCE, "pixel_radiance(pixel, simple)");
+    this.edit(KERNEL, RADIANCE, "path_value(simple)");
   }
 
   mendShader() {
-    this.edit(KERNEL, "simple", "sample");
+    this.edit(KERNEL, "simple", "path");
   }
 
   // The line of the broken shader, counted from 1.

@@ -138,7 +138,7 @@ fn textures() -> impl Strategy<Value = BTreeMap<String, TextureDescription>> {
     })
 }
 
-fn material() -> impl Strategy<Value = MaterialDescription> {
+fn material() -> BoxedStrategy<MaterialDescription> {
     let shininess =
         prop_oneof![3 => select(&[16.0, 1.0, 2.0, 50.0, 4096.0][..]), 1 => select(&[2.5, 0.5, 1e5, 1e-3][..])];
     let phong = (paint(), paint(), paint(), shininess).prop_map(|(ambient, diffuse, specular, shininess)| {
@@ -149,11 +149,16 @@ fn material() -> impl Strategy<Value = MaterialDescription> {
             specular: Some(specular),
             shininess,
             normal_map: None,
+            emission: None,
         })
     });
     let mirror = color(1.0).prop_map(|tint| {
         let tint = ColorDescription::Plain(tint);
-        MaterialDescription::Mirror(MirrorDescription { tint, normal_map: None })
+        MaterialDescription::Mirror(MirrorDescription {
+            tint,
+            normal_map: None,
+            emission: None,
+        })
     });
     let glass = (color(1.0), select(&[1.5, 1.0, 0.7, 2.4][..])).prop_map(|(tint, ior)| {
         let tint = ColorDescription::Plain(tint);
@@ -161,9 +166,91 @@ fn material() -> impl Strategy<Value = MaterialDescription> {
             ior,
             tint,
             normal_map: None,
+            emission: None,
         })
     });
-    prop_oneof![6 => phong, 1 => mirror, 1 => glass]
+    prop_oneof![6 => phong, 1 => mirror, 1 => glass].boxed()
+}
+
+/// What paths have more: shines, often; two dark ones among three.
+fn emission() -> impl Strategy<Value = Option<ColorDescription>> {
+    let texture = select(&["checker", "lines", "constant"][..]).prop_map(str::to_string);
+    prop_oneof![
+        6 => Just(None),
+        2 => color(5.0).prop_map(|color| Some(ColorDescription::Plain(color))),
+        1 => texture.prop_map(|texture| Some(ColorDescription::Texture(TextureReference { texture }))),
+    ]
+}
+
+/// A material of any kind, for paths.
+fn material_of_paths() -> BoxedStrategy<MaterialDescription> {
+    let texture = select(&["checker", "lines"][..]).prop_map(str::to_string);
+    let roughness = prop_oneof![
+        2 => Just(ValueDescription::Plain(0.0)),
+        1 => (0.0..=1.0).prop_map(ValueDescription::Plain),
+        1 => texture.prop_map(|texture| ValueDescription::Texture(TextureReference { texture })),
+    ];
+    let diffuse = (paint(), roughness).prop_map(|(color, roughness)| {
+        let mut diffuse = DiffuseDescription::new(color);
+        diffuse.roughness = roughness;
+        MaterialDescription::Diffuse(diffuse)
+    });
+    let conductor = paint().prop_map(|color| MaterialDescription::Conductor(ConductorDescription::new(color)));
+    let absorption = prop_oneof![Just(DVec3::ZERO), color(3.0)];
+    let dielectric = (select(&[1.5, 1.0, 0.7, 2.4][..]), paint(), absorption).prop_map(|(ior, color, absorption)| {
+        let mut dielectric = DielectricDescription::new(ior);
+        (dielectric.color, dielectric.absorption) = (color, absorption);
+        MaterialDescription::Dielectric(dielectric)
+    });
+    let any = prop_oneof![4 => diffuse, 1 => conductor, 1 => dielectric, 3 => material()];
+    (any, emission())
+        .prop_map(|(mut material, emission)| {
+            let own = match &mut material {
+                MaterialDescription::Phong(m) => &mut m.emission,
+                MaterialDescription::Mirror(m) => &mut m.emission,
+                MaterialDescription::Glass(m) => &mut m.emission,
+                MaterialDescription::Diffuse(m) => &mut m.emission,
+                MaterialDescription::Conductor(m) => &mut m.emission,
+                MaterialDescription::Dielectric(m) => &mut m.emission,
+                other => panic!("no random scene has the material {other:?}"),
+            };
+            *own = emission;
+            material
+        })
+        .boxed() // the tree of a strategy that is not is on the stack
+}
+
+/// What a scene has for the integrator `path`.
+#[derive(Clone, Debug)]
+struct OfPaths {
+    materials: [MaterialDescription; 3],
+    environment: Option<DVec3>,
+    max_depth: u32,
+    rr_depth: Option<u32>,
+    clamp: Option<f64>,
+    alpha: bool,
+}
+
+fn of_paths() -> BoxedStrategy<OfPaths> {
+    let materials = [material_of_paths(), material_of_paths(), material_of_paths()];
+    let environment = prop::option::of(color(1.0));
+    let depths = (
+        select(&[0, 1, 2, 5, 12][..]),
+        prop::option::of(select(&[0, 1, 3, 1024][..])),
+    );
+    let clamp = prop::option::of(select(&[0.1, 2.0][..]));
+    (materials, environment, depths, clamp, any::<bool>())
+        .prop_map(
+            |(materials, environment, (max_depth, rr_depth), clamp, alpha)| OfPaths {
+                materials,
+                environment,
+                max_depth,
+                rr_depth,
+                clamp,
+                alpha,
+            },
+        )
+        .boxed()
 }
 
 fn light() -> impl Strategy<Value = LightDescription> {
@@ -429,12 +516,20 @@ fn render() -> impl Strategy<Value = RenderDescription> {
 
 /// Scenes of everything.
 pub fn description() -> impl Strategy<Value = Description> {
-    described((shapes(), meshes()))
+    described((shapes(), meshes()), prop::option::of(of_paths()))
+}
+
+/// Scenes of the integrator `phong`.
+pub fn of_direct_light() -> impl Strategy<Value = Description> {
+    described((shapes(), meshes()), Just(None))
 }
 
 /// Scenes of a few primitives, none of which is in a tree.
 pub fn without_trees() -> impl Strategy<Value = Description> {
-    described((prop::collection::vec(shape(), 0..7), Just(Default::default())))
+    described(
+        (prop::collection::vec(shape(), 0..7), Just(Default::default())),
+        Just(None),
+    )
 }
 
 type Shapes = (
@@ -442,12 +537,16 @@ type Shapes = (
     (BTreeMap<String, MeshFileDescription>, Vec<InstanceDescription>),
 );
 
-fn described(shapes: impl Strategy<Value = Shapes>) -> impl Strategy<Value = Description> {
+fn described(
+    shapes: impl Strategy<Value = Shapes>,
+    paths: impl Strategy<Value = Option<OfPaths>> + 'static,
+) -> impl Strategy<Value = Description> {
     let lights = prop::collection::vec(light(), 0..4);
     let materials = [material(), material(), material()];
     let size = (1u32..25, 1u32..25);
     let place = (select(&[1.0, 1.0, 0.001, 1000.0][..]), select(&[0.0, 0.0, 100.0][..]));
-    (shapes, lights, materials, textures(), camera(), render(), size, place)
+    let settings = (render().boxed(), paths.boxed());
+    (shapes, lights, materials, textures(), camera(), settings, size, place)
         .prop_map(
             |(
                 (shapes, (meshes, instances)),
@@ -455,12 +554,13 @@ fn described(shapes: impl Strategy<Value = Shapes>) -> impl Strategy<Value = Des
                 materials,
                 textures,
                 camera,
-                render,
+                (render, paths),
                 (width, height),
                 (scale, offset),
             )| {
                 let names = ["a", "b", "c"].map(str::to_string);
                 let mut d = Description {
+                    environment: None,
                     image: ImageDescription { width, height },
                     camera,
                     render,
@@ -471,6 +571,19 @@ fn described(shapes: impl Strategy<Value = Shapes>) -> impl Strategy<Value = Des
                     meshes,
                     instances,
                 };
+                if let Some(paths) = paths {
+                    let names = ["a", "b", "c"].map(str::to_string);
+                    d.materials = names.into_iter().zip(paths.materials).collect();
+                    if let Some(color) = paths.environment {
+                        d.render.background = DVec3::ZERO;
+                        d.environment = Some(EnvironmentDescription::new(color));
+                    }
+                    d.render.integrator = Integrator::Path;
+                    d.render.max_depth = paths.max_depth;
+                    d.render.rr_depth = paths.rr_depth;
+                    d.render.clamp = paths.clamp;
+                    d.render.alpha = paths.alpha.then_some(true);
+                }
                 moved(&mut d, scale, DVec3::new(offset, -offset, offset));
                 d
             },

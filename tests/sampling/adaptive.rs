@@ -108,7 +108,7 @@ fn wanted(packed: &Packed, pixel: UVec2, first: u32, error: f64, most: u32) -> O
         else {
             continue;
         };
-        let values = (0..first).map(|i| pixel_radiance(packed, UVec2::new(x, y), i).truncate().as_dvec3());
+        let values = (0..first).map(|i| pixel_radiance(packed, UVec2::new(x, y), i).0.truncate().as_dvec3());
         let (mut n, mut mean, mut sum) = (0.0, DVec3::ZERO, DVec3::ZERO);
         for value in values {
             n += 1.0;
@@ -240,7 +240,7 @@ fn moments_are_the_variance_of_the_samples() {
     for (pixel, sum) in film.sums.iter().enumerate() {
         let at = UVec2::new(pixel as u32 % 41, pixel as u32 / 41);
         let n = film.sample_count(pixel);
-        let values: Vec<_> = (0..n).map(|i| pixel_radiance(&packed, at, i).as_dvec4()).collect();
+        let values: Vec<_> = (0..n).map(|i| pixel_radiance(&packed, at, i).0.as_dvec4()).collect();
         let mean = values.iter().map(|v| v.truncate()).sum::<glam::DVec3>() / f64::from(n);
         let deviations: glam::DVec3 = values
             .iter()

@@ -7,8 +7,9 @@ use wgray::cpu::camera::{camera_differential, camera_ray};
 use wgray::cpu::differential::{Arrival, reflected_derivative};
 use wgray::cpu::footprint::surface_footprint;
 use wgray::cpu::geometry::{arrival_of, closest_hit, footprint_of, material_of, spot_of, surface_of};
-use wgray::cpu::integrators::phong::{is_specular, scatter};
+use wgray::cpu::integrators::phong::scatter;
 use wgray::cpu::path::Path;
+use wgray::cpu::path::is_specular;
 use wgray::cpu::surface::{Surface, with_coordinates};
 use wgray::pack::{NOTHING, NOWHERE, Packed, Primitive};
 

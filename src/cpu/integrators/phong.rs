@@ -6,7 +6,7 @@ use crate::cpu::differential::Differential;
 use crate::cpu::geometry::{arrival_of, closest_hit, hidden_samples, material_of, spot_of, surface_of};
 use crate::cpu::light::segments_to_light;
 use crate::cpu::mesh::Spot;
-use crate::cpu::path::{Path, Scattered, glass_path, mirrored_path, usable_normal};
+use crate::cpu::path::{Path, Scattered, glass_path, is_specular, mirrored_path, usable_normal};
 use crate::cpu::phong::{Lobes, phong_block, unlit_samples};
 use crate::cpu::ray::{Hit, Ray};
 use crate::cpu::rng::unit_float;
@@ -14,7 +14,7 @@ use crate::cpu::sampling::{decision_bits, sample_key};
 use crate::cpu::shadow::Block;
 use crate::cpu::surface::Surface;
 use crate::cpu::texture::appearance;
-use crate::pack::{BLOCK, EMITTER, GLASS, GRID, LEAVES, Light, MIRROR, Material, NOTHING, NOWHERE, Packed, SPLITS};
+use crate::pack::{BLOCK, EMITTER, GRID, LEAVES, Light, MIRROR, Material, NOTHING, NOWHERE, Packed, SPLITS};
 
 pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVec2, sample: u32) -> Vec3 {
     let bounces = scene.specialization.bounces;
@@ -67,10 +67,6 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
         path = pending[waiting];
     }
     sum
-}
-
-pub fn is_specular(material: &Material) -> bool {
-    (material.kind == MIRROR) | (material.kind == GLASS)
 }
 
 pub fn scatter(scene: &Packed, spot: &Spot, hit: Hit, path: Path, pixel: UVec2, sample: u32) -> Scattered {

@@ -54,6 +54,31 @@ pub fn closest<S: Simd>(simd: S, mesh: &Mesh, line: &Line, start: f32, skip: u32
     best
 }
 
+/// See [`super::any`].
+#[inline(always)]
+pub fn any<S: Simd>(simd: S, mesh: &Mesh, line: &Line, skip: u32, reach: f32) -> bool {
+    let mut found = false;
+    leaves(
+        simd,
+        mesh.nodes,
+        line,
+        reach,
+        #[inline(always)]
+        |items, limit| {
+            for triangles in mesh.triangles[items].chunks(4) {
+                let (mut met, t) = Four::new(simd, mesh, triangles).met_by(simd, line);
+                while met != 0 {
+                    let i = met.trailing_zeros() as usize;
+                    met &= met - 1;
+                    found |= t[i] > 0.0 && t[i] < reach && triangles[i][3] != skip;
+                }
+            }
+            if found { f32::NEG_INFINITY } else { limit }
+        },
+    );
+    found
+}
+
 /// See [`super::leaves`].
 #[inline(always)]
 pub fn leaves<S: Simd>(

@@ -58,6 +58,11 @@ pub fn closest(level: Level, mesh: &Mesh, line: &Line, start: f32, skip: u32, be
     dispatch!(level, simd => closest::closest(simd, mesh, line, start, skip, best))
 }
 
+/// Whether a ray meets any triangle before `reach` lengths of its direction, but for the one with the number `skip`.
+pub fn any(level: Level, mesh: &Mesh, line: &Line, skip: u32, reach: f32) -> bool {
+    dispatch!(level, simd => closest::any(simd, mesh, line, skip, reach))
+}
+
 /// Visits the leaves of a tree that a ray meets before `limit`, nearly in the order in which it does: `visit` is given a range of
 /// the tree's order and the limit, and gives the limit from then on, which is not greater.
 pub fn leaves(level: Level, nodes: &[Node], line: &Line, limit: f32, visit: impl FnMut(Range<usize>, f32) -> f32) {

@@ -1,10 +1,11 @@
 //! What a scene file says of materials.
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::tagged::{ReadError, Tagged, tagged};
-use super::{ColorDescription, NormalMapDescription};
+use super::{ColorDescription, NormalMapDescription, ValueDescription};
 
 tagged! {
     /// `[materials.NAME]`
@@ -15,6 +16,12 @@ tagged! {
         "mirror" => Mirror(MirrorDescription),
         /// Clear glass.
         "glass" => Glass(GlassDescription),
+        /// Matt, for `integrator = "path"`.
+        "diffuse" => Diffuse(DiffuseDescription),
+        /// Polished metal, for `integrator = "path"`.
+        "conductor" => Conductor(ConductorDescription),
+        /// Clear glass or liquid, for `integrator = "path"`.
+        "dielectric" => Dielectric(DielectricDescription),
     }
 }
 
@@ -35,6 +42,8 @@ pub struct PhongDescription {
     pub shininess: f64,
     /// What bends its normals.
     pub normal_map: Option<NormalMapDescription>,
+    /// Radiance that it sends out, for `integrator = "path"`; black if absent.
+    pub emission: Option<ColorDescription>,
 }
 
 impl PhongDescription {
@@ -47,6 +56,7 @@ impl PhongDescription {
             specular: None,
             shininess: sixteen(),
             normal_map: None,
+            emission: None,
         }
     }
 }
@@ -60,6 +70,8 @@ pub struct MirrorDescription {
     pub tint: ColorDescription,
     /// What bends its normals.
     pub normal_map: Option<NormalMapDescription>,
+    /// Radiance that it sends out, for `integrator = "path"`; black if absent.
+    pub emission: Option<ColorDescription>,
 }
 
 /// Clear glass.
@@ -73,6 +85,8 @@ pub struct GlassDescription {
     pub tint: ColorDescription,
     /// What bends its normals.
     pub normal_map: Option<NormalMapDescription>,
+    /// Radiance that it sends out, for `integrator = "path"`; black if absent.
+    pub emission: Option<ColorDescription>,
 }
 
 impl GlassDescription {
@@ -82,6 +96,89 @@ impl GlassDescription {
             ior,
             tint: ColorDescription::default(),
             normal_map: None,
+            emission: None,
+        }
+    }
+}
+
+/// A matt surface.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct DiffuseDescription {
+    /// The share of the light that it reflects.
+    pub color: ColorDescription,
+    /// How rough it is, 0 to 1.
+    #[serde(default)]
+    pub roughness: ValueDescription,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
+    /// Radiance that it sends out; black if absent.
+    pub emission: Option<ColorDescription>,
+}
+
+impl DiffuseDescription {
+    /// A smooth one that reflects this share of the light.
+    pub fn new(color: impl Into<ColorDescription>) -> Self {
+        Self {
+            color: color.into(),
+            roughness: ValueDescription::default(),
+            normal_map: None,
+            emission: None,
+        }
+    }
+}
+
+/// Polished metal.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConductorDescription {
+    /// The share of the light that it reflects.
+    #[serde(default)]
+    pub color: ColorDescription,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
+    /// Radiance that it sends out; black if absent.
+    pub emission: Option<ColorDescription>,
+}
+
+impl ConductorDescription {
+    /// Metal that reflects this share of the light.
+    pub fn new(color: impl Into<ColorDescription>) -> Self {
+        Self {
+            color: color.into(),
+            normal_map: None,
+            emission: None,
+        }
+    }
+}
+
+/// Clear glass or liquid.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct DielectricDescription {
+    /// Index of refraction.
+    pub ior: f64,
+    /// Factor of the light that passes the surface.
+    #[serde(default)]
+    pub color: ColorDescription,
+    /// How much light it swallows, for each unit of length.
+    #[serde(default)]
+    pub absorption: DVec3,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
+    /// Radiance that it sends out; black if absent.
+    pub emission: Option<ColorDescription>,
+}
+
+impl DielectricDescription {
+    /// One that colours no light.
+    pub fn new(ior: f64) -> Self {
+        Self {
+            ior,
+            color: ColorDescription::default(),
+            absorption: DVec3::ZERO,
+            normal_map: None,
+            emission: None,
         }
     }
 }

@@ -38,6 +38,9 @@ pub struct Description {
     pub camera: CameraDescription,
     /// `[render]`
     pub render: RenderDescription,
+    /// `[environment]`
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub environment: Option<EnvironmentDescription>,
     /// `[textures.NAME]`
     pub textures: BTreeMap<String, TextureDescription>,
     /// `[materials.NAME]`
@@ -61,6 +64,7 @@ impl Description {
             image: ImageDescription { width, height },
             camera: camera.into(),
             render: RenderDescription::default(),
+            environment: None,
             textures: BTreeMap::new(),
             materials: BTreeMap::new(),
             lights: Vec::new(),
@@ -73,6 +77,12 @@ impl Description {
     /// The scene with other settings.
     pub fn with_render(mut self, render: RenderDescription) -> Self {
         self.render = render;
+        self
+    }
+
+    /// The scene with other surroundings.
+    pub fn with_environment(mut self, environment: EnvironmentDescription) -> Self {
+        self.environment = Some(environment);
         self
     }
 
@@ -212,6 +222,21 @@ impl OrthographicDescription {
             up: z_up(),
             height,
         }
+    }
+}
+
+/// What surrounds the scene, for `integrator = "path"`.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct EnvironmentDescription {
+    /// Radiance from everywhere; linear RGB.
+    pub color: DVec3,
+}
+
+impl EnvironmentDescription {
+    /// This radiance from everywhere, in linear RGB.
+    pub fn new(color: impl Into<DVec3>) -> Self {
+        Self { color: color.into() }
     }
 }
 

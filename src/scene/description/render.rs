@@ -19,8 +19,17 @@ pub struct RenderDescription {
     pub shadow_epsilon: f64,
     /// Whether glass casts shadows.
     pub shadows: Shadows,
-    /// Most bounces of a path by mirrors and glass.
+    /// Most bounces of a path; under `"phong"` by mirrors and glass.
     pub max_depth: u32,
+    /// From which bounce on a path may end at random, for `integrator = "path"`; absent, 5.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rr_depth: Option<u32>,
+    /// Most of what a sample of indirect light may add, for `integrator = "path"`; absent, all of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clamp: Option<f64>,
+    /// Whether the background is transparent, for `integrator = "path"`; absent, it is not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alpha: Option<bool>,
     /// Whether textures are filtered over the footprint of each ray.
     pub ray_differentials: bool,
     /// Seed of all random patterns.
@@ -39,7 +48,7 @@ pub struct RenderDescription {
 impl Default for RenderDescription {
     fn default() -> Self {
         let samples = SamplesDescription {
-            pattern: Pattern::Grid,
+            pattern: None,
             count: 16,
         };
         Self {
@@ -49,6 +58,9 @@ impl Default for RenderDescription {
             shadow_epsilon: 0.0,
             shadows: Shadows::Opaque,
             max_depth: 8,
+            rr_depth: None,
+            clamp: None,
+            alpha: None,
             ray_differentials: true,
             seed: 0,
             pixel_samples: samples.clone(),
@@ -69,11 +81,26 @@ impl Default for RenderDescription {
     expecting = "a table, such as { pattern = \"grid\", count = 16 }"
 )]
 pub struct SamplesDescription {
-    /// How they are laid out.
-    #[serde(default)]
-    pub pattern: Pattern,
+    /// How they are laid out; absent, as [`SamplesDescription::pattern()`] says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pattern: Option<Pattern>,
     /// How many.
     pub count: u32,
+}
+
+impl SamplesDescription {
+    /// So many, laid out as is usual for the integrator.
+    pub fn new(count: u32) -> Self {
+        Self { pattern: None, count }
+    }
+
+    /// How they are laid out: if nothing is said `"sobol"` under `"path"`, else `"grid"`.
+    pub fn pattern(&self, integrator: Integrator) -> Pattern {
+        self.pattern.unwrap_or(match integrator {
+            Integrator::Phong => Pattern::Grid,
+            Integrator::Path => Pattern::Sobol,
+        })
+    }
 }
 
 /// How samples are laid out on the unit square. In a file the names are in snake case: `"grid"`.

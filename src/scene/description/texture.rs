@@ -66,6 +66,69 @@ impl<'de> Deserialize<'de> for ColorDescription {
     }
 }
 
+/// A number of a material: `0.5` or `{ texture = "NAME" }`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum ValueDescription {
+    /// The same everywhere.
+    Plain(f64),
+    /// A texture's red.
+    Texture(TextureReference),
+}
+
+impl Default for ValueDescription {
+    /// 0.
+    fn default() -> Self {
+        Self::Plain(0.0)
+    }
+}
+
+impl From<f64> for ValueDescription {
+    fn from(value: f64) -> Self {
+        Self::Plain(value)
+    }
+}
+
+impl ValueDescription {
+    /// The red of a texture, by its name.
+    pub fn texture(name: impl Into<String>) -> Self {
+        Self::Texture(TextureReference { texture: name.into() })
+    }
+}
+
+// By hand, as that of colours.
+impl<'de> Deserialize<'de> for ValueDescription {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct ValueVisitor;
+
+        impl<'de> Visitor<'de> for ValueVisitor {
+            type Value = ValueDescription;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a number or { texture = NAME }")
+            }
+
+            fn visit_f64<E>(self, value: f64) -> Result<Self::Value, E> {
+                Ok(ValueDescription::Plain(value))
+            }
+
+            fn visit_i64<E>(self, value: i64) -> Result<Self::Value, E> {
+                Ok(ValueDescription::Plain(value as f64))
+            }
+
+            fn visit_u64<E>(self, value: u64) -> Result<Self::Value, E> {
+                Ok(ValueDescription::Plain(value as f64))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+                TextureReference::deserialize(MapAccessDeserializer::new(map)).map(ValueDescription::Texture)
+            }
+        }
+
+        deserializer.deserialize_any(ValueVisitor)
+    }
+}
+
 /// `{ texture = "NAME" }`
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, expecting = "a table, such as { texture = \"NAME\" }")]

@@ -13,6 +13,7 @@ use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
 use self::parts::{Broken, Kind, LARGEST, Parts};
+use super::Integrator;
 use super::course;
 use super::description::tagged::{ReadError, Tagged};
 use super::description::{
@@ -20,7 +21,7 @@ use super::description::{
     TextureDescription,
 };
 use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
-use super::validate::{DEEPEST, MOST};
+use super::validate::{DEEPEST, MOST, depths};
 
 pub(super) use syntax::{NOT_UTF8, syntax_error};
 
@@ -114,6 +115,7 @@ struct Sections {
     camera: Table,
     #[serde(default)]
     render: Table,
+    environment: Option<Table>,
     #[serde(default)]
     textures: BTreeMap<String, Table>,
     #[serde(default)]
@@ -134,6 +136,7 @@ fn read_file(file: Table) -> Result<Description, Problem> {
         image: read(sections.image).at("image")?,
         camera: read_tagged(sections.camera, Some("perspective")).at("camera")?,
         render: read(sections.render).at("render")?,
+        environment: sections.environment.map(read).transpose().at("environment")?,
         textures: read_map(sections.textures, tagged).at("textures")?,
         materials: read_map(sections.materials, tagged).at("materials")?,
         lights: read_list(sections.lights, tagged).at("lights")?,
@@ -246,9 +249,16 @@ fn tagged<T: Tagged>(table: Table) -> Read<T> {
     read_tagged(table, None)
 }
 
-pub(super) fn read<T: DeserializeOwned>(table: Table) -> Result<T, Problem> {
+fn read<T: DeserializeOwned>(table: Table) -> Result<T, Problem> {
+    let is_said = |integrator: &Integrator| table.get("integrator").and_then(Value::as_str) == Some(integrator.name());
+    let said = Integrator::ALL.into_iter().find(is_said);
+    read_for(table, said.unwrap_or(Integrator::Phong))
+}
+
+/// Reads a table. What it may say depends on the integrator.
+pub(super) fn read_for<T: DeserializeOwned>(table: Table, integrator: Integrator) -> Result<T, Problem> {
     // The copy is for the message: reading consumes the values.
-    serde_path_to_error::deserialize(table.clone()).map_err(|error| explain(error, table, false))
+    serde_path_to_error::deserialize(table.clone()).map_err(|error| explain(error, table, false, integrator))
 }
 
 fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) -> Result<T, Problem> {
@@ -262,7 +272,7 @@ fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) -> Result<T, 
     };
     let body = table.clone();
     match tag.as_str().and_then(|tag| T::read(tag, body)) {
-        Some(result) => result.map_err(|error| explain(error, table, true)),
+        Some(result) => result.map_err(|error| explain(error, table, true, Integrator::Phong)),
         None => {
             let message = format!("{} must be one of {}", show(&tag), list(T::TYPES));
             Err(Problem::new(message).at("type"))
@@ -292,7 +302,7 @@ fn show(value: &Value) -> String {
 }
 
 /// Makes a problem of serde's error while reading `table`, which has lost its key `type` if it is `tagged`.
-fn explain(error: ReadError, table: Table, tagged: bool) -> Problem {
+fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator) -> Problem {
     let mut path = segments(error.path());
     let mut value = Some(&Value::Table(table));
     for segment in &path {
@@ -321,7 +331,7 @@ fn explain(error: ReadError, table: Table, tagged: bool) -> Problem {
     } else if let (Some((_, expected)), Some(value)) = (message.rsplit_once(", expected "), value) {
         let rule = match expected {
             "f64" => "a number",
-            "u32" => &whole(path.last()),
+            "u32" => &whole(path.last(), integrator),
             "a sequence of 3 f64 values" => "a list of 3 numbers",
             "an array of length 2" => "a list of 2 numbers",
             "an array of length 3" => "a list of 3 points",
@@ -356,10 +366,11 @@ pub(super) fn segments(path: &serde_path_to_error::Path) -> Vec<Segment> {
 }
 
 /// What a key's whole number must be. How small it may be exactly is checked later, beside other keys.
-fn whole(key: Option<&Segment>) -> String {
+fn whole(key: Option<&Segment>, integrator: Integrator) -> String {
     let (low, high) = match key {
         Some(Segment::Key(key)) if key == "seed" => (0, u32::MAX),
-        Some(Segment::Key(key)) if key == "max_depth" => (1, DEEPEST),
+        Some(Segment::Key(key)) if key == "max_depth" => depths(integrator),
+        Some(Segment::Key(key)) if key == "rr_depth" => (0, DEEPEST),
         _ => (1, MOST),
     };
     format!("a whole number from {low} to {high}")

@@ -38,7 +38,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[film]\n",
             1,
-            "film: unknown key; the keys here are \"image\", \"camera\", \"render\", \"textures\", \"materials\", \"lights\", \"shapes\", \"meshes\", \"instances\"",
+            "film: unknown key; the keys here are \"image\", \"camera\", \"render\", \"environment\", \"textures\", \"materials\", \"lights\", \"shapes\", \"meshes\", \"instances\"",
         ),
         (
             "type = 'fisheye'",
@@ -71,9 +71,44 @@ fn bad_text_is_told_with_its_line() {
             "render.seed: 1.5 must be a whole number from 0 to 4294967295",
         ),
         (
-            "[render]\nintegrator = 'path'",
+            "[render]\nintegrator = 'paths'",
             2,
-            "render.integrator: \"path\" must be \"phong\"",
+            "render.integrator: \"paths\" must be \"phong\" or \"path\"",
+        ),
+        (
+            "[render]\nintegrator = 'path'\nmax_depth = -1",
+            3,
+            "render.max_depth: -1 must be a whole number from 0 to 1024",
+        ),
+        (
+            "[render]\nrr_depth = 1.5",
+            2,
+            "render.rr_depth: 1.5 must be a whole number from 0 to 1024",
+        ),
+        ("[render]\nclamp = 'off'", 2, "render.clamp: \"off\" must be a number"),
+        ("[render]\nalpha = 1", 2, "render.alpha: 1 must be a boolean"),
+        ("[environment]", 1, "environment.color: is missing"),
+        (
+            "[environment]\ncolor = 1",
+            2,
+            "environment.color: 1 must be a list of 3 numbers",
+        ),
+        (
+            "[materials.a]\ntype = 'diffuse'\ncolor = [1, 1, 1]\nroughness = [1, 1, 1]",
+            4,
+            "materials.a.roughness: [1, 1, 1] must be a number or { texture = NAME }",
+        ),
+        (
+            "[materials.a]\ntype = 'diffuse'\ncolor = [1, 1, 1]\nroughness = { file = 'a' }",
+            4,
+            "materials.a.roughness.file: unknown key; the keys here are \"texture\"",
+        ),
+        ("[materials.a]\ntype = 'diffuse'", 1, "materials.a.color: is missing"),
+        ("[materials.a]\ntype = 'dielectric'", 1, "materials.a.ior: is missing"),
+        (
+            "[materials.a]\ntype = 'mirror'\nemission = 1",
+            3,
+            "materials.a.emission: 1 must be a list of 3 numbers or { texture = NAME }",
         ),
         (
             "[render]\n\npixel_samples = { pattern = 'hex', count = 4 }",
@@ -95,7 +130,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[materials.red]\ncolor = [1, 0, 0]",
             1,
-            "materials.red.type: is missing; it is one of \"phong\", \"mirror\", \"glass\"",
+            "materials.red.type: is missing; it is one of \"phong\", \"mirror\", \"glass\", \"diffuse\", \"conductor\", \"dielectric\"",
         ),
         (
             "[materials.\"a b\"]\ntype = 'phong'\nshininess = 'x'",
@@ -248,6 +283,7 @@ fn the_page_has_every_key() {
     check_keys("[camera]\n[image]", "## `[image]`");
     check_keys(&format!("{START}[render]"), "## `[render]`");
     check_keys(&format!("{START}[render.pixel_samples]"), "### Samples");
+    check_keys(&format!("{START}[environment]"), "## `[environment]`");
     check_types::<CameraDescription>(image, "[camera]", "[camera]");
     check_types::<TextureDescription>(START, "[textures.a]", "[textures.NAME]");
     check_types::<MaterialDescription>(START, "[materials.a]", "[materials.NAME]");
@@ -269,8 +305,16 @@ fn the_page_has_the_defaults_of_a_render() {
         .filter(|(_, default)| default != "none")
         .map(|(key, default)| format!("{key} = {default}\n"))
         .collect();
-    let written: RenderDescription = toml::from_str(&text).unwrap();
+    // Those of paths alone are no values of a description, which says nothing of them.
+    let (text, of_paths) = text.split_at(text.find("rr_depth").unwrap());
+    let written: RenderDescription = toml::from_str(text).unwrap();
     assert_eq!(written, RenderDescription::default());
+    assert_eq!(of_paths.lines().count(), 2, "{of_paths}");
+    let scene = |lines: &str| {
+        let text = format!("{START}[render]\nintegrator = 'path'\n{lines}");
+        Scene::parse(&text, "s.toml").unwrap()
+    };
+    assert_eq!(scene(of_paths).render, scene("").render);
 }
 
 #[test]

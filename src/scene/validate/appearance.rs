@@ -8,9 +8,11 @@ use super::super::decode::Header;
 use super::super::image_file::{File, Place};
 use super::super::texture::{levels, words};
 use super::super::{
-    Assets, ColorDescription, Encoding, Image, ImageTextureDescription, Material, MaterialDescription, NormalMap,
-    NormalMapDescription, PhongDescription, Texels, Texture, TextureDescription, TextureKind,
+    Assets, ColorDescription, Encoding, Image, ImageTextureDescription, Integrator, Material, MaterialDescription,
+    NormalMap, NormalMapDescription, PhongDescription, Reflection, Texels, Texture, TextureDescription, TextureKind,
+    Value, ValueDescription,
 };
+use super::path::needs_path;
 use super::{At, BTreeMap, Checked, Color, Problem, between, check, color, list, number, show_pair};
 
 /// What all texels together may take, in bytes, as they are rendered from.
@@ -21,6 +23,8 @@ pub(super) const SHININESS: (f64, f64) = (1e-6, 1e6);
 const DENSEST: f64 = 100.0;
 /// Largest ratio of a footprint's axes.
 const LONGEST_FOOTPRINT: f64 = 64.0;
+/// The most light that is swallowed for each unit of length.
+pub(super) const DARKEST: f64 = 1e6;
 /// The largest factor of, and addend to, a texture coordinate.
 const FARTHEST_COORDINATE: f64 = 1e6;
 
@@ -174,6 +178,8 @@ fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 
 pub(super) struct Textures<'a> {
     pub(super) names: Vec<&'a str>,
     pub(super) textures: &'a [Texture],
+    /// Which materials there are depends on it.
+    pub(super) integrator: Integrator,
 }
 
 impl Textures<'_> {
@@ -195,7 +201,7 @@ impl Textures<'_> {
         })
     }
 
-    /// The factor of a mirror or of glass, which cannot give more light than it gets.
+    /// The factor of a surface that cannot give more light than it gets.
     fn tint(&self, description: &ColorDescription) -> Checked<Color> {
         if let ColorDescription::Plain(tint) = description {
             for x in tint.to_array() {
@@ -225,29 +231,80 @@ impl Textures<'_> {
         Ok(Some(NormalMap { texture, strength }))
     }
 
-    pub(super) fn material(&self, description: &MaterialDescription) -> Checked<Material> {
+    fn value(&self, description: &ValueDescription) -> Checked<Value> {
         Ok(match description {
+            ValueDescription::Plain(plain) => Value::Plain(between(*plain, 0.0, 1.0)?),
+            ValueDescription::Texture(reference) => Value::Texture(self.find(&reference.texture)?),
+        })
+    }
+
+    fn emission(&self, description: &Option<ColorDescription>) -> Checked<Color> {
+        let Some(emission) = description else {
+            return Ok(Color::BLACK);
+        };
+        needs_path(self.integrator)?;
+        self.color(emission)
+    }
+
+    /// Only paths have this type.
+    fn of_path(&self, tag: &str) -> Checked<()> {
+        let named = |problem: Problem| Problem::new(format!("{tag:?} {}", problem.message));
+        needs_path(self.integrator).map_err(named).at("type")
+    }
+
+    pub(super) fn material(&self, description: &MaterialDescription) -> Checked<Material> {
+        let (reflection, normal_map, emission) = match description {
             MaterialDescription::Phong(phong) => {
                 if let Some(all) = &phong.color {
                     self.color(all).at("color")?;
                 }
-                Material::Phong {
+                let reflection = Reflection::Phong {
                     ambient: self.factor(phong, &phong.ambient, "ambient")?,
                     diffuse: self.factor(phong, &phong.diffuse, "diffuse")?,
                     specular: self.factor(phong, &phong.specular, "specular")?,
                     shininess: between(phong.shininess, SHININESS.0, SHININESS.1).at("shininess")?,
-                    normal_map: self.normal_map(&phong.normal_map).at("normal_map")?,
-                }
+                };
+                (reflection, &phong.normal_map, &phong.emission)
             }
-            MaterialDescription::Mirror(mirror) => Material::Mirror {
-                tint: self.tint(&mirror.tint).at("tint")?,
-                normal_map: self.normal_map(&mirror.normal_map).at("normal_map")?,
-            },
-            MaterialDescription::Glass(glass) => Material::Glass {
-                ior: ior(glass.ior).at("ior")?,
-                tint: self.tint(&glass.tint).at("tint")?,
-                normal_map: self.normal_map(&glass.normal_map).at("normal_map")?,
-            },
+            MaterialDescription::Mirror(mirror) => {
+                let tint = self.tint(&mirror.tint).at("tint")?;
+                (Reflection::Mirror { tint }, &mirror.normal_map, &mirror.emission)
+            }
+            MaterialDescription::Glass(glass) => {
+                let reflection = Reflection::Glass {
+                    ior: ior(glass.ior).at("ior")?,
+                    tint: self.tint(&glass.tint).at("tint")?,
+                };
+                (reflection, &glass.normal_map, &glass.emission)
+            }
+            MaterialDescription::Diffuse(diffuse) => {
+                self.of_path("diffuse")?;
+                let reflection = Reflection::Diffuse {
+                    color: self.tint(&diffuse.color).at("color")?,
+                    roughness: self.value(&diffuse.roughness).at("roughness")?,
+                };
+                (reflection, &diffuse.normal_map, &diffuse.emission)
+            }
+            MaterialDescription::Conductor(conductor) => {
+                self.of_path("conductor")?;
+                let color = self.tint(&conductor.color).at("color")?;
+                let reflection = Reflection::Conductor { color };
+                (reflection, &conductor.normal_map, &conductor.emission)
+            }
+            MaterialDescription::Dielectric(dielectric) => {
+                self.of_path("dielectric")?;
+                let reflection = Reflection::Dielectric {
+                    ior: ior(dielectric.ior).at("ior")?,
+                    color: self.tint(&dielectric.color).at("color")?,
+                    absorption: absorption(dielectric.absorption).at("absorption")?,
+                };
+                (reflection, &dielectric.normal_map, &dielectric.emission)
+            }
+        };
+        Ok(Material {
+            reflection,
+            emission: self.emission(emission).at("emission")?,
+            normal_map: self.normal_map(normal_map).at("normal_map")?,
         })
     }
 
@@ -264,4 +321,13 @@ fn ior(ior: f64) -> Checked<f64> {
         format!("{ior} must be greater than 0, from {low} to {high}")
     })?;
     Ok(ior)
+}
+
+fn absorption(absorption: DVec3) -> Checked<DVec3> {
+    for x in absorption.to_array() {
+        check((0.0..=DARKEST).contains(&x), || {
+            format!("{} must be finite, from 0 to {}", number(x), number(DARKEST))
+        })?;
+    }
+    Ok(absorption)
 }

@@ -9,8 +9,8 @@ use super::super::error::cut;
 use super::super::image_file::Place;
 use super::super::mesh_file;
 use super::super::{
-    Assets, Color, Geometry, InstanceDescription, Material, MeshDescription, MeshFileDescription, Rotation, Scale,
-    Shape, ShapeDescription, Up,
+    Assets, Color, Geometry, InstanceDescription, Material, MeshDescription, MeshFileDescription, Reflection, Rotation,
+    Scale, Shape, ShapeDescription, Up, Value,
 };
 use super::mtl::Looks;
 use super::{At, Checked, FARTHEST, FLATTEST, LENGTHS, Problem, between, check, list, number, point, show, unit};
@@ -271,15 +271,18 @@ fn names(group: &Group) -> impl Iterator<Item = &str> {
 
 fn has_textures(material: &Material) -> bool {
     let is_texture = |color: &Color| matches!(color, Color::Texture(_));
-    material.normal_map().is_some()
-        || match material {
-            Material::Phong {
+    material.normal_map.is_some()
+        || is_texture(&material.emission)
+        || match &material.reflection {
+            Reflection::Phong {
                 ambient,
                 diffuse,
                 specular,
                 ..
             } => [ambient, diffuse, specular].into_iter().any(is_texture),
-            Material::Mirror { tint, .. } | Material::Glass { tint, .. } => is_texture(tint),
+            Reflection::Mirror { tint } | Reflection::Glass { tint, .. } => is_texture(tint),
+            Reflection::Diffuse { color, roughness } => is_texture(color) || matches!(roughness, Value::Texture(_)),
+            Reflection::Conductor { color } | Reflection::Dielectric { color, .. } => is_texture(color),
         }
 }
 

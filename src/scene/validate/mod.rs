@@ -5,6 +5,7 @@
 mod appearance;
 mod mesh;
 mod mtl;
+mod path;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -14,21 +15,27 @@ use glam::DVec3;
 use self::appearance::{Images, Textures};
 use self::mesh::Known;
 use self::mtl::Looks;
-use super::error::{At, Problem};
+use super::error::{At, Problem, cut};
 use super::parse::list;
 use super::{
     Adaptive, AdaptiveDescription, Assets, Camera, CameraDescription, Color, Description, EllipsoidDescription,
-    Geometry, InstanceDescription, Light, LightDescription, Parallelogram, Pattern, PixelFilter,
-    PixelFilterDescription, Projection, Render, RenderDescription, Samples, SamplesDescription, Scene, Shape,
-    ShapeDescription,
+    Environment, Geometry, InstanceDescription, Integrator, Light, LightDescription, Material, Parallelogram, Pattern,
+    PixelFilter, PixelFilterDescription, Projection, Render, RenderDescription, Samples, SamplesDescription, Scene,
+    Shadows, Shape, ShapeDescription, Texture,
 };
+
+pub(super) use self::path::LIGHT_SAMPLES;
 
 /// Largest absolute coordinate.
 const FARTHEST: f64 = 1e9;
 /// Smallest and largest length.
 const LENGTHS: (f64, f64) = (1e-9, 1e9);
-/// Most bounces of a path.
-pub(super) const DEEPEST: u32 = 64;
+/// Most bounces of a path of light from surface to surface.
+pub(super) const DEEPEST: u32 = 1024;
+/// From which bounce on a path may end at random, if nothing is said.
+const RR_DEPTH: u32 = 5;
+/// What the light of a sample may be limited to.
+const CLAMPS: (f64, f64) = (1e-6, 1e6);
 /// Largest component of a colour.
 const BRIGHTEST: f64 = 1e6;
 /// Most pixels along a side of the picture, and most samples.
@@ -69,6 +76,7 @@ impl Description {
         let known = Textures {
             names: self.textures.keys().map(String::as_str).collect(),
             textures: &textures,
+            integrator: self.render.integrator,
         };
         let materials = (self.materials.iter())
             .map(|(name, description)| known.material(description).at(name.as_str()))
@@ -95,11 +103,20 @@ impl Description {
         let textures = std::mem::take(&mut looks.textures);
         let files = looks.files.iter().cloned().collect();
         notes.extend(looks.notes());
+        notes.extend(path::notes(&self.render, (&material_names, &materials), &textures));
+        let mut render = render(&self.render).at("render")?;
+        let environment = path::environment(self).at("environment")?;
+        if render.integrator == Integrator::Path {
+            render.background = environment
+                .as_ref()
+                .map_or(DVec3::ZERO, |environment| environment.color);
+        }
         Ok(Scene {
             width: side(self.image.width).at("width").at("image")?,
             height: side(self.image.height).at("height").at("image")?,
             camera: camera(&self.camera).at("camera")?,
-            render: render(&self.render).at("render")?,
+            render,
+            environment,
             lights: each(&self.lights, light).at("lights")?,
             textures,
             materials,
@@ -149,27 +166,35 @@ fn count_to_most(count: u32) -> Checked<u32> {
     Ok(count)
 }
 
-fn samples(description: &SamplesDescription) -> Checked<Samples> {
-    let SamplesDescription { pattern, count } = *description;
-    let count = sample_count(pattern, count).at("count")?;
+fn samples(description: &SamplesDescription, integrator: Integrator) -> Checked<Samples> {
+    let pattern = description.pattern(integrator);
+    let count = sample_count(pattern, description.count).at("count")?;
     Ok(Samples { pattern, count })
 }
 
 fn render(description: &RenderDescription) -> Checked<Render> {
+    let integrator = description.integrator;
+    let is_path = integrator == Integrator::Path;
+    let ambient = color(description.ambient).at("ambient")?;
     Ok(Render {
-        integrator: description.integrator,
-        ambient: color(description.ambient).at("ambient")?,
+        integrator,
+        ambient: if is_path { DVec3::ZERO } else { ambient },
         background: color(description.background).at("background")?,
         shadow_epsilon: between(description.shadow_epsilon, 0.0, 0.1).at("shadow_epsilon")?,
-        shadows: description.shadows,
-        max_depth: max_depth(description.max_depth).at("max_depth")?,
+        shadows: if is_path { Shadows::Opaque } else { description.shadows },
+        max_depth: max_depth(description.max_depth, integrator).at("max_depth")?,
+        rr_depth: of_path(integrator, description.rr_depth, rr_depth)
+            .at("rr_depth")?
+            .unwrap_or(RR_DEPTH),
+        clamp: of_path(integrator, description.clamp, clamp).at("clamp")?,
+        alpha: of_path(integrator, description.alpha, Ok).at("alpha")?.unwrap_or(false),
         ray_differentials: description.ray_differentials,
         seed: description.seed,
-        pixel_samples: samples(&description.pixel_samples).at("pixel_samples")?,
-        light_samples: samples(&description.light_samples).at("light_samples")?,
+        pixel_samples: samples(&description.pixel_samples, integrator).at("pixel_samples")?,
+        light_samples: samples(&description.light_samples, integrator).at("light_samples")?,
         filter: filter(&description.filter).at("filter")?,
         adaptive: (description.adaptive.as_ref())
-            .map(|adaptive| self::adaptive(adaptive, &description.pixel_samples).at("adaptive"))
+            .map(|adaptive| self::adaptive(adaptive, &description.pixel_samples, integrator).at("adaptive"))
             .transpose()?,
     })
 }
@@ -186,8 +211,12 @@ pub(super) fn adaptive_error(error: f64) -> Checked<f64> {
 }
 
 /// Adaptive sampling, of pixels with these samples.
-pub(super) fn adaptive(description: &AdaptiveDescription, pixel_samples: &SamplesDescription) -> Checked<Adaptive> {
-    let SamplesDescription { pattern, count } = *pixel_samples;
+pub(super) fn adaptive(
+    description: &AdaptiveDescription,
+    pixel_samples: &SamplesDescription,
+    integrator: Integrator,
+) -> Checked<Adaptive> {
+    let (pattern, count) = (pixel_samples.pattern(integrator), pixel_samples.count);
     check(pattern.goes_on(), || {
         let name = pattern.name();
         let others: Vec<_> = Pattern::ALL
@@ -214,11 +243,41 @@ pub(super) fn adaptive(description: &AdaptiveDescription, pixel_samples: &Sample
     })
 }
 
-fn max_depth(depth: u32) -> Checked<u32> {
-    check((1..=DEEPEST).contains(&depth), || {
-        format!("{depth} must be from 1 to {DEEPEST}")
+/// The fewest and the most bounces of a path.
+pub(super) fn depths(integrator: Integrator) -> (u32, u32) {
+    match integrator {
+        Integrator::Phong => (1, 64),
+        Integrator::Path => (0, DEEPEST),
+    }
+}
+
+pub(super) fn max_depth(depth: u32, integrator: Integrator) -> Checked<u32> {
+    let (low, high) = depths(integrator);
+    check((low..=high).contains(&depth), || {
+        format!("{depth} must be from {low} to {high}")
     })?;
     Ok(depth)
+}
+
+fn rr_depth(depth: u32) -> Checked<u32> {
+    check(depth <= DEEPEST, || format!("{depth} must be from 0 to {DEEPEST}"))?;
+    Ok(depth)
+}
+
+fn clamp(most: f64) -> Checked<f64> {
+    let (low, high) = CLAMPS;
+    check((low..=high).contains(&most), || {
+        let [most, low, high] = [most, low, high].map(number);
+        format!("{most} must be greater than 0, from {low} to {high}")
+    })?;
+    Ok(most)
+}
+
+/// A value of a key that only paths have, if it is there.
+fn of_path<T>(integrator: Integrator, value: Option<T>, check: fn(T) -> Checked<T>) -> Checked<Option<T>> {
+    let Some(value) = value else { return Ok(None) };
+    path::needs_path(integrator)?;
+    check(value).map(Some)
 }
 
 fn camera(description: &CameraDescription) -> Checked<Camera> {
@@ -332,10 +391,18 @@ fn shape(description: &ShapeDescription, known: &mut Known) -> Checked<Shape> {
     let material = known.material(name).at("material")?;
     let has_tangents = !matches!(geometry, Geometry::Triangles(_));
     check(
-        has_tangents || known.looks.materials[material].normal_map().is_none(),
+        has_tangents || known.looks.materials[material].normal_map.is_none(),
         || format!("{name:?} must have no normal map here, as the sides of this shape have no tangents"),
     )
     .at("material")?;
+    if let Geometry::Plane { .. } = geometry {
+        let emission = &known.looks.materials[material].emission;
+        let is_dark = path::most(emission, &known.looks.textures) == Some(DVec3::ZERO);
+        check(is_dark, || {
+            format!("{name:?} must not emit light here, as this shape is infinite")
+        })
+        .at("material")?;
+    }
     Ok(Shape { geometry, material })
 }
 

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::super::error::{cut, cut_to};
 use super::super::image_file::Place;
-use super::super::{Color, ImageTextureDescription, Material, Texture, TextureDescription};
+use super::super::{Color, ImageTextureDescription, Material, Reflection, Texture, TextureDescription};
 use super::appearance::{Images, SHININESS, texture};
 use super::{BRIGHTEST, number, show};
 use crate::mesh::{Mesh, MtlMaterial, file_beside};
@@ -170,7 +170,8 @@ impl<'a> Looks<'a> {
             odd.push((Oddity::Shininess, rule));
         }
         if own.emission.is_some_and(|emission| emission != [0.0; 3]) {
-            let rule = "Ke: no surface emits light here; [[lights]] of the scene do";
+            let rule =
+                "Ke: it does not shine; a material of the scene with emission, or [[lights]], may stand in for it";
             odd.push((Oddity::Emission, rule.to_owned()));
         }
         if own.opacity.is_some_and(|opacity| opacity < 1.0) {
@@ -199,11 +200,14 @@ impl<'a> Looks<'a> {
             let told = self.oddities.entry((file.to_owned(), oddity));
             told.or_insert_with(|| (format!("{place}: {message}"), 0)).1 += 1;
         }
-        Material::Phong {
-            ambient: diffuse,
-            diffuse,
-            specular: Color::Plain(specular),
-            shininess,
+        Material {
+            reflection: Reflection::Phong {
+                ambient: diffuse,
+                diffuse,
+                specular: Color::Plain(specular),
+                shininess,
+            },
+            emission: Color::BLACK,
             normal_map: None,
         }
     }

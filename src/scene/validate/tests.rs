@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::super::{Material, SceneError};
+use super::super::{Material, Reflection, SceneError};
 use super::*;
 
 /// One of everything; every line is there once, so that a test can put another in its place.
@@ -106,11 +106,14 @@ fn a_good_scene_is_what_its_file_says() {
         projection: Projection::Perspective { fov: FRAC_PI_2 },
     };
     assert_eq!(scene.camera, camera);
-    let phong = |ambient, diffuse, specular, shininess| Material::Phong {
-        ambient: Color::Plain(ambient),
-        diffuse: Color::Plain(diffuse),
-        specular: Color::Plain(specular),
-        shininess,
+    let phong = |ambient, diffuse, specular, shininess| Material {
+        reflection: Reflection::Phong {
+            ambient: Color::Plain(ambient),
+            diffuse: Color::Plain(diffuse),
+            specular: Color::Plain(specular),
+            shininess,
+        },
+        emission: Color::BLACK,
         normal_map: None,
     };
     let (white, red) = (DVec3::splat(0.7), DVec3::X);
@@ -429,6 +432,18 @@ fn the_page_has_the_limits() {
         format!("greater than 0, and from {} to {}", number(shortest), number(longest)),
         format!("each from 0 to {}", number(BRIGHTEST)),
         format!("| `width` | required | 1 to {MOST} |"),
+        format!(
+            "| `max_depth` | 8 | {} to {}; under `\"path\"` {} to {DEEPEST} |",
+            depths(Integrator::Phong).0,
+            depths(Integrator::Phong).1,
+            depths(Integrator::Path).0
+        ),
+        format!("| `rr_depth` | {RR_DEPTH} | 0 to {DEEPEST} |"),
+        format!("above 0: {} to {} |", number(CLAMPS.0), number(CLAMPS.1)),
+        format!(
+            "| `absorption` | `[0, 0, 0]` | three numbers from 0 to {} |",
+            number(appearance::DARKEST)
+        ),
         format!("| `count` | required | 1 to {MOST} |"),
         format!("sine of their angle must be above {}", number(FLATTEST)),
         format!("unit vectors span must be above {}", number(FLATTEST)),

@@ -404,6 +404,45 @@ fn textures_are_on_meshes_with_coordinates() {
     assert_eq!(mesh.uvs, [Vec2::ZERO, Vec2::X, Vec2::Y]);
 }
 
+/// Wherever a material of the path tracer has its texture.
+#[test]
+fn every_texture_of_a_material_needs_coordinates() {
+    let texture = "{ texture = \"checks\" }";
+    let plain = "[1, 1, 1]";
+    for (needs, lines) in [
+        (false, format!("type = \"diffuse\"\ncolor = {plain}\nroughness = 0.5")),
+        (true, format!("type = \"diffuse\"\ncolor = {texture}")),
+        (
+            true,
+            format!("type = \"diffuse\"\ncolor = {plain}\nroughness = {texture}"),
+        ),
+        (
+            true,
+            format!("type = \"diffuse\"\ncolor = {plain}\nemission = {texture}"),
+        ),
+        (false, format!("type = \"conductor\"\ncolor = {plain}")),
+        (true, format!("type = \"conductor\"\ncolor = {texture}")),
+        (false, format!("type = \"dielectric\"\nior = 1.5\ncolor = {plain}")),
+        (true, format!("type = \"dielectric\"\nior = 1.5\ncolor = {texture}")),
+        (true, format!("type = \"phong\"\ncolor = {plain}\nemission = {texture}")),
+        (true, format!("type = \"mirror\"\nemission = {texture}")),
+        (true, format!("type = \"glass\"\nior = 1.5\nemission = {texture}")),
+    ] {
+        let text = with("material = \"white\"", "material = \"checked\"")
+            .replace("type = \"mirror\"\ntint = { texture = \"checks\" }", &lines)
+            .replace("[meshes.parts]", "[render]\nintegrator = \"path\"\n[meshes.parts]");
+        assert!(text.contains(&lines));
+        parse(&text.replace("one.obj", "coordinates.obj")).unwrap();
+        match parse(&text) {
+            Ok(_) => assert!(!needs, "{lines}"),
+            Err(error) => {
+                assert!(needs, "{lines}: {error}");
+                assert!(error.to_string().contains("shapes[1].material: "), "{error}");
+            }
+        }
+    }
+}
+
 #[test]
 fn meshes_are_scaled_then_turned_then_moved() {
     let scene = parse(GOOD).unwrap();

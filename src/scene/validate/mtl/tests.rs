@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use glam::DVec3;
 use tempfile::TempDir;
 
-use crate::scene::{Color, Geometry, Material, Scene, SceneError, TextureKind};
+use crate::scene::{Color, Geometry, Material, Reflection, Scene, SceneError, TextureKind};
 
 const SCENE: &str = "image = { width = 4, height = 4 }\n\
                      camera = { position = [0, -9, 0], look_at = [0, 0, 0], fov = 40 }\n\
@@ -68,13 +68,13 @@ fn named<'a>(scene: &'a Scene, name: &str) -> &'a Material {
 
 /// Ambient, diffuse and specular factor, and the exponent.
 fn phong(material: &Material) -> (Color, Color, Color, f64) {
-    match *material {
-        Material::Phong {
+    assert_eq!((material.emission, material.normal_map), (Color::BLACK, None));
+    match material.reflection {
+        Reflection::Phong {
             ambient,
             diffuse,
             specular,
             shininess,
-            normal_map: None,
         } => (ambient, diffuse, specular, shininess),
         ref other => panic!("not of Phong: {other:?}"),
     }
@@ -186,7 +186,7 @@ fn what_cannot_be_rendered_is_told_once() {
         ),
         (
             "Ke 0 0 2",
-            "\"red\": Ke: no surface emits light here; [[lights]] of the scene do",
+            "\"red\": Ke: it does not shine; a material of the scene with emission, or [[lights]], may stand in for it",
         ),
         (
             "Tr 0.5",

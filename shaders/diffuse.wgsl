@@ -1,0 +1,54 @@
+// The material `diffuse`: Lambert's reflection, and where it is rough the energy-preserving Oren-Nayar model.
+
+// The cosines of the angles between a normal, the direction to the light and the one to the viewer.
+struct Angles {
+    wi: f32,
+    wo: f32,
+    between: f32,          // wi and wo
+}
+
+fn angles_at(normal: vec3f, wo: vec3f, wi: vec3f) -> Angles {
+    return Angles(dot(normal, wi), dot(normal, wo), dot(wi, wo));
+}
+
+// The BRDF times the cosine of wi.
+fn diffuse_eval(material: Material, angles: Angles) -> vec3f {
+    return material.diffuse * (max(angles.wi, 0.0) * 0.31830988618379067);
+}
+
+// Portsmouth, Kutz and Hill, "EON: A Practical Energy-Preserving Rough Diffuse BRDF", 2024: Fujii's form of the model of Oren and
+// Nayar, and what it loses given back. Times the cosine of wi. For the roughness 0 it is Lambert's.
+fn rough_diffuse_eval(material: Material, angles: Angles) -> vec3f {
+    let wi = max(angles.wi, 0.0);
+    let wo = max(angles.wo, 0.0);
+    let r = material.roughness;
+    let whole = 1.0 / (1.0 + r * 0.2877934092108062);
+    let s = angles.between - wi * wo;
+    let once = whole * (1.0 + r * s / select(1.0, max(max(wi, wo), 1e-6), s > 0.0));
+    let lost_i = max(1.0 - whole * (1.0 + r * rough_share(wi)), 1e-6);
+    let lost_o = max(1.0 - whole * (1.0 + r * rough_share(wo)), 1e-6);
+    let mean = whole * (1.0 + r * 0.07248821245692394);
+    let lost = max(1.0 - mean, 1e-6);
+    let color = material.diffuse;
+    let often = color * color * (mean * lost_i * lost_o / lost) / (vec3f(1.0) - color * (1.0 - mean));
+    return (color * once + often) * (wi * 0.31830988618379067);
+}
+
+// How the share of light that a rough surface reflects at once grows with its roughness, by the cosine of the light's angle: G / pi
+// of the same paper.
+fn rough_share(cosine: f32) -> f32 {
+    let s = sqrt(max(1.0 - cosine * cosine, 0.0));
+    let angle = atan2(s, cosine);
+    let tangent = s * cosine * (1.0 + s + s * s) / (1.0 + s); // tan (1 - sin^3)
+    return (s * (angle - s * cosine) + 0.6666667 * (tangent - s)) * 0.31830988618379067;
+}
+
+// The density of `diffuse_sample`, per solid angle.
+fn diffuse_pdf(angles: Angles) -> f32 {
+    return max(angles.wi, 0.0) * 0.31830988618379067;
+}
+
+// A direction wi.
+fn diffuse_sample(normal: vec3f, u: vec2f) -> vec3f {
+    return hemisphere_sample(normal, u);
+}

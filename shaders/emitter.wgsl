@@ -1,0 +1,111 @@
+// What shines: which of it a sample of light is taken from, and at which point.
+
+// Light that may arrive at a point.
+struct LightSample {
+    to: vec3f,             // from the point to that of the light; of distant light the direction that it comes from
+    radiance: vec3f,       // of a light without extent, what its light weighs there for a density of 1
+    pdf: f32,              // per solid angle, with the light's choice; the choice's alone of a light without extent
+    is_delta: bool,        // has no extent, so that no other ray finds it
+    reach: f32,            // where shadow rays end, as a multiple of `to`
+    primitive: u32,        // what shines and does not hide itself, NOTHING for none
+}
+
+// One of all that shines, by its power: Walker, "An Efficient Method for Generating Discrete Random Variables with General
+// Distributions", ACM TOMS 3(3), 1977. Two numbers of 32 random bits.
+fn chosen_emitter(bits: vec2u) -> Emitter {
+    let count = emitter_count();
+    if EMITTERS == 1u {
+        return load_emitter(0u);
+    }
+    let first = whole_below(bits.x, count);
+    let emitter = load_emitter(first);
+    return load_emitter(select(emitter.other, first, unit_float(bits.y) < emitter.threshold));
+}
+
+// A sample of the light that arrives at p from `emitter`, for a uniform u.
+fn sample_emitter(emitter: Emitter, p: vec3f, u: vec2f) -> LightSample {
+    if (EMITTER_KINDS & (1u << INSTANCE)) != 0u {
+        if emitter.instance != 0u {
+            return sample_face(emitter, p, u);
+        }
+    }
+    return sample_light(load_light(emitter.index), p, u);
+}
+
+fn sample_light(light: Light, p: vec3f, u: vec2f) -> LightSample {
+    var at = vec2f(0.0);
+    if (EMITTER_KINDS & (1u << RECTANGLE)) != 0u {
+        at = select(at, u * 2.0 - 1.0, light.kind == RECTANGLE);
+    }
+    if (EMITTER_KINDS & (1u << DISK)) != 0u {
+        at = select(at, disk_sample(u), light.kind == DISK);
+    }
+    if (EMITTER_KINDS & (1u << TRIANGLE)) != 0u {
+        at = select(at, triangle_sample(u), light.kind == TRIANGLE);
+    }
+    var to = (light.center - p * light.finite) + light.u * at.x + light.v * at.y;
+    var pdf = light.density;
+    var radiance = light.color;
+    let is_delta = light.kind >= POINT;
+    var behind = false;
+    if (EMITTER_KINDS & (1u << POINT)) != 0u {
+        radiance = select(radiance, light.color / dot(to, to), light.kind == POINT);
+    }
+    if (EMITTER_KINDS & ((1u << RECTANGLE) | (1u << DISK) | (1u << TRIANGLE))) != 0u {
+        pdf = select(solid_angle_pdf(pdf, to, light.normal), pdf, is_delta);
+        behind = (light.sides == 1u) & (dot(light.normal, to) >= 0.0);
+    }
+    if (EMITTER_KINDS & (1u << ELLIPSOID)) != 0u {
+        if light.kind == ELLIPSOID {
+            let q = load_primitive(light.primitive);
+            to = ellipsoid_sample(q, p, u);
+            pdf = light.density * ellipsoid_area(q) * ellipsoid_pdf(q, p, normalize(to));
+        }
+    }
+    if EMISSION_TEXTURES != 0u {
+        if !is_delta {
+            let q = load_primitive(light.primitive);
+            let uv = primitive_uv(q, point_to_local(q, p + to));
+            radiance = emission_at(load_material(q.material), uv);
+        }
+    }
+    radiance = select(radiance, vec3f(0.0), behind);
+    return LightSample(to, radiance, pdf, is_delta, light.reach, light.primitive);
+}
+
+// Of a triangle of a mesh.
+fn sample_face(emitter: Emitter, p: vec3f, u: vec2f) -> LightSample {
+    let b = triangle_sample(u);
+    let face = face_of(load_instance(emitter.instance - 1u), Hit(0.0, emitter.instance, 0u, emitter.index, b));
+    let material = material_of(face);
+    let to = face.primitive.anchor + (face.edge_1 * b.x + face.edge_2 * b.y) - p;
+    var radiance = material.emission;
+    if EMISSION_TEXTURES != 0u {
+        radiance = emission_at(material, face_uv(face, b));
+    }
+    let pdf = solid_angle_pdf(material.density, to, face.primitive.z);
+    return LightSample(to, radiance, pdf, false, environment.reach, NOTHING);
+}
+
+// What a surface radiates at texture coordinates.
+fn emission_at(material: Material, uv: vec2f) -> vec3f {
+    var emission = material.emission;
+    for (var i = 0u; i < LOOKUPS; i++) {
+        let lookup = material.lookups[i];
+        if (lookup & FOR_EMISSION) != 0u {
+            emission = texture_color(load_texture(lookup & TEXTURE_NUMBER), Footprint(uv, vec2f(0.0), vec2f(0.0)));
+        }
+    }
+    return emission;
+}
+
+// The density that `sample_emitter` gives to what a ray has met, with the emitter's choice.
+fn emitter_pdf(spot: Spot, hit: Hit, material: Material, ray: Ray, normal: vec3f) -> f32 {
+    if (EMITTER_KINDS & (1u << ELLIPSOID)) != 0u {
+        if spot.primitive.kind == ELLIPSOID {
+            let q = spot.primitive;
+            return material.density * ellipsoid_area(q) * ellipsoid_pdf(q, ray.origin, ray.direction);
+        }
+    }
+    return solid_angle_pdf(material.density, ray.direction * hit.t, normal);
+}

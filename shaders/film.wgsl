@@ -1,0 +1,26 @@
+// The film, and the layers in it: parts of one vector for each pixel, one after the other.
+
+@group(0) @binding(1) var<storage, read_write> film: array<vec4f>;
+
+// The layers of a pixel, the first of which is this part of the film.
+fn stored_layers(index: u32, part: u32) -> Layers {
+    let pixels = work.film_size.x * work.film_size.y;
+    let first = part * pixels + index;
+    return Layers(film[first], film[first + pixels], film[first + 2u * pixels], film[first + 3u * pixels],
+                  film[first + 4u * pixels]);
+}
+
+fn store_layers(layers: Layers, index: u32, part: u32) {
+    let pixels = work.film_size.x * work.film_size.y;
+    let first = part * pixels + index;
+    film[first] = layers.emission;
+    film[first + pixels] = layers.direct;
+    film[first + 2u * pixels] = layers.indirect;
+    film[first + 3u * pixels] = layers.albedo;
+    film[first + 4u * pixels] = layers.normal;
+}
+
+fn layers_sum(a: Layers, b: Layers) -> Layers {
+    return Layers(a.emission + b.emission, a.direct + b.direct, a.indirect + b.indirect, a.albedo + b.albedo,
+                  a.normal + b.normal);
+}

@@ -1,0 +1,291 @@
+// The integrator `path`: light from surface to surface. A path goes from the camera to what it meets; at each surface one sample of
+// light is taken, and one direction to go on, and where both find the same light they are weighed against each other: Kajiya, "The
+// Rendering Equation", SIGGRAPH 1986; Veach, "Robust Monte Carlo Methods for Light Transport Simulation", thesis, 1997, chapter 9.
+
+// A path under way, for one sample of a pixel.
+struct PathState {
+    path: Path,            // the ray to go along
+    radiance: vec3f,       // found so far
+    pdf: f32,              // of the ray's direction, per solid angle; 0 where no sample of light finds what the ray does
+    eta2: f32,             // the product of the squared ratios of indices in the throughput
+    absorption: vec3f,     // of the medium that the ray is in
+    sample: u32,           // of the pixel
+    weight: f32,           // of the sample
+    ended: bool,
+    layers: Layers,        // of the sample, where layers are wanted
+    described: bool,       // whether they have the albedo
+}
+
+// The sample's path at the camera.
+fn begin_path(pixel: vec2u, sample: u32) -> PathState {
+    let start = camera_sample(pixel, sample);
+    let path = Path(start.ray, start.differential, vec3f(1.0), 0u, 0u, NOWHERE, NOWHERE);
+    return PathState(path, vec3f(0.0), 0.0, 1.0, vec3f(0.0), sample, start.weight, false, Layers(), false);
+}
+
+// The path after one more surface. What comes of a path that ends here is computed and not taken, where that is short: software
+// Vulkan computes both sides of a branch, and all that it then keeps of each costs as much again.
+fn advance(before: PathState, pixel: vec2u) -> PathState {
+    var state = before;
+    let path = before.path;
+    let hit = closest_hit(path.ray, path.left, path.wall);
+    let met = hit.primitive != NOTHING;
+    let shown = (ALPHA == 0u) | (path.depth > 0u);
+    state = with_radiance(state, path.throughput * environment.radiance, !met & shown, path.depth);
+    if (IN_TREE != 0u) | (LOOKUPS != 0u) {
+        if !met {
+            state.ended = true;
+            return state;
+        }
+    }
+    let spot = spot_of(hit);
+    var surface = surface_of(spot, hit, path.ray);
+    let at = arrival_of(spot, hit, surface, path.ray, path.differential);
+    let look = appearance(spot, hit, material_of(spot), surface, at, LOOKUPS);
+    let material = bounded(look.material);
+    if ABSORPTION != 0u {
+        let inside = (material.kind == GLASS) & (surface.side < 0.0);
+        let absorption = select(state.absorption, material.absorption, inside);
+        state.path.throughput *= transmittance(absorption, hit.t);
+    }
+    if SHINES != 0u {
+        state = with_emission(state, spot, hit, surface, material, met);
+    }
+    surface.shading_normal = shaded_normal(surface, material, look.normal);
+    if LAYERS != 0u {
+        if met {
+            state = described(state, surface, material);
+        }
+    }
+    let goes_on = met & (path.depth < BOUNCES) & (material.kind != EMITTER);
+    let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 1u + 2u * path.depth));
+    let other_key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 2u + 2u * path.depth));
+    var choices = vec2u(0u); // of a lobe, of an end
+    if ((MATERIALS & ~((1u << DIFFUSE) | (1u << EMITTER))) != 0u) | (RR_DEPTH < BOUNCES) {
+        choices = decision_set(other_key.zw, state.sample);
+    }
+    var specular = false;
+    if (MATERIALS & SPECULAR_KINDS) != 0u {
+        specular = is_specular(material);
+        if specular {
+            state = scattered_specularly(state, surface, at, material, unit_float(choices.x));
+        }
+    }
+    if (MATERIALS & ~SPECULAR_KINDS) != 0u {
+        if !specular {
+            if (IN_TREE & (1u << INSTANCE)) != 0u {
+                surface.start += surface.bulge;
+            }
+            if EMITTERS != 0u {
+                var bits = vec2u(0u);
+                if EMITTERS > 1u {
+                    bits = decision_set(other_key.xy, state.sample);
+                }
+                let emitter = chosen_emitter(bits);
+                let u = decision(key.xy, state.sample);
+                state = with_light(state, spot, surface, material, emitter, u, goes_on);
+            }
+            state = scattered(state, spot, surface, material, decision(key.zw, state.sample), unit_float(choices.x));
+        }
+    }
+    if RR_DEPTH < BOUNCES {
+        state = with_roulette(state, unit_float(choices.y));
+    }
+    state.ended |= !goes_on | !(largest(state.path.throughput) > 0.0);
+    return state;
+}
+
+// What a sample adds to its pixel: its radiance times its weight, and its weight.
+fn path_value(state: PathState) -> vec4f {
+    return vec4f(state.radiance * state.weight, state.weight);
+}
+
+// The layers' part of that.
+fn path_layers(state: PathState) -> Layers {
+    let layers = state.layers;
+    let weight = state.weight;
+    return Layers(layers.emission * weight, layers.direct * weight, layers.indirect * weight, layers.albedo * weight,
+                  layers.normal * weight);
+}
+
+// Two numbers of 32 bits for a decision: a set over the pixel's samples, apart for every key. Burley, "Practical Hash-based Owen
+// Scrambling", JCGT 9(4), 2020, section 5.
+fn decision_set(key: vec2u, sample: u32) -> vec2u {
+    if PIXEL_PATTERN == RANDOM {
+        return hash4(vec4u(key.x, key.y, sample, 0u)).xy;
+    }
+    return sobol_bits(sample, key);
+}
+
+// The same as a point of the unit square.
+fn decision(key: vec2u, sample: u32) -> vec2f {
+    let bits = decision_set(key, sample);
+    return vec2f(unit_float(bits.x), unit_float(bits.y));
+}
+
+// With light that came by so many bounces, if it is `taken`.
+fn with_radiance(before: PathState, found: vec3f, taken: bool, bounces: u32) -> PathState {
+    var state = before;
+    var radiance = select(vec3f(0.0), found, taken);
+    if MOST_INDIRECT != 0u {
+        let scale = bitcast<f32>(MOST_INDIRECT) / max(largest(found), 1e-30);
+        radiance *= select(1.0, min(scale, 1.0), bounces > 1u);
+    }
+    state.radiance += radiance;
+    if LAYERS != 0u {
+        state.layers.emission += vec4f(select(vec3f(0.0), radiance, bounces == 0u), 0.0);
+        state.layers.direct += vec4f(select(vec3f(0.0), radiance, bounces == 1u), 0.0);
+        state.layers.indirect += vec4f(select(vec3f(0.0), radiance, bounces > 1u), 0.0);
+    }
+    return state;
+}
+
+// With what the surface that was met, if any was, radiates itself.
+fn with_emission(state: PathState, spot: Spot, hit: Hit, surface: Surface, material: Material, met: bool) -> PathState {
+    let one_sided = material.kind == EMITTER;
+    let shines = (material.density > 0.0) & (!one_sided | (surface.side > 0.0));
+    let weighed = power_heuristic(state.pdf, emitter_pdf(spot, hit, material, state.path.ray, surface.normal));
+    let weight = select(1.0, weighed, (state.pdf > 0.0) & (EMITTERS != 0u));
+    return with_radiance(state, state.path.throughput * material.emission * weight, met & shines, state.path.depth);
+}
+
+// The normal that light is reflected by: what a normal map makes of it, if that can be.
+fn shaded_normal(surface: Surface, material: Material, normal: vec3f) -> vec3f {
+    if is_specular(material) {
+        let usable = usable_normal(surface, normal);
+        return select(usable, surface.normal, (material.kind == GLASS) & !refracts_inwards(surface, material, usable));
+    }
+    return normal;
+}
+
+// A material as its textures make it, none of which makes more light than there is.
+fn bounded(found: Material) -> Material {
+    var material = found;
+    if LOOKUPS != 0u {
+        let one = vec3f(1.0);
+        let above = (found.diffuse > one) & vec3<bool>(found.kind == DIFFUSE);
+        material.diffuse = select(found.diffuse, one, above);
+        material.tint = select(found.tint, one, found.tint > one);
+        material.roughness = min(found.roughness, 1.0);
+    }
+    return material;
+}
+
+// What layers tell of the first surface, and of the first that neither mirrors nor refracts.
+fn described(before: PathState, surface: Surface, material: Material) -> PathState {
+    var state = before;
+    if state.path.depth == 0u {
+        state.layers.emission.w = 1.0;
+        state.layers.normal = vec4f(surface.shading_normal * surface.side, 0.0);
+    }
+    if !state.described & !is_specular(material) {
+        state.layers.albedo = vec4f(state.path.throughput * albedo(material), 0.0);
+        state.described = true;
+    }
+    return state;
+}
+
+// The share of light that a surface reflects, about.
+fn albedo(material: Material) -> vec3f {
+    if material.kind == PHONG {
+        let factors = phong_factors(material);
+        return factors.diffuse + factors.specular;
+    }
+    return select(vec3f(0.0), material.diffuse, material.kind == DIFFUSE);
+}
+
+// The path mirrored or refracted.
+fn scattered_specularly(before: PathState, surface: Surface, at: Arrival, material: Material, random: f32) -> PathState {
+    var state = before;
+    state.pdf = 0.0;
+    var path = mirrored_path(before.path, surface, at, material).onward;
+    if (MATERIALS & (1u << GLASS)) != 0u {
+        if material.kind == GLASS {
+            let passage = dielectric_sample(before.path, surface, at, material, random);
+            path = passage.path;
+            state.eta2 = before.eta2 * passage.eta * passage.eta;
+            if ABSORPTION != 0u {
+                let ahead = select(vec3f(0.0), material.absorption, surface.side > 0.0);
+                state.absorption = select(before.absorption, ahead, passage.passes);
+            }
+        }
+    }
+    path.ray.direction = normalize(path.ray.direction);
+    state.path = path;
+    return state;
+}
+
+// How a surface reflects light from a direction, and how densely `sampled_direction` gives that.
+struct Reflection {
+    value: vec3f,          // the BRDF times the cosine of wi; 0 where no light passes
+    pdf: f32,              // per solid angle
+}
+
+fn reflection(spot: Spot, surface: Surface, material: Material, wi: vec3f) -> Reflection {
+    let angles = angles_at(surface.shading_normal, surface.wo, wi);
+    var result = Reflection(vec3f(0.0), 0.0);
+    if (MATERIALS & (1u << DIFFUSE)) != 0u {
+        result = Reflection(diffuse_eval(material, angles), diffuse_pdf(angles));
+        if ROUGH != 0u {
+            if material.roughness > 0.0 {
+                result.value = rough_diffuse_eval(material, angles);
+            }
+        }
+    }
+    if (MATERIALS & (1u << PHONG)) != 0u {
+        if material.kind == PHONG {
+            result = Reflection(modified_phong_eval(material, angles), modified_phong_pdf(material, angles));
+        }
+    }
+    var lit = is_lit(surface, wi);
+    if (IN_TREE & (1u << INSTANCE)) != 0u {
+        lit &= face_lets_pass(spot, surface, wi);
+    }
+    result.value = select(vec3f(0.0), result.value, lit);
+    return result;
+}
+
+// With the light of one sample of `emitter`, if that is `wanted`.
+fn with_light(state: PathState, spot: Spot, surface: Surface, material: Material, emitter: Emitter, u: vec2f,
+              wanted: bool) -> PathState {
+    let light = sample_emitter(emitter, surface.start, u);
+    let reflected = reflection(spot, surface, material, normalize(light.to));
+    var found = state.path.throughput * reflected.value * light.radiance * (1.0 / light.pdf);
+    if ABSORPTION != 0u {
+        found *= transmittance(state.absorption, light.reach * sqrt(dot(light.to, light.to)));
+    }
+    found *= select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta);
+    let most = largest(found);
+    let dark = !wanted | !(most > 0.0) | !(most < FAR);
+    let hidden = is_hidden(dark, surface, light.to, light.reach, light.primitive);
+    return with_radiance(state, found, !hidden, state.path.depth + 1u);
+}
+
+// The path in a direction that is chosen by how the surface reflects.
+fn scattered(before: PathState, spot: Spot, surface: Surface, material: Material, u: vec2f, random: f32) -> PathState {
+    var state = before;
+    var wi = diffuse_sample(surface.shading_normal, u);
+    if (MATERIALS & (1u << PHONG)) != 0u {
+        if material.kind == PHONG {
+            wi = modified_phong_sample(material, surface.shading_normal, surface.wo, u, random);
+        }
+    }
+    let reflected = reflection(spot, surface, material, wi);
+    let factor = reflected.value * select(0.0, 1.0 / reflected.pdf, reflected.pdf > 0.0);
+    let throughput = before.path.throughput * factor;
+    state.path = Path(Ray(surface.start, wi), Differential(), throughput, before.path.depth + 1u, 0u, surface.above, surface.below);
+    state.pdf = reflected.pdf;
+    return state;
+}
+
+// From a certain bounce on, paths that can carry little light end at random, and those that go on stand for them.
+fn with_roulette(before: PathState, random: f32) -> PathState {
+    var state = before;
+    if state.path.depth < RR_DEPTH {
+        return state;
+    }
+    let chance = min(largest(state.path.throughput) / state.eta2, 1.0);
+    state.ended |= random >= chance;
+    state.path.throughput *= 1.0 / chance;
+    return state;
+}

@@ -1,0 +1,25 @@
+// A sample in one step, for an integrator that is a function `radiance`.
+
+struct PathState {
+    value: vec4f,
+    sample: u32,
+    ended: bool,
+}
+
+fn begin_path(pixel: vec2u, sample: u32) -> PathState {
+    return PathState(vec4f(0.0), sample, false);
+}
+
+fn advance(path: PathState, pixel: vec2u) -> PathState {
+    let start = camera_sample(pixel, path.sample);
+    let found = radiance(start.ray, start.differential, pixel, path.sample);
+    return PathState(vec4f(found * start.weight, start.weight), path.sample, true);
+}
+
+fn path_value(path: PathState) -> vec4f {
+    return path.value;
+}
+
+fn path_layers(path: PathState) -> Layers {
+    return Layers();
+}

@@ -1,0 +1,59 @@
+//! Twin of `shaders/diffuse.wgsl`: the material `diffuse`.
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::{Vec2, Vec3};
+
+use super::math::{atan2, dot, max};
+use super::warp::hemisphere_sample;
+use crate::pack::Material;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Angles {
+    pub wi: f32,
+    pub wo: f32,
+    pub between: f32,
+}
+
+pub fn angles_at(normal: Vec3, wo: Vec3, wi: Vec3) -> Angles {
+    Angles {
+        wi: dot(normal, wi),
+        wo: dot(normal, wo),
+        between: dot(wi, wo),
+    }
+}
+
+pub fn diffuse_eval(material: &Material, angles: Angles) -> Vec3 {
+    material.diffuse * (max(angles.wi, 0.0) * FRAC_1_PI)
+}
+
+pub fn rough_diffuse_eval(material: &Material, angles: Angles) -> Vec3 {
+    let wi = max(angles.wi, 0.0);
+    let wo = max(angles.wo, 0.0);
+    let r = material.roughness;
+    let whole = 1.0 / (1.0 + r * 0.287_793_4);
+    let s = angles.between - wi * wo;
+    let once = whole * (1.0 + r * s / if s > 0.0 { max(max(wi, wo), 1e-6) } else { 1.0 });
+    let lost_i = max(1.0 - whole * (1.0 + r * rough_share(wi)), 1e-6);
+    let lost_o = max(1.0 - whole * (1.0 + r * rough_share(wo)), 1e-6);
+    let mean = whole * (1.0 + r * 0.072_488_21);
+    let lost = max(1.0 - mean, 1e-6);
+    let color = material.diffuse;
+    let often = color * color * (mean * lost_i * lost_o / lost) / (Vec3::ONE - color * (1.0 - mean));
+    (color * once + often) * (wi * FRAC_1_PI)
+}
+
+pub fn rough_share(cosine: f32) -> f32 {
+    let s = max(1.0 - cosine * cosine, 0.0).sqrt();
+    let angle = atan2(s, cosine);
+    let tangent = s * cosine * (1.0 + s + s * s) / (1.0 + s);
+    (s * (angle - s * cosine) + 0.666_666_7 * (tangent - s)) * FRAC_1_PI
+}
+
+pub fn diffuse_pdf(angles: Angles) -> f32 {
+    max(angles.wi, 0.0) * FRAC_1_PI
+}
+
+pub fn diffuse_sample(normal: Vec3, u: Vec2) -> Vec3 {
+    hemisphere_sample(normal, u)
+}

@@ -1,0 +1,136 @@
+//! Twin of `shaders/emitter.wgsl`: what shines.
+
+use glam::{UVec2, Vec2, Vec3};
+
+use super::footprint::Footprint;
+use super::geometry::{material_of, spot_of};
+use super::light_sample::{ellipsoid_area, ellipsoid_pdf, ellipsoid_sample, solid_angle_pdf, whole_below};
+use super::math::{dot, normalize};
+use super::mesh::{Spot, face_uv};
+use super::primitive::primitive_uv;
+use super::ray::{Hit, Ray, point_to_local};
+use super::rng::unit_float;
+use super::texture::texture_color;
+use super::warp::{disk_sample, triangle_sample};
+use crate::pack::{
+    DISK, ELLIPSOID, Emitter, FOR_EMISSION, Light, Material, NOTHING, POINT, Packed, RECTANGLE, TEXTURE_NUMBER,
+    TRIANGLE,
+};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightSample {
+    pub to: Vec3,
+    pub radiance: Vec3,
+    pub pdf: f32,
+    pub is_delta: bool,
+    pub reach: f32,
+    pub primitive: u32,
+}
+
+pub fn chosen_emitter(scene: &Packed, bits: UVec2) -> Emitter {
+    if scene.emitters.len() == 1 {
+        return scene.emitters[0];
+    }
+    let first = whole_below(bits.x, scene.emitters.len() as u32);
+    let emitter = scene.emitters[first as usize];
+    if unit_float(bits.y) < emitter.threshold {
+        emitter
+    } else {
+        scene.emitters[emitter.other as usize]
+    }
+}
+
+pub fn sample_emitter(scene: &Packed, emitter: Emitter, p: Vec3, u: Vec2) -> LightSample {
+    if emitter.instance != 0 {
+        return sample_face(scene, emitter, p, u);
+    }
+    sample_light(scene, &scene.lights[emitter.index as usize], p, u)
+}
+
+pub fn sample_light(scene: &Packed, light: &Light, p: Vec3, u: Vec2) -> LightSample {
+    let at = match light.kind {
+        RECTANGLE => u * 2.0 - 1.0,
+        DISK => disk_sample(u),
+        TRIANGLE => triangle_sample(u),
+        _ => Vec2::ZERO,
+    };
+    let mut to = (light.center - p * light.finite) + light.u * at.x + light.v * at.y;
+    let is_delta = light.kind >= POINT;
+    let mut behind = false;
+    let mut pdf = light.density;
+    let mut radiance = light.color;
+    if light.kind == POINT {
+        radiance = light.color / dot(to, to);
+    }
+    if light.kind == ELLIPSOID {
+        let q = &scene.primitives[light.primitive as usize];
+        to = ellipsoid_sample(q, p, u);
+        pdf = light.density * ellipsoid_area(q) * ellipsoid_pdf(q, p, normalize(to));
+    } else if !is_delta {
+        pdf = solid_angle_pdf(pdf, to, light.normal);
+        behind = (light.sides == 1) & (dot(light.normal, to) >= 0.0);
+    }
+    if scene.specialization.emission_textures != 0 && !is_delta {
+        let q = &scene.primitives[light.primitive as usize];
+        let uv = primitive_uv(q, point_to_local(q, p + to));
+        radiance = emission_at(scene, &scene.materials[q.material as usize], uv);
+    }
+    LightSample {
+        to,
+        radiance: if behind { Vec3::ZERO } else { radiance },
+        pdf,
+        is_delta,
+        reach: light.reach,
+        primitive: light.primitive,
+    }
+}
+
+pub fn sample_face(scene: &Packed, emitter: Emitter, p: Vec3, u: Vec2) -> LightSample {
+    let b = triangle_sample(u);
+    let hit = Hit {
+        t: 0.0,
+        instance: emitter.instance,
+        primitive: 0,
+        slot: emitter.index,
+        barycentric: b,
+    };
+    let face = spot_of(scene, hit);
+    let material = material_of(scene, &face);
+    let to = face.primitive.anchor + (face.edge_1 * b.x + face.edge_2 * b.y) - p;
+    let mut radiance = material.emission;
+    if scene.specialization.emission_textures != 0 {
+        radiance = emission_at(scene, material, face_uv(&face, b));
+    }
+    LightSample {
+        to,
+        radiance,
+        pdf: solid_angle_pdf(material.density, to, face.primitive.z),
+        is_delta: false,
+        reach: scene.environment.reach,
+        primitive: NOTHING,
+    }
+}
+
+pub fn emission_at(scene: &Packed, material: &Material, uv: Vec2) -> Vec3 {
+    let mut emission = material.emission;
+    for lookup in material.lookups.to_array() {
+        if lookup & FOR_EMISSION != 0 {
+            let texture = &scene.textures[(lookup & TEXTURE_NUMBER) as usize];
+            let footprint = Footprint {
+                uv,
+                dx: Vec2::ZERO,
+                dy: Vec2::ZERO,
+            };
+            emission = texture_color(scene, texture, footprint);
+        }
+    }
+    emission
+}
+
+pub fn emitter_pdf(spot: &Spot, hit: Hit, material: &Material, ray: Ray, normal: Vec3) -> f32 {
+    let q = &spot.primitive;
+    if q.kind == ELLIPSOID {
+        return material.density * ellipsoid_area(q) * ellipsoid_pdf(q, ray.origin, ray.direction);
+    }
+    solid_angle_pdf(material.density, ray.direction * hit.t, normal)
+}

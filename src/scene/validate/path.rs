@@ -1,0 +1,114 @@
+//! What a scene has for the path tracer alone, and what it ignores.
+
+use super::super::{Integrator, Reflection, RenderDescription, Shadows, TextureKind};
+use super::{At, Checked, Color, DVec3, Description, Environment, Material, Texture, check, color, cut, number, show};
+
+/// The most materials in a note.
+const MOST_NAMES: usize = 8;
+/// How far above 1 a sum of two shares may be by its rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// What is told of `light_samples` that are ignored.
+pub(in crate::scene) const LIGHT_SAMPLES: &str =
+    "render.light_samples: without effect under integrator = \"path\"; pixel_samples are what makes it smooth";
+
+/// The rule of what only paths have.
+pub(super) fn needs_path(integrator: Integrator) -> Checked<()> {
+    check(integrator == Integrator::Path, || {
+        "needs integrator = \"path\"".to_owned()
+    })
+}
+
+/// The surroundings: under the path tracer the section's, or the background, if they shine.
+pub(super) fn environment(description: &Description) -> Checked<Option<Environment>> {
+    let integrator = description.render.integrator;
+    let background = description.render.background;
+    let color = match &description.environment {
+        None if integrator == Integrator::Phong => return Ok(None),
+        None => background,
+        Some(environment) => {
+            needs_path(integrator)?;
+            check(background == DVec3::ZERO, || {
+                let background = show(background);
+                format!("must not be there beside render.background, {background}, which stands for it")
+            })?;
+            color(environment.color).at("color")?
+        }
+    };
+    Ok((color != DVec3::ZERO).then_some(Environment { color }))
+}
+
+/// The largest value that a colour has in each component; of images that is not known.
+pub(super) fn most(color: &Color, textures: &[Texture]) -> Option<DVec3> {
+    match *color {
+        Color::Plain(color) => Some(color),
+        Color::Texture(i) => match textures[i].kind {
+            TextureKind::Constant(color) => Some(color),
+            TextureKind::Checker { even, odd } => Some(even.max(odd)),
+            TextureKind::Lines { cell, line, .. } => Some(cell.max(line)),
+            TextureKind::Image { .. } => None,
+        },
+    }
+}
+
+/// What the path tracer does not do as the file says.
+pub(super) fn notes(
+    render: &RenderDescription,
+    (names, materials): (&[String], &[Material]),
+    textures: &[Texture],
+) -> Vec<String> {
+    if render.integrator != Integrator::Path {
+        return Vec::new();
+    }
+    let mut notes = Vec::new();
+    if render.ambient != DVec3::ZERO {
+        notes.push("render.ambient: without effect under integrator = \"path\"; surfaces light each other".to_owned());
+    }
+    if render.shadows == Shadows::Transparent {
+        let rule = "without effect under integrator = \"path\"; light goes through glass as it does";
+        notes.push(format!("render.shadows: {rule}"));
+    }
+    if render.light_samples != RenderDescription::default().light_samples {
+        notes.push(LIGHT_SAMPLES.to_owned());
+    }
+    notes.extend(too_bright(names, materials, textures));
+    notes
+}
+
+/// Which Phong materials would give more light than they get.
+fn too_bright(names: &[String], materials: &[Material], textures: &[Texture]) -> Option<String> {
+    let share = |material: &Material| {
+        let Reflection::Phong { diffuse, specular, .. } = &material.reflection else {
+            return None;
+        };
+        let share = (most(diffuse, textures)? + most(specular, textures)?).max_element();
+        (share > 1.0 + ROUNDING).then_some(share)
+    };
+    let bright: Vec<(&String, f64)> = (names.iter().zip(materials))
+        .filter_map(|(name, material)| Some((name, share(material)?)))
+        .collect();
+    let shown = bright.iter().take(MOST_NAMES);
+    // Hundredths tell by how much; sums such as 0.7 + 0.4 have many digits.
+    let shown = shown.map(|(name, share)| {
+        format!(
+            "{} of {:?}",
+            number(((share - ROUNDING) * 100.0).ceil() / 100.0),
+            cut(name)
+        )
+    });
+    let mut shown: Vec<String> = shown.collect();
+    if bright.len() > MOST_NAMES {
+        shown.push(format!("{} more", bright.len() - MOST_NAMES));
+    }
+    let last = shown.pop()?;
+    let all = match shown.is_empty() {
+        true => last,
+        false => format!("{} and {last}", shown.join(", ")),
+    };
+    Some(format!(
+        "materials: diffuse + specular must be at most 1 under integrator = \"path\", and both are scaled down to that: {all}"
+    ))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,503 @@
+//! Layers that are means over the samples, and alpha: their sums, known answers, and the same bits by every way.
+
+use glam::{Vec3, Vec4};
+use wgray::film::{Film, Form, Layer, Region};
+use wgray::gpu::{Gpu, Options as GpuOptions};
+use wgray::image::straight;
+use wgray::job::Cut;
+use wgray::pack::Packed;
+use wgray::{Aov, Channel, Description, Device, Options, Picture};
+
+use crate::pictures::{Way, backend, crop, differing, exact_ways, film, first_hits, reference, render, whole};
+use crate::scenes::parse;
+use crate::{adapter, sources};
+
+/// Diffuse, mirroring, shining and nothing at all; light that comes by any number of bounces.
+const SCENE: &str = r#"
+image = { width = 24, height = 16 }
+camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40 }
+[environment]
+color = [0.2, 0.3, 0.5]
+[render]
+integrator = "path"
+max_depth = 4
+pixel_samples = { pattern = "sobol", count = 8 }
+[materials.gray]
+type = "diffuse"
+color = [0.5, 0.4, 0.3]
+[materials.mirror]
+type = "mirror"
+tint = [0.9, 0.8, 0.7]
+[materials.lamp]
+type = "diffuse"
+color = [0.1, 0.1, 0.1]
+emission = [0.4, 0.8, 0.2]
+[[lights]]
+type = "rectangle"
+center = [0, -1, 4]
+size = [2, 2]
+normal = [0, 0, -1]
+tangent = [1, 0, 0]
+color = [3, 3, 3]
+[[shapes]]
+type = "sphere"
+material = "gray"
+center = [-0.9, 0, 1]
+radius = 0.8
+[[shapes]]
+type = "sphere"
+material = "mirror"
+center = [0.9, 0, 1]
+radius = 0.8
+[[shapes]]
+type = "sphere"
+material = "lamp"
+center = [0, -1, 0.4]
+radius = 0.3
+[[shapes]]
+type = "rectangle"
+material = "gray"
+center = [0, 0, 0]
+size = [4, 4]
+normal = [0, 0, 1]
+tangent = [1, 0, 0]
+"#;
+
+/// The scene with other settings in `[render]`, instead of those of the same keys.
+fn with(settings: &str) -> String {
+    let keys: Vec<&str> = settings.lines().filter_map(|line| line.split(" =").next()).collect();
+    let kept = SCENE
+        .lines()
+        .filter(|line| !keys.iter().any(|key| line.starts_with(&format!("{key} ="))));
+    let text = kept.collect::<Vec<_>>().join("\n");
+    text.replace("[render]", &format!("[render]\n{settings}"))
+}
+
+const ADAPTIVE: &str = "adaptive = { error = 0.02, max_samples = 64 }";
+
+/// Scenes whose films are of every form that has layers.
+fn subjects() -> Vec<(&'static str, Packed)> {
+    let adaptive_alpha = format!("{ADAPTIVE}\nalpha = true");
+    vec![
+        ("plain", parse(SCENE).with_layers()),
+        ("adaptive", parse(&with(ADAPTIVE)).with_layers()),
+        (
+            "filtered",
+            parse(&with("filter = { type = \"mitchell\" }")).with_layers(),
+        ),
+        ("alpha", parse(&with("alpha = true"))),
+        ("adaptive, alpha", parse(&with(&adaptive_alpha))),
+    ]
+}
+
+/// Pixels whose bits differ in the layers alone.
+fn other_layers(a: &Film, b: &Film) -> usize {
+    let only = |film: &Film| Film {
+        sums: vec![Vec4::ZERO; film.sums.len()],
+        moments: Vec::new(),
+        ..film.clone()
+    };
+    differing(&only(a), &only(b))
+}
+
+#[test]
+fn layers_are_the_same_on_both_backends_and_for_every_cut() {
+    let cut = |band_pixels, samples_per_call, rows_per_call| Cut {
+        band_pixels,
+        samples_per_call,
+        rows_per_call,
+    };
+    for (name, packed) in subjects() {
+        let expected = reference(&packed);
+        assert!(expected.has_layers(), "{name}");
+        for way in exact_ways() {
+            let mut backend = backend(&packed, way);
+            for cut in [
+                cut(u64::MAX, None, None),
+                cut(24 * 5, Some(3), Some(2)),
+                cut(1, Some(1), None),
+            ] {
+                let found = film(&mut *backend, &packed, whole(&packed), &cut);
+                assert_eq!(differing(&found, &expected), 0, "{name}, {way:?}, {cut:?}");
+            }
+            for (x0, y0, x1, y1) in [(0, 0, 1, 1), (3, 2, 20, 11), (23, 15, 24, 16)] {
+                let part = Region { x0, y0, x1, y1 };
+                let found = film(&mut *backend, &packed, part, &Cut::default());
+                assert_eq!(differing(&found, &crop(&expected, part)), 0, "{name}, {way:?}, {part}");
+            }
+        }
+        let mut other = packed.clone();
+        other.camera.seed += 1;
+        assert!(
+            other_layers(&reference(&other), &expected) > 0,
+            "{name}: the comparison cannot fail"
+        );
+    }
+}
+
+#[test]
+fn the_picture_is_the_same_with_layers_and_without() {
+    for (name, packed) in subjects() {
+        let plain = packed.clone().without_layers();
+        let expected = reference(&plain);
+        assert_eq!(plain.form().layers, expected.has_layers(), "{name}");
+        for way in exact_ways() {
+            let found = render(&packed, way);
+            let found = Film {
+                layers: Film::new(found.region).layers,
+                ..found
+            };
+            assert_eq!(differing(&found, &expected), 0, "{name}, {way:?}");
+        }
+    }
+    let [plain, alpha] = [SCENE, &with("alpha = true")].map(|text| reference(&parse(text).without_layers()));
+    assert!(
+        differing(&plain, &alpha) > 0,
+        "the background of a picture with alpha is gone"
+    );
+}
+
+#[test]
+fn emission_direct_and_indirect_light_are_the_picture() {
+    let mut clamped = subjects();
+    clamped.push(("clamped", parse(&with("clamp = 0.05")).with_layers()));
+    for (name, packed) in clamped {
+        let film = reference(&packed);
+        let mut without = 0;
+        for (i, mean) in film.means().enumerate() {
+            let [emission, direct, indirect] =
+                [Layer::Emission, Layer::Direct, Layer::Indirect].map(|layer| Vec3::from(film.layer(layer, i)));
+            let (sum, mean) = (emission + direct + indirect, Vec3::from(mean));
+            let near = |sum: Vec3| (sum - mean).abs().max_element() <= 1e-5 * (1.0 + mean.max_element());
+            assert!(near(sum), "{name}, pixel {i}: {sum} for {mean}");
+            without += usize::from(!near(emission + direct)) + usize::from(!near(direct + indirect));
+        }
+        assert!(
+            without > 100,
+            "{name}: a layer that is left out is missed in {without} pixels"
+        );
+    }
+}
+
+#[test]
+fn light_is_sorted_by_how_often_it_was_reflected() {
+    let sums = |depth: u32| {
+        let film = reference(&parse(&with(&format!("max_depth = {depth}"))).with_layers());
+        [Layer::Emission, Layer::Direct, Layer::Indirect].map(|layer| {
+            let pixels = 0..film.sums.len();
+            pixels
+                .map(|i| Vec3::from(film.layer(layer, i)).element_sum())
+                .sum::<f32>()
+        })
+    };
+    let [none, once, often] = [0, 1, 4].map(sums);
+    assert!(none[0] > 0.0 && none[1..] == [0.0, 0.0], "{none:?}");
+    assert!(once[1] > 0.0 && once[2] == 0.0, "{once:?}");
+    assert!(often[2] > 0.0, "{often:?}");
+    // What comes by fewer bounces does not depend on how many there may be.
+    assert_eq!([none[0], once[0]], [often[0]; 2]);
+    assert_eq!(once[1], often[1]);
+}
+
+/// A rectangle of 1 x 1 in a picture of pixels as large, seen straight, or from behind.
+fn facing(size: (u32, u32), place: [f64; 2], more: &str, from_behind: bool) -> String {
+    let ([x, z], (width, height)) = (place, size);
+    let y = if from_behind { 5 } else { -5 };
+    format!(
+        r#"
+image = {{ width = {width}, height = {height} }}
+camera = {{ type = "orthographic", position = [0, {y}, 0], look_at = [0, 0, 0], height = {height} }}
+[environment]
+color = [0.5, 0.25, 2]
+[render]
+integrator = "path"
+max_depth = 0
+pixel_samples = {{ pattern = "grid", count = 16 }}
+{more}
+[materials.m]
+type = "diffuse"
+color = [0.25, 0.5, 0.75]
+emission = [0.5, 0.25, 4]
+[[shapes]]
+type = "rectangle"
+material = "m"
+center = [{x}, 0, {z}]
+size = [1, 1]
+normal = [0, -1, 0]
+tangent = [1, 0, 0]
+"#
+    )
+}
+
+/// By every exact way; they must be the same.
+fn on_all(packed: &Packed) -> Film {
+    let expected = reference(packed);
+    for way in exact_ways() {
+        assert_eq!(differing(&render(packed, way), &expected), 0, "{way:?}");
+    }
+    expected
+}
+
+#[test]
+fn layers_of_a_flat_thing_are_its_own() {
+    for behind in [false, true] {
+        let film = on_all(&parse(&facing((3, 1), [0.0, 0.0], "", behind)).with_layers());
+        for (pixel, there) in [(0, 0.0), (1, 1.0), (2, 0.0)] {
+            let layer = |layer| Vec3::from(film.layer(layer, pixel));
+            assert_eq!(film.alpha(pixel), there);
+            assert_eq!(layer(Layer::Normal), Vec3::NEG_Y * there, "behind {behind}");
+            assert_eq!(layer(Layer::Albedo), Vec3::new(0.25, 0.5, 0.75) * there);
+            let background = Vec3::new(0.5, 0.25, 2.0) * (1.0 - there);
+            assert_eq!(layer(Layer::Emission), Vec3::new(0.5, 0.25, 4.0) * there + background);
+        }
+    }
+}
+
+#[test]
+fn normals_are_those_of_the_first_hits_where_surfaces_are_flat() {
+    let packed = parse(SCENE).with_layers();
+    let (film, hits) = (reference(&packed), first_hits(&packed, Way::Cpu));
+    let (mut flat, mut bent) = (0, 0);
+    for (i, hit) in hits.iter().enumerate() {
+        let mean = Vec3::from(film.layer(Layer::Normal, i));
+        assert!(mean.length() < 1.0 + 1e-6, "pixel {i}: {mean}");
+        match hit.shape {
+            3 if film.alpha(i) == 1.0 && (mean - hit.shading_normal).length() < 1e-6 => flat += 1,
+            0 if mean.length() < 0.9999 => bent += 1,
+            _ => {}
+        }
+    }
+    assert!(flat > 20, "{flat} pixels of the ground have its normal");
+    assert!(
+        bent > 20,
+        "the mean is not made as long as a normal: {bent} pixels of the sphere"
+    );
+}
+
+#[test]
+fn normal_maps_are_in_the_mean_of_the_normals() {
+    let folder = tempfile::tempdir().unwrap();
+    let tilted = Vec3::new(0.6, 0.0, 0.8);
+    crate::textures::write_exr(&folder.path().join("n.exr"), 2, 2, |_, _| {
+        (tilted * 0.5 + 0.5).to_array()
+    });
+    let text = facing((3, 1), [0.0, 0.0], "", false).replace(
+        "[materials.m]",
+        "[textures.n]\ntype = 'image'\nfile = 'n.exr'\n[materials.m]\nnormal_map = { texture = 'n' }",
+    );
+    let packed = crate::textures::scene(&text, folder.path()).with_layers();
+    let (film, hits) = (on_all(&packed), first_hits(&packed, Way::Cpu));
+    let mean = Vec3::from(film.layer(Layer::Normal, 1));
+    assert!((mean - Vec3::new(0.6, -0.8, 0.0)).length() < 1e-5, "{mean}");
+    assert_eq!(
+        hits[1].shading_normal,
+        Vec3::NEG_Y,
+        "that of the first hit is without the map"
+    );
+}
+
+#[test]
+fn albedo_is_what_mirrors_show() {
+    let text = facing((1, 1), [0.0, -0.5], "", false)
+        .replace("max_depth = 0", "max_depth = 2")
+        .replace(
+            "[[shapes]]",
+            r#"[materials.mirror]
+type = "mirror"
+tint = [0.5, 0.25, 1]
+[[shapes]]
+type = "rectangle"
+material = "mirror"
+center = [0, -2, 0]
+size = [9, 9]
+normal = [0, -1, 0]
+tangent = [1, 0, 0]
+[[shapes]]
+type = "rectangle"
+size = [99, 99]
+material = "m"
+center = [0, -9, 0]
+normal = [0, 1, 0]
+tangent = [1, 0, 0]
+[[shapes]]"#,
+        );
+    let film = on_all(&parse(&text).with_layers());
+    let albedo = Vec3::from(film.layer(Layer::Albedo, 0));
+    assert!((albedo - Vec3::new(0.125, 0.125, 0.75)).length() < 1e-6, "{albedo}");
+    assert_eq!(film.layer(Layer::Normal, 0), [0.0, -1.0, 0.0], "the mirror's own");
+}
+
+#[test]
+fn alpha_is_the_share_of_the_samples_that_meet_anything() {
+    for (place, shares) in [
+        ([0.0, 0.0], [0.0, 1.0, 0.0]),
+        ([0.5, 0.0], [0.0, 0.5, 0.5]),
+        ([-0.75, 0.5], [0.375, 0.125, 0.0]),
+        ([9.0, 0.0], [0.0; 3]),
+    ] {
+        let packed = parse(&facing((3, 1), place, "alpha = true", false));
+        let form = Form {
+            adaptive: false,
+            layers: true,
+        };
+        assert_eq!(packed.form(), form, "alpha asks for layers");
+        let film = on_all(&packed);
+        for (i, share) in shares.into_iter().enumerate() {
+            assert_eq!(film.alpha(i), share, "{place:?}, pixel {i}");
+            // The colours are weighted by it, and the environment is not seen.
+            let color = Vec3::new(0.5, 0.25, 4.0) * share;
+            assert_eq!(
+                Vec3::from(wgray::film::mean(film.sums[i])),
+                color,
+                "{place:?}, pixel {i}"
+            );
+        }
+    }
+    // A picture of one pixel, of which a quarter is covered.
+    let film = on_all(&parse(&facing((1, 1), [0.5, 0.5], "alpha = true", false)));
+    assert_eq!(film.alpha(0), 0.25);
+}
+
+#[test]
+fn filters_of_either_sign_take_alpha_out_of_its_range() {
+    let filter = "filter = { type = \"mitchell\" }\nalpha = true";
+    let text = facing((7, 1), [-1.0, 0.0], filter, false).replace("\"grid\", count = 16", "\"sobol\", count = 1024");
+    let film = reference(&parse(&text));
+    let alphas: Vec<f32> = (0..7).map(|i| film.alpha(i)).collect();
+    assert!(alphas.iter().any(|alpha| *alpha < 0.0), "{alphas:?}");
+    for (i, mean) in film.means().enumerate() {
+        let color = Vec3::new(0.5, 0.25, 4.0) * alphas[i];
+        assert!(
+            (Vec3::from(mean) - color).abs().max_element() < 1e-5,
+            "pixel {i}: {mean:?}"
+        );
+    }
+}
+
+#[test]
+fn a_png_has_colours_by_themselves_and_an_exr_weighted_ones() {
+    assert_eq!(straight([0.25, 0.125, 0.5], 0.5), [186, 136, 255, 128]);
+    assert_eq!(straight([0.5, 0.25, 1.0], 1.0), [186, 136, 255, 255]);
+    assert_eq!(straight([0.0; 3], 0.0), [0; 4]);
+    assert_eq!(straight([-0.01; 3], -0.01), [0; 4], "a filter's lobes");
+    assert_eq!(straight([1.1, 0.55, 0.0], 1.1), [255, 186, 0, 255]);
+    assert_eq!(straight([f32::NAN; 3], f32::NAN), [0; 4]);
+}
+
+fn picture(text: &str, aovs: Vec<Aov>) -> Picture {
+    let scene = Description::parse(text, "test").unwrap().validate().unwrap();
+    let options = Options {
+        device: Device::Cpu,
+        aovs,
+        ..Options::default()
+    };
+    wgray::render(&scene, &options).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn floats(picture: &Picture, name: &str) -> Vec<f32> {
+    match picture.channel(name) {
+        Some(Channel::Floats(values)) => values,
+        other => panic!("{name}: {other:?}"),
+    }
+}
+
+#[test]
+fn the_library_has_layers_and_alpha() {
+    let half = facing((3, 1), [0.5, 0.0], "alpha = true", false);
+    let with_alpha = picture(&half, vec![Aov::Albedo, Aov::ShadingNormal, Aov::Depth]);
+    assert_eq!(with_alpha.alpha(), Some(vec![0.0, 0.5, 0.5]));
+    assert_eq!(floats(&with_alpha, "A"), [0.0, 0.5, 0.5]);
+    assert_eq!(floats(&with_alpha, "R"), [0.0, 0.25, 0.25]);
+    assert_eq!(floats(&with_alpha, "albedo.B"), [0.0, 0.375, 0.375]);
+    assert_eq!(floats(&with_alpha, "shading_normal.Y"), [0.0, -0.5, -0.5]);
+    assert_eq!(with_alpha.channel("direct.R"), None, "a layer that was not asked for");
+    let [off, on] = [[0; 4], [186, 136, 255, 128]];
+    assert_eq!(with_alpha.rgba8(), [off, on, on].concat());
+    assert_eq!(with_alpha.rgb8()[3..6], [0.25, 0.125, 2.0].map(wgray::image::encode));
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    with_alpha.save(path("a.png")).unwrap();
+    let png = image::open(path("a.png")).unwrap();
+    assert_eq!(png.color(), image::ColorType::Rgba8);
+    assert_eq!(png.into_bytes(), with_alpha.rgba8());
+    assert_eq!(
+        image::open(path("a.albedo.png")).unwrap().color(),
+        image::ColorType::Rgb8
+    );
+    with_alpha.save(path("a.exr")).unwrap();
+    assert_eq!(wgray::image::read_exr(&path("a.exr")).unwrap(), with_alpha.pixels());
+
+    let plain = picture(&half.replace("alpha = true", ""), Vec::new());
+    assert_eq!((plain.alpha(), plain.channel("A")), (None, None));
+    assert_eq!(plain.rgba8().chunks(4).map(|p| p[3]).collect::<Vec<_>>(), [255; 3]);
+    plain.save(path("b.png")).unwrap();
+    assert_eq!(image::open(path("b.png")).unwrap().color(), image::ColorType::Rgb8);
+}
+
+#[test]
+fn layers_of_paths_are_refused_under_another_integrator() {
+    let text = SCENE
+        .replace("\"path\"", "\"phong\"")
+        .replace("\"diffuse\"", "\"phong\"");
+    let text: String = text
+        .lines()
+        .filter(|line| !line.starts_with("emission"))
+        .collect::<Vec<_>>()
+        .join("\n");
+    let text = text.replace("[environment]\ncolor = [0.2, 0.3, 0.5]\n", "");
+    let scene = Description::parse(&text.replace("count = 8", "count = 4"), "test").unwrap();
+    let scene = scene.validate().unwrap_or_else(|error| panic!("{error}"));
+    for aov in Aov::ALL {
+        let options = Options {
+            device: Device::Cpu,
+            aovs: vec![aov],
+            ..Options::default()
+        };
+        let told = wgray::render(&scene, &options).err().map(|error| error.to_string());
+        let name = aov.name();
+        let expected = match aov {
+            Aov::Albedo | Aov::Direct | Aov::Indirect | Aov::Emission => {
+                Some(format!("aov.{name}: needs integrator = \"path\""))
+            }
+            Aov::SampleCount | Aov::Variance => Some(format!("aov.{name}: is known under adaptive sampling alone")),
+            _ => None,
+        };
+        assert_eq!(told, expected, "{name}");
+    }
+    let packed = wgray::pack::pack(&scene);
+    assert_eq!(packed.clone().with_layers(), packed, "no other film");
+}
+
+#[test]
+fn a_film_of_another_form_takes_another_kernel() {
+    let plain = parse(SCENE);
+    let layered = plain.clone().with_layers();
+    assert!(!plain.same_but_camera(&layered));
+    let Some(device) = adapter::device() else {
+        return;
+    };
+    let options = GpuOptions {
+        exact: device.info.exact.then_some(wgray::gpu::Rounding::Device),
+        baked: false,
+    };
+    let mut gpu = Gpu::new(device, &plain, sources::shaders(), options).unwrap();
+    assert!(
+        gpu.update(&parse(&SCENE.replace("0.9, 0.8, 0.7", "0.7, 0.8, 0.9")))
+            .unwrap()
+    );
+    assert!(!gpu.update(&layered).unwrap(), "the kernel writes no layers");
+    let mut gpu = Gpu::new(device, &layered, sources::shaders(), options).unwrap();
+    let other = parse(&SCENE.replace("0.9, 0.8, 0.7", "0.7, 0.8, 0.9"));
+    assert!(!gpu.update(&other).unwrap(), "the kernel writes layers");
+    let other = other.with_layers();
+    assert!(gpu.update(&other).unwrap());
+    let found = film(&mut gpu, &other, whole(&other), &Cut::default());
+    assert!(found.has_layers());
+    if adapter::bit_exact(device) {
+        assert_eq!(differing(&found, &reference(&other)), 0);
+        assert!(
+            other_layers(&found, &reference(&layered)) > 0,
+            "the comparison cannot fail"
+        );
+    }
+}

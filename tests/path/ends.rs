@@ -1,0 +1,196 @@
+//! The ends of ranges: no shapes, no light, no bounces, many bounces; huge and tiny scenes; nothing that is not a number.
+
+use super::{mean, scene};
+use crate::pictures::{both, differing, exact_ways, reference, render};
+
+const CAMERA: &str = "camera = { position = [0, -4, 0.5], look_at = [0, 0, 0], fov = 40 }\n";
+
+#[test]
+fn nothing_is_the_environment() {
+    for depth in [0, 1, 1024] {
+        let packed = scene(
+            4,
+            depth,
+            &format!("{CAMERA}environment = {{ color = [0.25, 0.5, 1e6] }}\n"),
+        );
+        for way in both() {
+            assert_eq!(mean(&render(&packed, way)), [0.25, 0.5, 1e6], "{way:?}");
+        }
+    }
+    let packed = scene(4, 3, CAMERA);
+    for way in both() {
+        assert_eq!(mean(&render(&packed, way)), [0.0; 3], "{way:?}");
+    }
+}
+
+#[test]
+fn without_bounces_only_what_shines_is_seen() {
+    let packed = scene(
+        16,
+        0,
+        &format!(
+            "{CAMERA}materials.m = {{ type = 'diffuse', color = [1, 1, 1] }}\n\
+             materials.s = {{ type = 'conductor', color = [1, 1, 1], emission = [2, 3, 4] }}\n\
+             [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [-1, 0, 0]\nradius = 0.5\n\
+             [[shapes]]\ntype = 'sphere'\nmaterial = 's'\ncenter = [1, 0, 0]\nradius = 0.5\n\
+             [[lights]]\ntype = 'point'\nposition = [0, -4, 3]\ncolor = [9, 9, 9]\n"
+        ),
+    );
+    for way in both() {
+        let film = render(&packed, way);
+        let colors: Vec<[f32; 3]> = film.means().collect();
+        assert_eq!(colors[8 * 16 + 4], [0.0; 3], "{way:?}: the dark one");
+        assert_eq!(colors[8 * 16 + 12], [2.0, 3.0, 4.0], "{way:?}: the one that shines");
+    }
+}
+
+#[test]
+fn scenes_of_every_size_look_alike() {
+    // The same room, a millionth and a million times as large: the light is the same but for the rounding of coordinates.
+    let room = |s: f64| {
+        format!(
+            "camera = {{ position = [0, {}, {s}], look_at = [0, 0, {s}], fov = 40 }}\n\
+             materials.m = {{ type = 'diffuse', color = [0.7, 0.7, 0.7] }}\nmaterials.s = {{ type = 'diffuse', color = [0.2, 0.2, 0.2], emission = [5, 5, 5] }}\n\
+             materials.g = {{ type = 'dielectric', ior = 1.5 }}\n\
+             [[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n\
+             [[shapes]]\ntype = 'sphere'\nmaterial = 's'\ncenter = [0, {s}, {}]\nradius = {}\n\
+             [[shapes]]\ntype = 'sphere'\nmaterial = 'g'\ncenter = [{s}, 0, {s}]\nradius = {}\n\
+             [[shapes]]\ntype = 'rectangle'\nmaterial = 'm'\ncenter = [0, {}, {s}]\nsize = [{}, {s}]\nnormal = [0, -1, 0]\ntangent = [1, 0, 0]\n",
+            -4.0 * s,
+            2.0 * s,
+            0.3 * s,
+            0.5 * s,
+            2.0 * s,
+            4.0 * s
+        )
+    };
+    let expected = mean(&reference(&scene(1024, 6, &room(1.0))));
+    for s in [1e-6, 1e-3, 1e3, 1e6] {
+        let packed = scene(1024, 6, &room(s));
+        for way in both() {
+            let found = mean(&render(&packed, way));
+            assert!(
+                (found[1] - expected[1]).abs() < 1e-2 * expected[1],
+                "{way:?}, {s}: {found:?} for {expected:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn lights_that_touch_surfaces_and_graze_them_give_numbers() {
+    let packed = scene(
+        256,
+        8,
+        "camera = { position = [0, -0.5, 0.02], look_at = [0, 0, 0], fov = 60 }\n\
+         materials.m = { type = 'diffuse', color = [1, 1, 1], roughness = 1 }\n\
+         materials.s = { type = 'phong', diffuse = [0.5, 0.5, 0.5], specular = [0.5, 0.5, 0.5], ambient = [0, 0, 0], shininess = 1e6, emission = [1, 1, 1] }\n\
+         [[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n\
+         [[shapes]]\ntype = 'sphere'\nmaterial = 's'\ncenter = [0, 0, 0]\nradius = 0.1\n\
+         [[shapes]]\ntype = 'disk'\nmaterial = 's'\ncenter = [0.2, 0, 0]\nradius = 0.1\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n\
+         [[shapes]]\ntype = 'triangle'\nmaterial = 's'\nvertices = [[-0.3, 0, 0], [-0.1, 0, 0], [-0.2, 0.2, 1e-6]]\n\
+         [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.1, 1e-9]\nsize = [1, 0.1]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\ncolor = [1, 1, 1]\n\
+         [[lights]]\ntype = 'point'\nposition = [0, 0.3, 0]\ncolor = [1, 1, 1]\n\
+         [[lights]]\ntype = 'point'\nposition = [0.1, 0.3, 1e-9]\ncolor = [1, 1, 1]\n\
+         [[lights]]\ntype = 'directional'\ndirection = [1, 0, 0]\ncolor = [1, 1, 1]\n",
+    );
+    let expected = reference(&packed);
+    for sum in &expected.sums {
+        assert!(sum.is_finite() && sum.min_element() >= 0.0, "{sum}");
+    }
+    for way in exact_ways() {
+        assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
+    }
+}
+
+#[test]
+fn long_paths_end() {
+    // A closed mirror that absorbs nothing: nothing is found, and every path is as long as it may be.
+    let text = |color: &str| {
+        format!(
+            "camera = {{ position = [0.3, 0, 0], look_at = [1, 0.1, 0], fov = 40 }}\nmaterials.m = {{ type = 'mirror', tint = {color} }}\n\
+             [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n"
+        )
+    };
+    for color in ["[1, 1, 1]", "[0, 0, 0]", "[1, 1e-30, 0]"] {
+        let packed = scene(1, 1024, &text(color));
+        for way in both() {
+            assert_eq!(mean(&render(&packed, way)), [0.0; 3], "{way:?}");
+        }
+    }
+}
+
+#[test]
+fn textures_that_are_too_bright_make_no_light() {
+    for key in ["color", "roughness"] {
+        let color = if key == "color" {
+            ""
+        } else {
+            "color = [0.5, 0.5, 0.5], "
+        };
+        let packed = scene(
+            64,
+            20,
+            &format!(
+                "{CAMERA}environment = {{ color = [1, 1, 1] }}\ntextures.t = {{ type = 'constant', color = [7, 7, 7] }}\n\
+                 textures.c = {{ type = 'checker', even = [9, 9, 9], odd = [7, 7, 7] }}\n\
+                 materials.m = {{ type = 'diffuse', {color}{key} = {{ texture = 'c' }} }}\n\
+                 [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 9\n"
+            ),
+        );
+        let text = format!(
+            "camera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 5 }}\nenvironment = {{ color = [1, 1, 1] }}\n\
+             textures.c = {{ type = 'checker', even = [9, 9, 9], odd = [7, 7, 7] }}\n\
+             materials.m = {{ type = 'diffuse', {color}{key} = {{ texture = 'c' }} }}\n\
+             [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n"
+        );
+        // What is above 1 counts as 1.
+        let plain = match key {
+            "color" => text.replace("{ texture = 'c' }", "[1, 1, 1]"),
+            _ => text.replace("{ texture = 'c' }", "1"),
+        };
+        let (body, expected) = (scene(256, 20, &text), mean(&reference(&scene(256, 20, &plain))));
+        for way in both() {
+            assert_eq!(
+                mean(&render(&packed, way)),
+                [0.0; 3],
+                "{way:?}: nothing comes into a closed ball"
+            );
+            let found = mean(&render(&body, way));
+            assert_eq!(found, expected, "{way:?}, {key}");
+        }
+    }
+}
+
+#[test]
+fn glass_makes_no_light_whatever_its_normals_are() {
+    // A cube and a coarse ball of glass with smooth normals, and balls with normal maps, in a white furnace: white at most.
+    let folder = tempfile::tempdir().expect("a folder");
+    let cube = crate::meshes::forms::Form::cube();
+    let ball = crate::meshes::forms::Form::icosphere(1);
+    for (name, form) in [("cube", cube), ("ball", ball)] {
+        let normals: Vec<_> = form.points.iter().map(|p| p.normalize()).collect();
+        std::fs::write(
+            folder.path().join(format!("{name}.obj")),
+            form.obj(Some(&normals), None),
+        )
+        .expect("a mesh");
+        for ior in [0.5, 1.5, 2.4] {
+            let text = format!(
+                "image = {{ width = 16, height = 16 }}\ncamera = {{ position = [0.3, -6, 0.5], look_at = [0, 0, 0], fov = 25 }}\n\
+                 render = {{ integrator = 'path', max_depth = 200, rr_depth = 200, pixel_samples = {{ count = 256 }} }}\n\
+                 environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'dielectric', ior = {ior} }}\n\
+                 [[shapes]]\ntype = 'mesh'\nmaterial = 'm'\nfile = '{name}.obj'\nnormals = 'smooth'\n"
+            );
+            let description = wgray::scene::Description::parse(&text, "test").expect("a scene");
+            let beside = wgray::scene::Assets::beside(folder.path());
+            let packed = wgray::pack::pack(&description.validate_with(&beside).expect("a sound scene"));
+            for way in both() {
+                let film = render(&packed, way);
+                let found = mean(&film)[0];
+                // The furnace is white wherever a path comes from; some are caught inside, as those normals have no outside.
+                assert!(found < 1.0 + 1e-3 && found > 0.85, "{name}, {ior}, {way:?}: {found}");
+            }
+        }
+    }
+}

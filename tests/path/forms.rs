@@ -1,0 +1,262 @@
+//! Scenes whose light has a closed form, on both paths, each with a wrong answer that must fail.
+
+use std::f64::consts::PI;
+
+use super::{mean, scene};
+use crate::pictures::{both, means, render};
+
+/// A camera in the middle of nothing that sees along x.
+const INSIDE: &str = "camera = { position = [0.1, 0, 0.05], look_at = [1, 0, 0.2], fov = 60 }\n";
+
+/// A camera of parallel rays straight down, on a picture of this height.
+fn above(x: f64, y: f64, z: f64, height: f64) -> String {
+    format!(
+        "camera = {{ type = 'orthographic', position = [{x}, {y}, {z}], look_at = [{x}, {y}, 0], up = [0, 1, 0], height = {height} }}\n"
+    )
+}
+
+const FLOOR: &str =
+    "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
+
+fn near(found: f64, expected: f64, relative: f64) -> bool {
+    (found - expected).abs() <= relative * expected.abs()
+}
+
+#[test]
+fn a_convex_body_in_a_furnace_has_its_albedo() {
+    // Each sample is the albedo itself: no variance.
+    for (material, albedo, tolerance) in [
+        ("type = 'diffuse', color = [0.8, 0.5, 1]", [0.8, 0.5, 1.0], 1e-5),
+        ("type = 'diffuse', color = [1, 1, 1], roughness = 1", [1.0; 3], 3e-2),
+        ("type = 'conductor', color = [0.8, 0.5, 1]", [0.8, 0.5, 1.0], 1e-5),
+        ("type = 'mirror', tint = [0.8, 0.5, 1]", [0.8, 0.5, 1.0], 1e-5),
+        ("type = 'dielectric', ior = 1.5", [1.0; 3], 2e-3),
+        ("type = 'glass', ior = 0.7", [1.0; 3], 2e-3),
+        (
+            "type = 'phong', diffuse = [0.8, 0.5, 1], specular = [0, 0, 0], ambient = [0, 0, 0]",
+            [0.8, 0.5, 1.0],
+            1e-5,
+        ),
+    ] {
+        for shape in [
+            "type = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1",
+            "type = 'ellipsoid'\nmaterial = 'm'\ncenter = [0, 0, 0]\na = [1, 0.2, 0]\nb = [0, 0.7, 0]\nc = [0, 0, 2]",
+        ] {
+            let text = format!(
+                "camera = {{ position = [0, -4, 0.3], look_at = [0, 0, 0], fov = 10 }}\nenvironment = {{ color = [1, 1, 1] }}\n\
+                 materials.m = {{ {material} }}\n[[shapes]]\n{shape}\n"
+            );
+            let packed = scene(64, 1024, &text);
+            for way in both() {
+                let found = mean(&render(&packed, way));
+                for (found, expected) in found.into_iter().zip(albedo) {
+                    assert!(near(found, expected, tolerance), "{material}, {way:?}: {found}");
+                    assert!(!near(found, expected * 1.04, tolerance), "the control");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn inside_of_what_shines_bounces_are_a_series() {
+    // A closed body of albedo a that shines with radiance 1: after n bounces the sum of a^k, whatever its form.
+    let (albedo, shine) = (0.6, 0.5);
+    let body = [
+        "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 2\n".to_owned(),
+        "[[shapes]]\ntype = 'ellipsoid'\nmaterial = 'm'\ncenter = [0, 0, 0]\na = [1.5, 0.2, 0]\nb = [0, 0.7, 0]\nc = [0, 0, 2]\n".to_owned(),
+        {
+            let wall = |center: &str, normal: &str, tangent: &str| {
+                format!(
+                    "[[shapes]]\ntype = 'rectangle'\nmaterial = 'm'\ncenter = {center}\nsize = [2, 2]\nnormal = {normal}\ntangent = {tangent}\n"
+                )
+            };
+            [
+                wall("[1, 0, 0]", "[-1, 0, 0]", "[0, 1, 0]"),
+                wall("[-1, 0, 0]", "[1, 0, 0]", "[0, 1, 0]"),
+                wall("[0, 1, 0]", "[0, -1, 0]", "[1, 0, 0]"),
+                wall("[0, -1, 0]", "[0, 1, 0]", "[1, 0, 0]"),
+                wall("[0, 0, 1]", "[0, 0, -1]", "[1, 0, 0]"),
+                wall("[0, 0, -1]", "[0, 0, 1]", "[1, 0, 0]"),
+            ]
+            .concat()
+        },
+    ];
+    for body in body {
+        for depth in [0, 1, 2, 5, 40] {
+            let text = format!(
+                "{INSIDE}materials.m = {{ type = 'diffuse', color = [{albedo}, {albedo}, {albedo}], \
+                 emission = [{shine}, {shine}, {shine}] }}\n{body}"
+            );
+            let packed = scene(256, depth, &text);
+            let expected = shine * (1.0 - f64::powi(albedo, depth as i32 + 1)) / (1.0 - albedo);
+            for way in both() {
+                let found = mean(&render(&packed, way))[0];
+                assert!(
+                    near(found, expected, 4e-3),
+                    "{way:?}, {depth}: {found} for {expected}\n{body}"
+                );
+                assert!(!near(found, expected * 1.02, 4e-3), "the control");
+            }
+        }
+    }
+}
+
+/// The form factor from a point of a plane to a parallel rectangle that has a corner straight above it, at height h: Howell, "A Catalog
+/// of Radiation Heat Transfer Configuration Factors", B-3.
+fn corner_factor(a: f64, b: f64, h: f64) -> f64 {
+    let (x, y) = (a / h, b / h);
+    let (p, q) = ((1.0 + x * x).sqrt(), (1.0 + y * y).sqrt());
+    (x / p * (y / p).atan() + y / q * (x / q).atan()) / (2.0 * PI)
+}
+
+#[test]
+fn a_rectangle_lights_the_floor_by_its_form_factor() {
+    let (width, height, h) = (1.5, 0.5, 0.8);
+    let factor = |x: f64, y: f64| {
+        let mut sum = 0.0;
+        for (sx, sy) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+            let (a, b) = (width / 2.0 + sx * x, height / 2.0 + sy * y);
+            sum += a.signum() * b.signum() * corner_factor(a.abs(), b.abs(), h);
+        }
+        sum
+    };
+    let light = format!(
+        "[[lights]]\ntype = 'rectangle'\ncenter = [0, 0, {h}]\nsize = [{width}, {height}]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [3, 2, 1]\n"
+    );
+    let shape = format!(
+        "materials.s = {{ type = 'diffuse', color = [0, 0, 0], emission = [3, 2, 1] }}\n[[shapes]]\ntype = 'rectangle'\nmaterial = 's'\ncenter = [0, 0, {h}]\nsize = [{width}, {height}]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n"
+    );
+    for shining in [light, shape] {
+        // Seen from below the light, beside it and far from it.
+        for (x, y) in [(0.0, 0.0), (0.6, 0.1), (2.0, 1.5)] {
+            let camera = above(x, y, 0.4, 0.02);
+            let packed = scene(
+                1024,
+                1,
+                &format!("{camera}materials.m = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{shining}{FLOOR}"),
+            );
+            let expected = 0.5 * factor(x, y);
+            for way in both() {
+                let found = mean(&render(&packed, way));
+                for (found, radiance) in found.into_iter().zip([3.0, 2.0, 1.0]) {
+                    assert!(
+                        near(found, expected * radiance, 2e-3),
+                        "{way:?}, {x} {y}: {found} for {expected}"
+                    );
+                    assert!(!near(found, expected * radiance * 1.01, 2e-3), "the control");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn spheres_and_disks_light_the_floor_by_their_form_factors() {
+    // A sphere of radius r at height h, straight above: (r / d)^2 cos; a disk: r^2 / (r^2 + h^2). So too for tiny and huge ones.
+    for scale in [1e-3, 1.0, 1e3] {
+        for r in [1e-3, 0.3, 0.999] {
+            let h = 1.0;
+            let (r, h) = (r * scale, h * scale);
+            let factor_sphere = (r / h) * (r / h);
+            let factor_disk = r * r / (r * r + h * h);
+            for (shape, factor) in [
+                (
+                    format!("type = 'sphere'\ncenter = [0, 0, {h}]\nradius = {r}"),
+                    factor_sphere,
+                ),
+                (
+                    format!(
+                        "type = 'disk'\ncenter = [0, 0, {h}]\nradius = {r}\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]"
+                    ),
+                    factor_disk,
+                ),
+            ] {
+                let camera = above(0.0, 0.0, 1e-4 * scale, 1e-6 * scale);
+                let packed = scene(
+                    1024,
+                    1,
+                    &format!(
+                        "{camera}materials.m = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\nmaterials.s = {{ type = 'diffuse', color = [0, 0, 0], emission = [10, 10, 10] }}\n[[shapes]]\nmaterial = 's'\n{shape}\n{FLOOR}"
+                    ),
+                );
+                for way in both() {
+                    let found = mean(&render(&packed, way))[1];
+                    let expected = 5.0 * factor;
+                    assert!(
+                        near(found, expected, 3e-3),
+                        "{way:?}, {r} {scale}: {found} for {expected} {shape}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn points_fall_off_with_the_square_of_the_distance_and_suns_do_not() {
+    for (light, expected) in [
+        (
+            "type = 'point'\nposition = [0, 0, 2]\ncolor = [8, 8, 8]",
+            0.5 / PI * 8.0 / 4.0,
+        ),
+        (
+            "type = 'directional'\ndirection = [0, 3, -4]\ncolor = [8, 8, 8]",
+            0.5 / PI * 8.0 * 0.8,
+        ),
+    ] {
+        let packed = scene(
+            4,
+            1,
+            &format!(
+                "{}materials.m = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n[[lights]]\n{light}\n{FLOOR}",
+                above(0.0, 0.0, 1.0, 1e-3)
+            ),
+        );
+        for way in both() {
+            for found in means(&render(&packed, way)) {
+                assert!(near(found[0], expected, 1e-5), "{way:?}: {} for {expected}", found[0]);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_slab_of_glass_passes_what_fresnel_and_beer_leave() {
+    // At a right angle: r = ((n - 1) / (n + 1))^2 at each face; inside light goes to and fro, and loses exp(-a d) each time.
+    let n = 1.5_f64;
+    let r = ((n - 1.0) / (n + 1.0)).powi(2);
+    for (absorption, thickness) in [(0.0, 0.5), (0.7, 0.5), (3.0, 1.0)] {
+        let a = f64::exp(-absorption * thickness);
+        let passed = (1.0 - r).powi(2) * a / (1.0 - r * r * a * a);
+        let text = format!(
+            "{}environment = {{ color = [0, 0, 0] }}\n\
+             materials.m = {{ type = 'dielectric', ior = {n}, absorption = [{absorption}, {absorption}, {absorption}] }}\n\
+             materials.s = {{ type = 'diffuse', color = [0, 0, 0], emission = [1, 1, 1] }}\n\
+             [[shapes]]\ntype = 'rectangle'\nmaterial = 'm'\ncenter = [0, 0, {thickness}]\nsize = [9, 9]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n\
+             [[shapes]]\ntype = 'rectangle'\nmaterial = 'm'\ncenter = [0, 0, 0]\nsize = [9, 9]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n\
+             [[shapes]]\ntype = 'rectangle'\nmaterial = 's'\ncenter = [0, 0, -1]\nsize = [9, 9]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n",
+            above(0.0, 0.0, 3.0, 1.0)
+        );
+        let packed = scene(1024, 1000, &text);
+        for way in both() {
+            let found = mean(&render(&packed, way))[2];
+            assert!(near(found, passed, 1e-3), "{way:?}, {absorption}: {found} for {passed}");
+            assert!(!near(found, passed * 1.01, 1e-3), "the control");
+        }
+    }
+}
+
+#[test]
+fn radiance_in_glass_is_the_square_of_its_index() {
+    // From inside of glass in a furnace every direction that leaves has n^2 times its radiance, less what is mirrored back, which is the same light.
+    let text = format!(
+        "{INSIDE}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'dielectric', ior = 1.5 }}\n\
+         [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 3\n"
+    );
+    let packed = scene(256, 1000, &text);
+    for way in both() {
+        let found = mean(&render(&packed, way))[0];
+        assert!(near(found, 2.25, 2e-3), "{way:?}: {found}");
+    }
+}

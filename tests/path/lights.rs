@@ -1,0 +1,110 @@
+//! Lights among lights: each is chosen as often as its power says, whatever shines, and what is hidden lights nothing.
+
+use std::fmt::Write as _;
+
+use glam::UVec2;
+use wgray::cpu::emitter::chosen_emitter;
+use wgray::cpu::rng::hash4;
+
+use super::{mean, scene};
+use crate::pictures::{both, means, render};
+
+const CAMERA: &str = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.3], fov = 50 }\n\
+                      materials.m = { type = 'diffuse', color = [0.7, 0.7, 0.7] }\n";
+const FLOOR: &str =
+    "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
+
+#[test]
+fn lights_are_chosen_by_their_power() {
+    // Points of power 1 to 40, and one that is dark.
+    let mut text = format!("{CAMERA}{FLOOR}");
+    for i in 0..=40 {
+        let _ = write!(
+            text,
+            "[[lights]]\ntype = 'point'\nposition = [{i}, 0, 1]\ncolor = [{i}, {i}, {i}]\n"
+        );
+    }
+    let packed = scene(1, 1, &text);
+    assert_eq!(packed.emitters.len(), 40, "the dark one is none");
+    let mut counts = vec![0.0; packed.lights.len()];
+    let calls = 400_000;
+    for i in 0..calls {
+        let bits = hash4(glam::UVec4::new(i, 1, 2, 3));
+        let emitter = chosen_emitter(&packed, UVec2::new(bits.x, bits.y));
+        counts[emitter.index as usize] += 1.0;
+    }
+    let total = f64::from(40 * 41 / 2);
+    let chi_square: f64 = (packed.lights.iter().zip(&counts))
+        .map(|(light, count)| {
+            let share = f64::from(light.color.x) / total;
+            assert!(
+                (f64::from(light.density) - share).abs() < 1e-6,
+                "its density is its share"
+            );
+            let expected = share * f64::from(calls);
+            (count - expected) * (count - expected) / expected
+        })
+        .sum();
+    assert!(chi_square < 39.0 + 6.0 * (2.0_f64 * 39.0).sqrt(), "{chi_square}");
+}
+
+#[test]
+fn what_shines_lights_alike_whatever_it_is_made_of() {
+    // A square light as a light, as a rectangle, as two triangles, as a box of no height nearly, by a texture of one colour; alone and
+    // among others.
+    let square = "center = [0, 0, 1]\nsize = [1, 1]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n";
+    let shine = "materials.s = { type = 'diffuse', color = [0, 0, 0], emission = [4, 4, 4] }\n";
+    let textured = "textures.t = { type = 'checker', even = [4, 4, 4], odd = [4, 4, 4] }\n\
+                    materials.s = { type = 'diffuse', color = [0, 0, 0], emission = { texture = 't' } }\n";
+    let kinds = [
+        format!("{CAMERA}[[lights]]\ntype = 'rectangle'\ncolor = [4, 4, 4]\n{square}{FLOOR}"),
+        format!("{CAMERA}{shine}[[shapes]]\ntype = 'rectangle'\nmaterial = 's'\n{square}{FLOOR}"),
+        format!("{CAMERA}{textured}[[shapes]]\ntype = 'rectangle'\nmaterial = 's'\n{square}{FLOOR}"),
+        format!(
+            "{CAMERA}{shine}[[shapes]]\ntype = 'triangle'\nmaterial = 's'\nvertices = [[-0.5, -0.5, 1], [0.5, -0.5, 1], [0.5, 0.5, 1]]\n\
+             [[shapes]]\ntype = 'triangle'\nmaterial = 's'\nvertices = [[-0.5, -0.5, 1], [0.5, 0.5, 1], [-0.5, 0.5, 1]]\n{FLOOR}"
+        ),
+    ];
+    let far = "[[lights]]\ntype = 'point'\nposition = [0, 500, 1e5]\ncolor = [1e3, 1e3, 1e3]\n";
+    let expected = mean(&render(&scene(1024, 1, &kinds[0]), both()[0]));
+    for kind in &kinds {
+        for text in [kind.clone(), format!("{kind}{far}")] {
+            let packed = scene(1024, 1, &text);
+            for way in both() {
+                let found = mean(&render(&packed, way));
+                assert!(
+                    (found[0] - expected[0]).abs() < 5e-3 * expected[0],
+                    "{way:?}: {found:?} for {expected:?}\n{text}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rectangle_light_hides_what_is_behind_it_and_shines_to_one_side() {
+    let light = "[[lights]]\ntype = 'rectangle'\ncenter = [0, 0, 1]\nsize = [1, 1]\nnormal = [0, 0, NZ]\ntangent = [1, 0, 0]\ncolor = [4, 4, 4]\n";
+    let sun = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -1]\ncolor = [2, 2, 2]\n";
+    let camera = "camera = { type = 'orthographic', position = [0, 0, 0.5], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }\n\
+                  materials.m = { type = 'diffuse', color = [0.5, 0.5, 0.5] }\n";
+    // Turned away, it is but a shade in the sun.
+    let packed = scene(1024, 1, &format!("{camera}{}{sun}{FLOOR}", light.replace("NZ", "1")));
+    for way in both() {
+        let found = means(&render(&packed, way));
+        let at = |x: usize, y: usize| found[y * 16 + x][0];
+        assert_eq!(at(8, 8), 0.0, "{way:?}: in its shade");
+        let lit = at(1, 1);
+        assert!(
+            (lit - 1.0 / std::f64::consts::PI).abs() < 5e-3,
+            "{way:?}: {lit} in the sun"
+        );
+    }
+    // From above it is black behind, and bright before.
+    for (nz, expected) in [(1.0, 4.0), (-1.0, 0.0)] {
+        let camera = "camera = { type = 'orthographic', position = [0, 0, 2], look_at = [0, 0, 0], up = [0, 1, 0], height = 0.5 }\n";
+        let packed = scene(4, 3, &format!("{camera}{}", light.replace("NZ", &nz.to_string())));
+        for way in both() {
+            assert_eq!(mean(&render(&packed, way))[0], expected, "{way:?}");
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! Materials by themselves: what they reflect of light from everywhere, that light's way can be turned round, and that directions
+//! come as often as their density says. In f64 by quadratures of their own.
+
+use std::f64::consts::{PI, TAU};
+
+use bytemuck::Zeroable;
+use glam::{DVec3, Vec2, Vec3};
+use wgray::cpu::diffuse::{angles_at, diffuse_eval, diffuse_pdf, diffuse_sample, rough_diffuse_eval};
+use wgray::cpu::modified_phong::{modified_phong_eval, modified_phong_pdf, modified_phong_sample};
+use wgray::cpu::sequence::sobol_sample;
+use wgray::pack::{DIFFUSE, Material, PHONG};
+
+/// What a material is: its functions.
+struct Lobes {
+    name: String,
+    material: Material,
+    /// Whether it reflects all light that its colour, 1, lets it.
+    whole: bool,
+}
+
+impl Lobes {
+    fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        let angles = angles_at(Vec3::Z, wo, wi);
+        match self.material.kind {
+            PHONG => modified_phong_eval(&self.material, angles),
+            _ if self.material.roughness > 0.0 => rough_diffuse_eval(&self.material, angles),
+            _ => diffuse_eval(&self.material, angles),
+        }
+    }
+
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        let angles = angles_at(Vec3::Z, wo, wi);
+        match self.material.kind {
+            PHONG => modified_phong_pdf(&self.material, angles),
+            _ => diffuse_pdf(angles),
+        }
+    }
+
+    fn sample(&self, wo: Vec3, u: Vec2, random: f32) -> Vec3 {
+        match self.material.kind {
+            PHONG => modified_phong_sample(&self.material, Vec3::Z, wo, u, random),
+            _ => diffuse_sample(Vec3::Z, u),
+        }
+    }
+}
+
+fn all() -> Vec<Lobes> {
+    let diffuse = |roughness: f32| Lobes {
+        name: format!("diffuse, roughness {roughness}"),
+        material: Material {
+            kind: DIFFUSE,
+            diffuse: Vec3::ONE,
+            roughness,
+            ..Material::zeroed()
+        },
+        whole: true,
+    };
+    let phong = |kd: f32, ks: f32, shininess: f32| Lobes {
+        name: format!("phong {kd} {ks} {shininess}"),
+        material: Material {
+            kind: PHONG,
+            diffuse: Vec3::splat(kd),
+            specular: Vec3::splat(ks),
+            shininess,
+            ..Material::zeroed()
+        },
+        whole: false,
+    };
+    vec![
+        diffuse(0.0),
+        diffuse(1e-6),
+        diffuse(0.3),
+        diffuse(1.0),
+        phong(1.0, 0.0, 16.0),
+        phong(0.0, 1.0, 1e-6),
+        phong(0.4, 0.6, 1.0),
+        phong(0.5, 0.5, 37.5),
+        phong(0.0, 1.0, 1000.0),
+        phong(0.7, 0.7, 16.0),
+    ]
+}
+
+fn direction(cosine: f64, longitude: f64) -> Vec3 {
+    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+    DVec3::new(sine * longitude.cos(), sine * longitude.sin(), cosine).as_vec3()
+}
+
+/// Directions to a viewer: from straight above to grazing.
+fn viewers() -> Vec<Vec3> {
+    [1.0, 0.9, 0.5, 0.1, 0.01].map(|cosine| direction(cosine, 0.7)).to_vec()
+}
+
+/// The integral over all directions around the mirrored one or, for a function of wide lobes, around the normal: cells fine where a lobe
+/// is narrow.
+fn integral(wo: Vec3, mut f: impl FnMut(Vec3) -> f64) -> f64 {
+    let (rings, spokes) = (1500, 600);
+    let axis = Vec3::new(-wo.x, -wo.y, wo.z).as_dvec3().normalize();
+    let u = axis.any_orthonormal_vector();
+    let v = axis.cross(u);
+    let mut sum = 0.0;
+    for i in 0..rings {
+        // Rings of equal steps of the angle's square root near the axis.
+        let edge = |i: i32| PI * (f64::from(i) / f64::from(rings)).powi(2);
+        let (inner, outer) = (edge(i), edge(i + 1));
+        let angle = (inner + outer) / 2.0;
+        let area = (inner.cos() - outer.cos()) * TAU / f64::from(spokes);
+        for j in 0..spokes {
+            let longitude = TAU * (f64::from(j) + 0.5) / f64::from(spokes);
+            let d = axis * angle.cos() + (u * longitude.cos() + v * longitude.sin()) * angle.sin();
+            sum += f(d.as_vec3()) * area;
+        }
+    }
+    sum
+}
+
+#[test]
+fn a_white_surface_in_white_light_is_white_or_darker() {
+    for lobes in all() {
+        for wo in viewers() {
+            let reflected = integral(wo, |wi| {
+                if wi.z > 0.0 {
+                    f64::from(lobes.eval(wo, wi).x)
+                } else {
+                    0.0
+                }
+            });
+            let name = &lobes.name;
+            if lobes.whole {
+                assert!((reflected - 1.0).abs() < 2e-3, "{name}, {wo}: {reflected}");
+            } else {
+                assert!(reflected < 1.001 && reflected > 0.0, "{name}, {wo}: {reflected}");
+            }
+        }
+    }
+    // The control: without what is given back, a rough surface is darker.
+    let once = Material {
+        diffuse: Vec3::splat(1e-3),
+        roughness: 1.0,
+        ..Material::zeroed()
+    };
+    let wo = viewers()[1];
+    let lost = 1.0
+        - integral(wo, |wi| {
+            f64::from(rough_diffuse_eval(&once, angles_at(Vec3::Z, wo, wi)).x)
+        }) / 1e-3;
+    assert!(lost > 0.05, "{lost}");
+}
+
+#[test]
+fn light_has_the_same_way_back() {
+    for lobes in all() {
+        for wo in viewers() {
+            for wi in [direction(0.8, 0.1), direction(0.3, 3.9), direction(0.02, 2.0)] {
+                let there = lobes.eval(wo, wi) / wi.z;
+                let back = lobes.eval(wi, wo) / wo.z;
+                assert!(
+                    there.abs_diff_eq(back, 2e-5 * there.x.max(1.0)),
+                    "{}: {there} {back}",
+                    lobes.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn densities_integrate_to_one() {
+    for lobes in all() {
+        for wo in viewers() {
+            let total = integral(wo, |wi| f64::from(lobes.pdf(wo, wi)));
+            assert!((total - 1.0).abs() < 3e-3, "{}, {wo}: {total}", lobes.name);
+        }
+    }
+}
+
+/// Pearson's chi-square over cells of the sphere, and its degrees of freedom: of directions that are sampled, against the density. Cells that
+/// are expected to have few are taken together.
+fn chi_square(lobes: &Lobes, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) {
+    const SAMPLES: u32 = 200_000;
+    const HEIGHTS: usize = 40;
+    const LONGITUDES: usize = 40;
+    // Cells in the frame of the mirrored direction, where lobes are narrow.
+    let axis = Vec3::new(-wo.x, -wo.y, wo.z).as_dvec3().normalize();
+    let u = axis.any_orthonormal_vector();
+    let v = axis.cross(u);
+    let cell = |d: DVec3| {
+        let angle = d.dot(axis).clamp(-1.0, 1.0).acos();
+        let ring = ((angle / PI).sqrt() * HEIGHTS as f64) as usize;
+        let longitude = d.dot(v).atan2(d.dot(u)) / TAU + 0.5;
+        ring.min(HEIGHTS - 1) * LONGITUDES + ((longitude * LONGITUDES as f64) as usize).min(LONGITUDES - 1)
+    };
+    let mut counts = vec![0.0; HEIGHTS * LONGITUDES];
+    for i in 0..SAMPLES {
+        // Independent numbers: a sequence's are too even for this test.
+        let bits = wgray::cpu::rng::hash4(glam::UVec4::new(i, 7, 11, 13));
+        let [a, b, c] = [bits.x, bits.y, bits.z].map(wgray::cpu::rng::unit_float);
+        let wi = lobes.sample(wo, Vec2::new(a, b), c).as_dvec3();
+        assert!((wi.length() - 1.0).abs() < 1e-5, "{}: {wi}", lobes.name);
+        counts[cell(wi)] += 1.0;
+    }
+    let mut expected = vec![0.0; HEIGHTS * LONGITUDES];
+    let fine = 20;
+    for ring in 0..HEIGHTS * fine {
+        let edge = |i: usize| PI * (i as f64 / (HEIGHTS * fine) as f64).powi(2);
+        let (inner, outer) = (edge(ring), edge(ring + 1));
+        let angle = (inner + outer) / 2.0;
+        for spoke in 0..LONGITUDES * fine {
+            let longitude = TAU * ((spoke as f64 + 0.5) / (LONGITUDES * fine) as f64 - 0.5);
+            let d = axis * angle.cos() + (u * longitude.cos() + v * longitude.sin()) * angle.sin();
+            let area = (inner.cos() - outer.cos()) * TAU / (LONGITUDES * fine) as f64;
+            expected[cell(d)] += pdf(d.as_vec3()) * area * f64::from(SAMPLES);
+        }
+    }
+    let (mut sum, mut cells, mut rest) = (0.0, -1.0, (0.0, 0.0));
+    for (count, expected) in counts.iter().zip(&expected) {
+        if *expected < 10.0 {
+            rest = (rest.0 + count, rest.1 + expected);
+        } else {
+            sum += (count - expected) * (count - expected) / expected;
+            cells += 1.0;
+        }
+    }
+    if rest.1 > 10.0 {
+        sum += (rest.0 - rest.1) * (rest.0 - rest.1) / rest.1;
+        cells += 1.0;
+    }
+    (sum, cells)
+}
+
+#[test]
+fn directions_are_as_frequent_as_their_density_says() {
+    for lobes in all() {
+        for wo in [direction(0.95, 0.4), direction(0.3, 2.5)] {
+            let (sum, freedom) = chi_square(&lobes, wo, |wi| f64::from(lobes.pdf(wo, wi)));
+            // Six standard deviations of the distribution.
+            let most = freedom + 6.0 * (2.0 * freedom).sqrt();
+            assert!(freedom > 5.0 && sum < most, "{}, {wo}: {sum} of {freedom}", lobes.name);
+            let (wrong, _) = chi_square(&lobes, wo, |wi| {
+                f64::from(lobes.pdf(wo, wi)) * if wi.x > 0.0 { 1.08 } else { 0.92 }
+            });
+            assert!(
+                wrong > most,
+                "{}: a wrong density is not seen: {wrong} of {freedom}",
+                lobes.name
+            );
+        }
+    }
+}
+
+#[test]
+fn a_sample_is_worth_what_it_reflects() {
+    // The mean of eval / pdf is the albedo by quadrature.
+    for lobes in all() {
+        for wo in viewers() {
+            let expected = integral(wo, |wi| {
+                if wi.z > 0.0 {
+                    f64::from(lobes.eval(wo, wi).x)
+                } else {
+                    0.0
+                }
+            });
+            let count = 65_536;
+            let mut sum = 0.0;
+            for i in 0..count {
+                let u = sobol_sample(i, glam::UVec2::new(1, 2));
+                let random = sobol_sample(i, glam::UVec2::new(3, 4)).x;
+                let wi = lobes.sample(wo, u, random);
+                let pdf = lobes.pdf(wo, wi);
+                if wi.z > 0.0 && pdf > 0.0 {
+                    sum += f64::from(lobes.eval(wo, wi).x) / f64::from(pdf);
+                }
+            }
+            let mean = sum / f64::from(count);
+            assert!(
+                (mean - expected).abs() < 6e-3,
+                "{}, {wo}: {mean} {expected}",
+                lobes.name
+            );
+        }
+    }
+}

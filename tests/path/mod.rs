@@ -1,0 +1,29 @@
+//! The integrator `path`: materials by their own laws, scenes whose light mathematics knows, and that every way to sample
+//! light finds the same.
+
+mod ends;
+mod forms;
+mod lights;
+mod materials;
+mod strategies;
+
+use wgray::pack::Packed;
+
+use crate::scenes;
+
+/// A scene of the path tracer from the rest of its text: 16 x 16 pixels, so many samples of each.
+pub fn scene(samples: u32, depth: u32, rest: &str) -> Packed {
+    scenes::parse(&format!(
+        "image = {{ width = 16, height = 16 }}\n{rest}\n\
+         [render]\nintegrator = 'path'\nmax_depth = {depth}\npixel_samples = {{ count = {samples} }}\n"
+    ))
+}
+
+/// The mean of a film's pixels, by channel.
+pub fn mean(film: &wgray::film::Film) -> [f64; 3] {
+    let count = film.sums.len() as f64;
+    let sum = film.means().fold([0.0; 3], |sum: [f64; 3], mean| {
+        [0, 1, 2].map(|i| sum[i] + f64::from(mean[i]))
+    });
+    sum.map(|x| x / count)
+}

@@ -1,0 +1,90 @@
+//! Samples of light alone, samples of materials alone and both together converge to one mean: so densities and weights fit each
+//! other.
+
+use wgray::gpu::compose::Shaders;
+
+use super::{mean, scene};
+use crate::pictures::{Way, render_with};
+use crate::{adapter, sources};
+
+const FILE: &str = "integrators/path.wgsl";
+
+fn path_with(changes: &[(&str, &str)]) -> Shaders {
+    let mut text = sources::shaders().text(FILE).to_owned();
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from} is not there to be changed");
+        text = text.replace(from, to);
+    }
+    sources::shaders_with(FILE, &text)
+}
+
+#[test]
+fn light_alone_and_materials_alone_find_the_same() {
+    if adapter::device().is_none() {
+        return;
+    }
+    const OF_LIGHT: &str = "select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta)";
+    const OF_MATERIAL: &str =
+        "power_heuristic(state.pdf, emitter_pdf(spot, hit, material, state.path.ray, surface.normal));";
+    let light_alone = path_with(&[(OF_LIGHT, "1.0"), (OF_MATERIAL, "0.0;")]);
+    let material_alone = path_with(&[(OF_LIGHT, "0.0"), (OF_MATERIAL, "1.0;")]);
+    let wrong = path_with(&[(
+        OF_LIGHT,
+        "0.9 * (select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta))",
+    )]);
+    let camera = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.5], fov = 40 }\n\
+                  materials.shine = { type = 'diffuse', color = [0.3, 0.3, 0.3], emission = [5, 3, 1] }\n\
+                  materials.dim = { type = 'phong', diffuse = [0.3, 0.3, 0.3], specular = [0.3, 0.3, 0.3], shininess = 5, ambient = [0, 0, 0], emission = [1, 2, 1] }\n\
+                  [[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
+    let shapes = [
+        "[[shapes]]\ntype = 'sphere'\nmaterial = 'shine'\ncenter = [0.2, 0, 0.9]\nradius = 0.5\n",
+        "[[shapes]]\ntype = 'ellipsoid'\nmaterial = 'shine'\ncenter = [0, 0, 0.6]\na = [0.8, 0.1, 0]\nb = [0, 0.3, 0.1]\nc = [0, 0.1, 0.3]\n",
+        "[[shapes]]\ntype = 'disk'\nmaterial = 'shine'\ncenter = [0, 0.4, 0.8]\nradius = 0.6\nnormal = [0.3, -0.5, 0.4]\ntangent = [0.5, 0.3, 0]\n",
+        "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'shine'\nvertices = [[-0.5, 0, 0.3], [0.5, 0, 0.3], [0, 0.6, 0.3], [0, 0.2, 0.9]]\n",
+        "[[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.1]\nsize = [1, 0.5]\nnormal = [0.1, -0.3, -1]\ntangent = [10, 0, 1]\ncolor = [5, 3, 1]\n",
+        // several, of several powers, one behind the other
+        "[[shapes]]\ntype = 'sphere'\nmaterial = 'shine'\ncenter = [-0.6, 0, 0.7]\nradius = 0.3\n\
+         [[shapes]]\ntype = 'disk'\nmaterial = 'dim'\ncenter = [0.6, 0.4, 0.7]\nradius = 0.3\nnormal = [-1, -1, 0]\ntangent = [1, -1, 0]\n\
+         [[shapes]]\ntype = 'triangle'\nmaterial = 'dim'\nvertices = [[-1, 1, 0.1], [1, 1, 0.1], [0, 1, 1.5]]\n\
+         [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.3]\nsize = [1, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [2, 3, 4]\n",
+    ];
+    for (i, shape) in shapes.into_iter().enumerate() {
+        let materials = [
+            "type = 'diffuse', color = [0.7, 0.6, 0.5]",
+            "type = 'diffuse', color = [0.7, 0.6, 0.5], roughness = 0.8",
+            "type = 'phong', diffuse = [0.4, 0.4, 0.4], specular = [0.5, 0.5, 0.5], shininess = 12, ambient = [0, 0, 0]",
+        ];
+        // Each with one of them, the last with all.
+        for material in materials
+            .iter()
+            .skip(if i < 5 { i % 3 } else { 0 })
+            .take(if i < 5 { 1 } else { 3 })
+        {
+            let text = format!("materials.m = {{ {material} }}\n{camera}{shape}");
+            let packed = scene(4096, 2, &text);
+            // What is seen to shine is left out.
+            let seen = mean(&render_with(&scene(4096, 0, &text), Way::Baked, sources::shaders()));
+            let reflected = |shaders: &Shaders| {
+                let found = mean(&render_with(&packed, Way::Baked, shaders));
+                [0, 1, 2].map(|i| found[i] - seen[i])
+            };
+            let both = reflected(sources::shaders());
+            let (light, materials, wrong) = (reflected(&light_alone), reflected(&material_alone), reflected(&wrong));
+            for i in 0..3 {
+                let near = |x: f64, relative: f64| (x - both[i]).abs() < relative * both[i];
+                assert!(
+                    near(light[i], 1e-2),
+                    "light alone: {light:?} for {both:?}\n{shape}{material}"
+                );
+                assert!(
+                    near(materials[i], 1e-2),
+                    "materials alone: {materials:?} for {both:?}\n{shape}{material}"
+                );
+                assert!(
+                    !near(wrong[i], 1e-2),
+                    "the control: {wrong:?} for {both:?}\n{shape}{material}"
+                );
+            }
+        }
+    }
+}
