@@ -44,10 +44,10 @@ fn ellipsoid_pdf(q: Primitive, p: vec3f, wi: vec3f) -> f32 {
 }
 
 // The weight of a sample whose direction has the density `own`, where another way to find it has the density `other`: the power
-// heuristic with the exponent 2, Veach's thesis, section 9.2.4.
+// heuristic with the exponent 2, Veach's thesis, section 9.2.4. 0 for what has no density.
 fn power_heuristic(own: f32, other: f32) -> f32 {
     let ratio = other / own;
-    return 1.0 / (1.0 + ratio * ratio);
+    return select(0.0, 1.0 / (1.0 + ratio * ratio), own > 0.0);
 }
 
 // The upper 32 bits of a product: a whole number below `count`, uniform where the bits are.

@@ -53,7 +53,7 @@ pub fn ellipsoid_pdf(q: &Primitive, p: Vec3, wi: Vec3) -> f32 {
 
 pub fn power_heuristic(own: f32, other: f32) -> f32 {
     let ratio = other / own;
-    1.0 / (1.0 + ratio * ratio)
+    if own > 0.0 { 1.0 / (1.0 + ratio * ratio) } else { 0.0 }
 }
 
 pub fn whole_below(bits: u32, count: u32) -> u32 {
