@@ -9,9 +9,9 @@ struct PhongFactors {
 }
 
 fn phong_factors(material: Material) -> PhongFactors {
-    let scale = 1.0 / max(largest(material.diffuse + material.specular), 1.0);
-    let diffuse = material.diffuse * scale;
-    let specular = material.specular * scale;
+    let most = largest(material.diffuse + material.specular);
+    let diffuse = select(material.diffuse, material.diffuse / most, most > 1.0);
+    let specular = select(material.specular, material.specular / most, most > 1.0);
     let d = diffuse.x + diffuse.y + diffuse.z;
     let s = specular.x + specular.y + specular.z;
     return PhongFactors(diffuse, specular, select(1.0, d / (d + s), s > 0.0));

@@ -18,9 +18,9 @@ pub struct PhongFactors {
 }
 
 pub fn phong_factors(material: &Material) -> PhongFactors {
-    let scale = 1.0 / max(largest(material.diffuse + material.specular), 1.0);
-    let diffuse = material.diffuse * scale;
-    let specular = material.specular * scale;
+    let most = largest(material.diffuse + material.specular);
+    let shrunk = |factor: Vec3| if most > 1.0 { factor / most } else { factor };
+    let (diffuse, specular) = (shrunk(material.diffuse), shrunk(material.specular));
     let d = diffuse.x + diffuse.y + diffuse.z;
     let s = specular.x + specular.y + specular.z;
     PhongFactors {
