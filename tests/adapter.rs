@@ -61,7 +61,7 @@ pub struct Known {
 
 /// All of them.
 pub const KNOWN: &[Known] = &[
-    swiftshader("denormal numbers", "zero taken for denormal numbers", 0.0095),
+    swiftshader("denormal numbers", "zero taken for denormal numbers", 0.0096),
     swiftshader("grid_sample", ROUNDED_TWICE, 0.0014),
     swiftshader("rotated_grid_sample", ROUNDED_TWICE, 0.0005),
     swiftshader("jittered_sample", ROUNDED_TWICE, 0.0065),
