@@ -1,7 +1,12 @@
-//! What renders: the choice among the CPU and the adapters of the machine, and the CPU that takes over where an adapter
-//! cannot do the work.
+//! What renders: the choice among the CPU and the adapters of the machine, the device that is opened anew where one was lost,
+//! and the CPU that takes over where an adapter cannot do the work.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 use crate::backend::Backend;
+use crate::contain::contained;
 use crate::cpu::Cpu;
 use crate::error::{Error, RenderError};
 #[cfg(feature = "gpu")]
@@ -53,53 +58,110 @@ pub struct DeviceInfo {
 
 type Ready<'a> = (Box<dyn Backend + 'a>, DeviceInfo);
 
-/// A scene on a device, with the CPU to fall back on.
+/// What is done about a fault of a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Remedy {
+    /// The device is opened anew.
+    Anew,
+    /// The CPU renders from now on.
+    Cpu,
+}
+
+/// What is told of a fault that does not end the work.
+pub type Tell<'a> = Box<dyn FnMut(&RenderError, Remedy) + 'a>;
+
+/// Whom a renderer turns to at a fault.
+pub struct OnFault<'a> {
+    /// Is told of a fault that does not end the work, and what is done about it.
+    pub tell: Tell<'a>,
+    /// Tells whether to give up while a lost device is waited for.
+    pub stopped: Box<dyn Fn() -> bool + 'a>,
+}
+
+/// So long a lost device is given to come back before it is opened anew, time after time without any progress in between.
+const PAUSES: [Duration; 3] = [Duration::ZERO, Duration::from_millis(500), Duration::from_secs(2)];
+
+/// So often a pause is looked up from.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Tells a renderer, in the midst of its work, that the work has come further in a way that a loss of the device does not undo.
+/// Losses are counted from there: work that comes on between them goes on, however many there are.
+#[derive(Clone, Debug, Default)]
+pub struct Progress(Arc<AtomicU64>);
+
+impl Progress {
+    /// Something was finished for good.
+    pub fn made(&self) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn count(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// A scene on a device, which is opened anew if it is lost, with the CPU to fall back on.
 pub struct Renderer<'a> {
     scene: &'a Packed,
+    device: Device,
+    exact_rounding: bool,
     backend: Box<dyn Backend + 'a>,
     info: DeviceInfo,
     why: Option<String>,
-    on_cpu: Box<dyn FnMut(&RenderError) + 'a>,
+    on_fault: OnFault<'a>,
+    /// The film that work may be cut for, once that is known: a device that takes the place of another must have room for it.
+    needed_film: Option<u64>,
+    /// The device that was lost, and why, while there is no other.
+    gone: Option<(String, String)>,
+    /// How often the device was lost since there was progress.
+    losses: usize,
+    progress: Progress,
+    /// What it counted at the last loss.
+    known_progress: u64,
 }
 
 impl<'a> Renderer<'a> {
-    /// Makes a device ready for a scene. With [`Device::Auto`] the CPU renders where there is no adapter, and where the
-    /// scene is too large for it; `on_cpu` is told why.
+    /// Makes a device ready for a scene. With [`Device::Auto`] the CPU renders where there is no adapter, where the scene is
+    /// too large for it, and where it is lost and does not come back; `on_fault` is told why.
     ///
     /// # Errors
     ///
-    /// No device that fits the choice, scenes that it has no room for, what its driver refuses, and
+    /// No device that fits the choice, scenes that it has no room for, what its driver refuses or loses, and
     /// [`Options::exact_rounding`] on an adapter that is not reached by Vulkan.
-    pub fn new(
-        scene: &'a Packed,
-        options: &Options,
-        mut on_cpu: Box<dyn FnMut(&RenderError) + 'a>,
-    ) -> Result<Renderer<'a>, Error> {
-        let device = &options.device;
-        let why = match device {
-            Device::Auto => faster_on_cpu(scene),
-            _ => None,
-        };
-        let (backend, info) = match device {
-            Device::Cpu => cpu(scene),
-            Device::Auto if !cfg!(feature = "gpu") || why.is_some() => cpu(scene),
-            _ => match adapter(scene, device, options.exact_rounding) {
-                Err(Error::Render(why @ (RenderError::NoDevice(_) | RenderError::TooLarge { .. })))
-                    if *device == Device::Auto =>
-                {
-                    on_cpu(&why);
-                    cpu(scene)
-                }
-                ready => ready?,
-            },
-        };
-        Ok(Renderer {
+    pub fn new(scene: &'a Packed, options: &Options, on_fault: OnFault<'a>) -> Result<Renderer<'a>, Error> {
+        let (backend, info) = cpu(scene);
+        let mut renderer = Renderer {
             scene,
+            device: options.device.clone(),
+            exact_rounding: options.exact_rounding,
+            needed_film: None,
+            gone: None,
             backend,
             info,
-            why,
-            on_cpu,
-        })
+            why: match options.device {
+                Device::Auto => faster_on_cpu(scene),
+                _ => None,
+            },
+            on_fault,
+            losses: 0,
+            progress: Progress::default(),
+            known_progress: 0,
+        };
+        match &options.device {
+            Device::Cpu => return Ok(renderer),
+            Device::Auto if !cfg!(feature = "gpu") || renderer.why.is_some() => return Ok(renderer),
+            _ => {}
+        }
+        match adapter(scene, &options.device, options.exact_rounding, &|_, _| true) {
+            Ok(ready) => renderer.take(ready),
+            Err(Error::Render(why @ RenderError::NoDevice(_))) if options.device == Device::Auto => {
+                renderer.go_on_cpu(&why);
+            }
+            Err(Error::Render(error)) => renderer.mend(error)?,
+            Err(error) => return Err(error),
+        }
+        renderer.needed_film = Some(renderer.backend.largest_film());
+        Ok(renderer)
     }
 
     /// Why [`Device::Auto`] chose the CPU though there is an adapter.
@@ -112,28 +174,139 @@ impl<'a> Renderer<'a> {
         &self.info
     }
 
-    /// The largest film that the device can have, in pixels.
+    /// The largest film that the device can have, in pixels. It stays so when another device takes its place.
     pub fn largest_film(&self) -> u64 {
-        self.backend.largest_film()
+        self.needed_film.unwrap_or_else(|| self.backend.largest_film())
     }
 
-    /// Does work on the device, which is told what it is. If the driver cuts it short, the CPU does it, and all that follows: it has no such limit.
+    /// What work can tell its progress by.
+    pub fn progress(&self) -> Progress {
+        self.progress.clone()
+    }
+
+    /// Does work on the device, which is told what it is. If the device is lost, it is opened anew and does the work again.
+    /// Where it does not come back, or has no memory for the work, and [`Device::Auto`] chose it, the CPU does it, and all that
+    /// follows; so it does, whatever the choice, where the driver cuts the work short, as the CPU has no such limit.
     ///
     /// # Errors
     ///
-    /// The errors of the work.
+    /// The errors of the work; [`RenderError::Lost`] if the device does not come back; [`RenderError::Cancelled`] if the
+    /// renderer was told to stop while it waited for that.
     pub fn work<T>(
         &mut self,
         mut work: impl FnMut(&mut dyn Backend, &DeviceInfo) -> Result<T, RenderError>,
     ) -> Result<T, RenderError> {
-        match work(self.backend.as_mut(), &self.info) {
-            Err(why @ RenderError::CutShort { .. }) => {
-                (self.on_cpu)(&why);
-                (self.backend, self.info) = cpu(self.scene);
-                work(self.backend.as_mut(), &self.info)
+        loop {
+            if let Some((device, message)) = self.gone.clone() {
+                return Err(RenderError::Lost { device, message });
             }
-            other => other,
+            match work(self.backend.as_mut(), &self.info) {
+                Ok(value) => {
+                    self.losses = 0;
+                    return Ok(value);
+                }
+                Err(error) => self.mend(error)?,
+            }
         }
+    }
+
+    /// Does what there is to do about an error, after which work can be done again; or returns it.
+    fn mend(&mut self, error: RenderError) -> Result<(), RenderError> {
+        match error {
+            RenderError::Lost { device, message } => self.open_anew(device, message),
+            RenderError::CutShort { .. } => {
+                self.go_on_cpu(&error);
+                Ok(())
+            }
+            RenderError::OutOfMemory { .. } | RenderError::TooLarge { .. } if self.device == Device::Auto => {
+                self.go_on_cpu(&error);
+                Ok(())
+            }
+            other => Err(other),
+        }
+    }
+
+    /// Opens the lost device anew, or one that may take its place.
+    fn open_anew(&mut self, lost: String, message: String) -> Result<(), RenderError> {
+        let progress = self.progress.count();
+        if progress > std::mem::replace(&mut self.known_progress, progress) {
+            self.losses = 0;
+        }
+        let of = |message: String| RenderError::Lost {
+            device: lost.clone(),
+            message,
+        };
+        self.release(&lost, &message);
+        let mut reason = None;
+        while let Some(pause) = PAUSES.get(self.losses) {
+            self.losses += 1;
+            if reason.is_none() {
+                (self.on_fault.tell)(&of(message.clone()), Remedy::Anew);
+            }
+            self.pause(*pause)?;
+            let last = self.losses == PAUSES.len();
+            let wanted = |name: &str, kind: &str| match &self.device {
+                _ if name == lost => true,
+                Device::Gpu => last,
+                Device::Auto => last && kind != "software", // the CPU is faster
+                Device::Named(_) | Device::Cpu => false,
+            };
+            match adapter(self.scene, &self.device, self.exact_rounding, &wanted) {
+                Ok((backend, info)) if self.needed_film.is_none_or(|needed| needed <= backend.largest_film()) => {
+                    self.take((backend, info));
+                    return Ok(());
+                }
+                Ok((_, info)) => reason = Some(format!("{} has no room for its film", info.name)),
+                Err(Error::Render(RenderError::Lost { message, .. })) => reason = Some(message),
+                Err(why) => reason = Some(why.to_string()),
+            }
+        }
+        let message = match reason {
+            Some(why) => format!("{message}; it did not come back: {why}"),
+            None => format!("{message}, time after time"),
+        };
+        let error = of(message.clone());
+        match self.device {
+            Device::Auto => {
+                self.go_on_cpu(&error);
+                Ok(())
+            }
+            _ => {
+                self.gone = Some((lost, message));
+                Err(error)
+            }
+        }
+    }
+
+    /// Gives back what is on a lost device.
+    fn release(&mut self, lost: &str, message: &str) {
+        let (cpu, _) = cpu(self.scene);
+        let backend = std::mem::replace(&mut self.backend, cpu);
+        let _ = contained(|| drop(backend)); // wgpu may panic, and nothing is left to be done about that
+        self.gone = Some((lost.to_string(), message.to_string()));
+    }
+
+    fn pause(&self, length: Duration) -> Result<(), RenderError> {
+        let start = Instant::now();
+        loop {
+            if (self.on_fault.stopped)() {
+                return Err(RenderError::Cancelled);
+            }
+            match length.saturating_sub(start.elapsed()) {
+                Duration::ZERO => return Ok(()),
+                left => std::thread::sleep(left.min(LOOK)),
+            }
+        }
+    }
+
+    fn take(&mut self, (backend, info): Ready<'a>) {
+        (self.backend, self.info) = (backend, info);
+        self.gone = None;
+    }
+
+    fn go_on_cpu(&mut self, why: &RenderError) {
+        (self.on_fault.tell)(why, Remedy::Cpu);
+        self.take(cpu(self.scene));
     }
 }
 
@@ -165,14 +338,21 @@ fn faster_on_cpu(_: &Packed) -> Option<String> {
     None
 }
 
+/// A scene on an adapter that fits the choice, and whose name and type are wanted.
 #[cfg(feature = "gpu")]
-fn adapter<'a>(scene: &'a Packed, device: &Device, exact_rounding: bool) -> Result<Ready<'a>, Error> {
+fn adapter<'a>(
+    scene: &'a Packed,
+    device: &Device,
+    exact_rounding: bool,
+    wanted: &dyn Fn(&str, &str) -> bool,
+) -> Result<Ready<'a>, Error> {
     let choice = match device {
         Device::Named(name) => gpu::Choice::Named(name.clone()),
         Device::Auto => gpu::Choice::Auto,
         Device::Gpu | Device::Cpu => gpu::Choice::Gpu,
     };
-    let opened = gpu::choose(&choice).map_err(|error| match device {
+    let wanted = |info: &gpu::Info| wanted(&info.name, info.kind);
+    let opened = gpu::choose_among(&choice, &wanted).map_err(|error| match device {
         Device::Auto => RenderError::NoDevice(error.to_string()),
         _ => error,
     })?;
@@ -195,7 +375,7 @@ fn adapter<'a>(scene: &'a Packed, device: &Device, exact_rounding: bool) -> Resu
 }
 
 #[cfg(not(feature = "gpu"))]
-fn adapter<'a>(_: &'a Packed, device: &Device, _: bool) -> Result<Ready<'a>, Error> {
+fn adapter<'a>(_: &'a Packed, device: &Device, _: bool, _: &dyn Fn(&str, &str) -> bool) -> Result<Ready<'a>, Error> {
     let asked = match device {
         Device::Named(name) => format!("'{name}'"),
         _ => "a GPU".to_string(),

@@ -69,6 +69,22 @@ pub enum RenderError {
         /// What it says.
         message: String,
     },
+    /// The device is gone, as when its driver was reset: what was on it is lost. Another one may be opened.
+    #[error("{device}: the device was lost: {message}")]
+    Lost {
+        /// The adapter's name.
+        device: String,
+        /// What its driver says.
+        message: String,
+    },
+    /// The device has no memory left for what is needed.
+    #[error("{device}: out of memory: {message}")]
+    OutOfMemory {
+        /// The adapter's name.
+        device: String,
+        /// What takes how much.
+        message: String,
+    },
     /// The driver ends loops before their time, and did so in a kernel that renders a single sample of a pixel.
     #[error(
         "{device}: this driver ends long loops early, and a single sample of a pixel has longer ones: the scene has too \
@@ -121,6 +137,9 @@ pub enum RenderError {
     /// There is no memory for a picture of so many bytes.
     #[error("a picture in memory takes {} MiB here, which there are not; a crop takes less", .0 >> 20)]
     Memory(u64),
+    /// What the work goes on from cannot be read.
+    #[error("{0}")]
+    Input(std::io::Error),
     /// The work was cancelled.
     #[error("cancelled")]
     Cancelled,

@@ -172,6 +172,14 @@ impl Film {
         }
     }
 
+    /// What it has beside its sums; a film without pixels has nothing.
+    pub fn form(&self) -> Form {
+        Form {
+            adaptive: !self.moments.is_empty(),
+            layers: self.has_layers(),
+        }
+    }
+
     /// Every list of its pixels, also those that are empty: sums, moments, looks, layers.
     pub fn lists(&self) -> impl Iterator<Item = &Vec<Vec4>> {
         let Film {

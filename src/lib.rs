@@ -20,7 +20,7 @@
 //! - [`Options`] chooses the device, a part of the picture, and layers such as depth and normals; [`Overrides`] with
 //!   [`Scene::load_with`] puts another size, number of samples or seed in place of the file's.
 //! - [`render_growing`] shows the picture as it grows, and can be cancelled.
-//! - [`Picture`] gives the linear pixels and layers, and writes PNG and OpenEXR files.
+//! - [`Picture`] gives the linear pixels and layers, and writes PNG, OpenEXR, JPEG and WebP files.
 //! - A scene can be built in code, without a file, by [`Description::new`]:
 //!
 //! ```
@@ -63,6 +63,10 @@ struct Readme;
 
 #[doc(hidden)]
 pub mod backend;
+#[doc(hidden)]
+pub mod compare;
+#[doc(hidden)]
+pub mod contain;
 #[doc(hidden)]
 pub mod cpu;
 #[cfg(feature = "dev")]

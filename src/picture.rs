@@ -1,11 +1,12 @@
 //! A rendered picture in memory.
 
+use std::io;
 use std::path::Path;
 
 use crate::device::DeviceInfo;
 use crate::error::{Error, RenderError};
 use crate::film::{Film, Region};
-use crate::image::{self, Aov, Band, Format, Layout, Output, Pending, Pixels};
+use crate::image::{self, Aov, Band, Format, Layout, Output, Pending, Pixels, SaveOptions, Target};
 use crate::pack::FirstHit;
 
 /// A rendered picture, or the part of one that was asked for: linear radiance, and the layers beside it.
@@ -64,18 +65,18 @@ impl Picture {
         self.layout.alpha.then(|| pixels.map(|i| self.film.alpha(i)).collect())
     }
 
-    /// The pixels as a screen and a PNG without alpha show them: red, green and blue of 8 bits each, clamped to [0, 1] and
-    /// raised to the power 1/2.2, row by row from the top. Where the picture has alpha it is over black.
+    /// The pixels as a screen and a PNG without alpha show them: red, green and blue of 8 bits each, by the scene's view
+    /// transform and exposure, row by row from the top. Where the picture has alpha it is over black.
     pub fn rgb8(&self) -> Vec<u8> {
-        self.film.means().flat_map(|mean| mean.map(image::encode)).collect()
+        self.film.means().flat_map(|mean| self.layout.view.rgb8(mean)).collect()
     }
 
     /// The pixels as a PNG with alpha has them, row by row from the top: red, green and blue as in [`Picture::rgb8`], but of
     /// what is there by itself, not weighted by alpha; then alpha, linear, 255 where the picture has none.
     pub fn rgba8(&self) -> Vec<u8> {
         let pixel = |(i, mean)| match self.layout.alpha {
-            true => image::straight(mean, self.film.alpha(i)),
-            false => image::straight(mean, 1.0),
+            true => self.layout.view.rgba8(mean, self.film.alpha(i)),
+            false => self.layout.view.rgba8(mean, 1.0),
         };
         self.film.means().enumerate().flat_map(pixel).collect()
     }
@@ -103,25 +104,37 @@ impl Picture {
         &self.layout.aovs
     }
 
-    /// Writes the picture to a file whose name ends in `.png`, as a screen shows it, or in `.exr`, with its linear values.
-    /// Layers are further channels of an EXR, and files beside a PNG: `NAME.normal.png` and so on. Files appear when they
-    /// are whole, in place of those that have their names. Alpha is a further channel of either.
+    /// Writes the picture to a file whose name ends in `.png`, `.jpg`, `.jpeg` or `.webp`, as a screen shows it, or in `.exr`, with its linear values.
+    /// Layers are further channels of an EXR, and files beside a PNG: `NAME.normal.png` and so on; JPEG and WebP have none. Files appear when they
+    /// are whole, in place of those that have their names. Alpha is a further channel of all but JPEG, which is over black.
     ///
     /// # Errors
     ///
-    /// Names of another end, and files that cannot be written.
+    /// Names of another end, pictures larger than the format has them, and files that cannot be written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        self.save_with(path, &SaveOptions::default())
+    }
+
+    /// Writes the picture as [`Picture::save`] does, with other settings than the usual ones.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Picture::save`].
+    pub fn save_with(&self, path: impl AsRef<Path>, options: &SaveOptions) -> Result<(), Error> {
         let path = path.as_ref();
-        let format = Format::of(path).ok_or_else(|| {
-            let rule = format!("{}: must end in .png or .exr", path.display());
-            RenderError::Output(std::io::Error::new(std::io::ErrorKind::InvalidInput, rule))
-        })?;
+        let refused = |rule: &str| {
+            let told = format!("{}: {rule}", path.display());
+            RenderError::Output(io::Error::new(io::ErrorKind::InvalidInput, told))
+        };
+        let format = Format::of(path).ok_or_else(|| refused("must end in .png, .exr, .jpg, .jpeg or .webp"))?;
+        let size = format.check_size(self.width(), self.height());
+        size.map_err(|rule| refused(&rule))?;
         let files = image::files(path, format, &self.layout.aovs);
-        let pending = files.iter().map(|file| Pending::start(Output::find(file)?));
-        let pending = pending.collect::<Result<_, _>>().map_err(RenderError::Output)?;
-        Ok(image::save(pending, format, &self.layout, &mut |sink| {
-            sink(self.band())
-        })?)
+        let files = files.iter().map(|file| Pending::start(Output::find(file)?));
+        let files = files.collect::<Result<_, _>>().map_err(RenderError::Output)?;
+        let targets = vec![Target { format, files }];
+        image::save(targets, &self.layout, options, &mut |sink| sink(self.band()))?;
+        Ok(())
     }
 
     fn band(&self) -> Band<'_> {

@@ -5,11 +5,11 @@ use std::ops::ControlFlow;
 use tracing::warn;
 
 use crate::backend::Backend;
-use crate::device::{Device, DeviceInfo, Renderer};
+use crate::device::{Device, DeviceInfo, OnFault, Remedy, Renderer};
 use crate::error::{Error, RenderError};
 use crate::film::{Film, Form, Region};
 use crate::image::{Aov, AovSource, Layout};
-use crate::job::{self, Bands, Cut, Order};
+use crate::job::{self, Bands, Cut, Flow, Nowhere, Order};
 use crate::pack::{FirstHit, Packed, pack};
 use crate::picture::Picture;
 use crate::scene::{Integrator, Problem, Scene};
@@ -75,10 +75,12 @@ impl Options {
 /// Renders a scene. The picture is kept in memory, in 16 bytes a pixel; in 80 more where it has alpha, or layers that are means
 /// over the samples.
 ///
-/// Where [`Device::Auto`] finds no adapter, or one that has no room for the scene, the CPU renders. So it does, whatever
-/// device was chosen, where the driver ends long loops early and a single sample has longer ones. A warning by `tracing` says
-/// why; [`Picture::device`] tells what has rendered. Mesa's drivers print a line on standard error if the environment has no
-/// `XDG_RUNTIME_DIR`.
+/// Where [`Device::Auto`] finds no adapter, or one that has no room for the scene or the picture, the CPU renders. So it does,
+/// whatever device was chosen, where the driver ends long loops early and a single sample has longer ones. A device that is lost
+/// is opened anew, a few times within seconds, and goes on from the last finished part; where it does not come back, and
+/// [`Device::Auto`] chose it, the CPU goes on. Warnings by `tracing` say why; [`Picture::device`] tells what has rendered last.
+/// wgpu panics at some losses: that is contained, but a panic hook hears of it, and a program that is built with
+/// `panic = "abort"` ends. Mesa's drivers print a line on standard error if the environment has no `XDG_RUNTIME_DIR`.
 ///
 /// # Errors
 ///
@@ -87,22 +89,19 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
     let packed = options.pack(scene);
     let mut prepared = Prepared::new(scene, &packed, options)?;
     let region = prepared.layout.region;
-    let film = prepared.renderer.work(|backend, _| {
-        let mut whole = empty(region, packed.form())?;
-        let mut take = |band: Film| {
-            put(&mut whole, &band);
-            Ok(())
-        };
-        job::render(
-            backend,
-            region,
-            packed.pixel_samples,
-            &Cut::of(packed.form()),
-            &mut |_| true,
-            &mut take,
-        )?;
-        Ok(whole)
-    })?;
+    let mut film = empty(region, packed.form())?;
+    let (cut, most) = (Cut::of(packed.form()), prepared.renderer.largest_film());
+    let mut nowhere = Nowhere;
+    let mut bands = Bands::new(region, packed.pixel_samples, &cut, Order::Rows, most, &mut nowhere);
+    let progress = prepared.renderer.progress();
+    let mut next = || {
+        prepared
+            .renderer
+            .work(|backend, _| bands.render_next(backend, &mut |_, _, _| Ok(Flow::GoOn), &mut || progress.made()))
+    };
+    while let Some(band) = next()? {
+        put(&mut film, &band.film);
+    }
     Ok(prepared.picture(film))
 }
 
@@ -120,13 +119,16 @@ pub fn render_growing(
 ) -> Result<Picture, Error> {
     let packed = options.pack(scene);
     let mut prepared = Prepared::new(scene, &packed, options)?;
-    let (layout, hits) = (&prepared.layout, &prepared.hits);
+    let Prepared { renderer, hits, layout } = &mut prepared;
+    let (cut, order) = (Cut::of(packed.form()), Order::Pixels);
+    let most = renderer.largest_film();
+    let mut nowhere = Nowhere;
+    let mut bands = Bands::new(layout.region, packed.pixel_samples, &cut, order, most, &mut nowhere);
+    let progress = renderer.progress();
+    let mut whole = empty(layout.region, packed.form())?;
     let mut failed = None;
-    let film = prepared.renderer.work(|backend, device| {
-        let (cut, order) = (Cut::of(packed.form()), Order::Pixels);
-        let mut bands = Bands::new(layout.region, packed.pixel_samples, &cut, order, backend.largest_film());
-        let mut whole = empty(layout.region, packed.form())?;
-        loop {
+    let mut render_next = || {
+        renderer.work(|backend, device| {
             let mut look = |backend: &mut dyn Backend, band: Region, share: f64| {
                 let mut growing = Growing {
                     share,
@@ -138,24 +140,33 @@ pub fn render_growing(
                     layout,
                 };
                 match watch(&mut growing) {
-                    Ok(flow) => Ok(flow.is_continue()),
+                    Ok(flow) => Ok(flow.is_continue().into()),
+                    // What befalls the device while the picture is copied from it is a fault like any other.
+                    Err(Error::Render(error @ (RenderError::Lost { .. } | RenderError::OutOfMemory { .. }))) => {
+                        Err(error)
+                    }
                     Err(error) => {
                         failed = Some(error);
-                        Ok(false)
+                        Ok(Flow::Cancel)
                     }
                 }
             };
-            match bands.render_next(backend, &mut look)? {
-                Some(band) => put(&mut whole, &band),
-                None => return Ok(whole),
-            }
+            let band = bands.render_next(backend, &mut look, &mut || progress.made())?;
+            Ok(band.map(|band| put(&mut whole, &band.film)))
+        })
+    };
+    let rendered = loop {
+        match render_next() {
+            Ok(Some(())) => {}
+            Ok(None) => break Ok(()),
+            Err(error) => break Err(error),
         }
-    });
+    };
     match failed {
         Some(error) => Err(error),
         None => {
-            let film = film?;
-            Ok(prepared.picture(film))
+            rendered?;
+            Ok(prepared.picture(whole))
         }
     }
 }
@@ -203,8 +214,14 @@ struct Prepared<'a> {
 impl<'a> Prepared<'a> {
     fn new(scene: &Scene, packed: &'a Packed, options: &Options) -> Result<Prepared<'a>, Error> {
         let region = options.region(scene).map_err(Error::Option)?;
-        let on_cpu = |why: &RenderError| warn!("rendering on the CPU: {why}");
-        let mut renderer = Renderer::new(packed, options, Box::new(on_cpu))?;
+        let on_fault = OnFault {
+            tell: Box::new(|why, remedy| match remedy {
+                Remedy::Anew => warn!("{why}; it is opened anew"),
+                Remedy::Cpu => warn!("rendering on the CPU: {why}"),
+            }),
+            stopped: Box::new(|| false), // the pauses are short
+        };
+        let mut renderer = Renderer::new(packed, options, on_fault)?;
         let hits = match needs_first_hits(packed, &options.aovs) {
             true => renderer.work(|backend, _| job::first_hits(backend, region))?,
             false => Vec::new(),
@@ -222,6 +239,7 @@ impl<'a> Prepared<'a> {
             alpha: packed.has_alpha(),
             middle_depth: renderer.work(|backend, _| middle_depth(packed, &options.aovs, backend))?,
             most_samples: packed.pixel_samples,
+            view: scene.view,
         };
         Ok(Prepared { renderer, hits, layout })
     }
@@ -237,13 +255,8 @@ impl<'a> Prepared<'a> {
 }
 
 fn empty(region: Region, form: Form) -> Result<Film, RenderError> {
-    let bytes = region.pixels().saturating_mul(form.bytes() as u64);
-    // Taken and given back: what is not there is an error here, and would end the program later.
-    let there = usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
-    match there {
-        true => Ok(Film::of(region, form)),
-        false => Err(RenderError::Memory(bytes)),
-    }
+    job::there_is_memory(region.pixels().saturating_mul(form.bytes() as u64))?;
+    Ok(Film::of(region, form))
 }
 
 /// Puts whole rows of a film into it.

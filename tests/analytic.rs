@@ -30,13 +30,11 @@ fn empty(from: DVec3, to: DVec3, up: DVec3, height: f64) -> Description {
         look_at: to,
         up,
         height,
+        path: None,
     };
     Description {
         environment: None,
-        image: ImageDescription {
-            width: SIDE,
-            height: SIDE,
-        },
+        image: ImageDescription::new(SIDE, SIDE),
         camera: CameraDescription::Orthographic(camera),
         render: RenderDescription {
             pixel_samples: grid(1),

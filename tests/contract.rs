@@ -17,7 +17,7 @@ const SIZE: (u32, u32) = (20, 12);
 const SAMPLES: u32 = 40;
 
 /// A small scene, and the same with adaptive sampling; then both along whole paths, with layers.
-fn subjects() -> [Packed; 4] {
+pub fn subjects() -> [Packed; 4] {
     let mut plain = scenes::scene("cornell.toml");
     (plain.image.width, plain.image.height) = SIZE;
     plain.render.pixel_samples = patterns::samples(wgray::scene::Pattern::Sobol, SAMPLES);
@@ -51,7 +51,7 @@ fn region(x0: u32, y0: u32, x1: u32, y1: u32) -> Region {
 }
 
 /// A film's bits.
-fn bits(film: &Film) -> (Region, Vec<u32>) {
+pub fn bits(film: &Film) -> (Region, Vec<u32>) {
     let all = film.lists().map(|list| bytemuck::cast_slice(list).to_vec());
     (film.region, all.collect::<Vec<_>>().concat())
 }

@@ -3,9 +3,9 @@
 use glam::{Vec3, Vec4};
 use wgray::film::{Film, Form, Layer, Region};
 use wgray::gpu::{Gpu, Options as GpuOptions};
-use wgray::image::straight;
 use wgray::job::Cut;
 use wgray::pack::Packed;
+use wgray::scene::ViewSettings;
 use wgray::{Aov, Channel, Description, Device, Options, Picture};
 
 use crate::pictures::{Way, backend, crop, differing, exact_ways, film, first_hits, reference, render, whole};
@@ -376,6 +376,7 @@ fn filters_of_either_sign_take_alpha_out_of_its_range() {
 
 #[test]
 fn a_png_has_colours_by_themselves_and_an_exr_weighted_ones() {
+    let straight = |color, alpha| ViewSettings::default().rgba8(color, alpha);
     assert_eq!(straight([0.25, 0.125, 0.5], 0.5), [186, 136, 255, 128]);
     assert_eq!(straight([0.5, 0.25, 1.0], 1.0), [186, 136, 255, 255]);
     assert_eq!(straight([0.0; 3], 0.0), [0; 4]);

@@ -7,11 +7,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use wgray::error::RenderError;
-use wgray::image::read_exr;
+use wgray::image::{BitDepth, Metadata, SaveOptions, read_exr};
 use wgray::scene::{
     AdaptiveDescription, Assets, ColorDescription, Encoding, Image, ImageTextureDescription, Pattern,
     PerspectiveDescription, PhongDescription, PlaneDescription, RectangleLightDescription, RenderDescription,
-    SamplesDescription, SphereDescription, Texels,
+    SamplesDescription, SphereDescription, Texels, ViewSettings, ViewTransform,
 };
 use wgray::{Aov, Channel, DVec3, Description, Device, Error, Options, Overrides, Picture, Region, Scene};
 
@@ -213,8 +213,37 @@ fn a_picture_is_saved_as_its_name_says() {
     assert_eq!(png("a.png").into_raw(), picture.rgb8());
     assert_eq!(png("a.depth.png").dimensions(), (24, 16));
     let error = picture.save(path("a.gif")).unwrap_err().to_string();
-    assert!(error.ends_with("a.gif: must end in .png or .exr"), "{error}");
+    assert!(
+        error.ends_with("a.gif: must end in .png, .exr, .jpg, .jpeg or .webp"),
+        "{error}"
+    );
     assert!(!path("a.gif").exists());
+    // As it is said, or as the scene says.
+    let saved = SaveOptions {
+        bit_depth: BitDepth::Sixteen,
+        metadata: Metadata {
+            pairs: vec![("Source".to_owned(), "a test, 21 °C, 数".to_owned())],
+        },
+        ..SaveOptions::default()
+    };
+    for name in ["b.png", "b.jpg", "b.webp", "b.exr"] {
+        picture.save_with(path(name), &saved).unwrap();
+    }
+    assert_eq!(image::open(path("b.png")).unwrap().color(), image::ColorType::Rgb16);
+    assert_eq!(png("b.webp").into_raw(), picture.rgb8());
+    let mut description = described();
+    description.image.view_transform = ViewTransform::Srgb;
+    description.image.exposure = -1.0;
+    let darker = wgray::render(&description.validate().unwrap(), &options).unwrap();
+    assert_eq!(darker.pixels(), picture.pixels());
+    let halved = darker.pixels().colors.into_iter();
+    let settings = ViewSettings {
+        transform: ViewTransform::Srgb,
+        exposure: 0.0,
+    };
+    let expected: Vec<u8> = halved.flat_map(|color| settings.rgb8(color.map(|x| x / 2.0))).collect();
+    assert_eq!(darker.rgb8(), expected);
+    assert_ne!(darker.rgb8(), picture.rgb8());
 }
 
 #[test]

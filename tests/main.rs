@@ -7,14 +7,18 @@ mod analytic;
 mod bounds;
 mod choices;
 mod cli;
+mod compare;
 mod contract;
 mod cost;
 mod culling;
 #[cfg(feature = "dev")]
 mod dev;
+#[cfg(target_os = "linux")]
+mod faults;
 mod grounds;
 mod inputs;
 mod integrator;
+mod jobs;
 mod kernel;
 mod layers;
 mod layout;

@@ -7,9 +7,10 @@ use std::process::ExitCode;
 #[cfg(feature = "gpu")]
 use wgray::gpu::{Forms, check_kernels, compose::Shaders};
 use wgray::pack::pack;
-use wgray::scene::Overrides;
+use wgray::scene::{CameraPath, Define, Overrides, Scene, SceneError};
 
 #[derive(Debug, clap::Args)]
+#[command(after_help = super::EXIT_CODES)]
 pub struct Args {
     /// Scene files
     #[arg(value_name = "SCENE", required = true)]
@@ -23,7 +24,14 @@ pub struct Args {
     /// Folder that files named by the scenes, their textures and meshes, must lie in, in place of the scenes' own
     #[arg(long, value_name = "DIR")]
     asset_root: Option<PathBuf>,
+
+    /// Puts a value in place of each scene's: -D render.seed=3
+    #[arg(short = 'D', long, value_name = "KEY=VALUE")]
+    define: Vec<Define>,
 }
+
+/// The most frames of a path that are looked at.
+const MOST_FRAMES: f64 = 100_000.0;
 
 /// Checks all files, whatever is wrong with some; the exit code is that of the first bad one.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
@@ -34,6 +42,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     };
     let overrides = Overrides {
         asset_root: args.asset_root.clone(),
+        define: args.define.clone(),
         ..Overrides::default()
     };
     let mut code = None;
@@ -67,6 +76,7 @@ fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &S
     for note in &scene.notes {
         super::say(&format!("warning: {}: {note}", path.display()));
     }
+    let frames = check_path(&scene)?;
     let packed = pack(&scene);
     #[cfg(feature = "gpu")]
     check_kernels(&packed, shaders, Forms::All)?;
@@ -82,7 +92,7 @@ fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &S
         ),
     };
     Ok(format!(
-        "good; {} x {} pixels, {} samples each, {} of light; shapes: {} of {} primitives{meshes}; lights: {}",
+        "good; {} x {} pixels, {} samples each, {} of light; shapes: {} of {} primitives{meshes}; lights: {}{frames}",
         scene.width,
         scene.height,
         packed.pixel_samples,
@@ -91,4 +101,16 @@ fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &S
         packed.primitives.len(),
         scene.lights.len(),
     ))
+}
+
+/// Checks the camera at all frames from its path's first key to its last, and says which these are.
+fn check_path(scene: &Scene) -> Result<String, SceneError> {
+    let Some((first, last)) = scene.camera_path.as_ref().map(CameraPath::frames) else {
+        return Ok(String::new());
+    };
+    let count = (last.floor() - first.ceil() + 1.0).clamp(0.0, MOST_FRAMES) as u32;
+    for i in 0..count {
+        scene.camera_at(first.ceil() + f64::from(i))?;
+    }
+    Ok(format!("; the camera moves from frame {first} to {last}"))
 }

@@ -20,6 +20,7 @@ use super::signal;
 
 /// The arguments as they are written.
 #[derive(Debug, clap::Args)]
+#[command(after_help = super::EXIT_CODES)]
 pub struct Args {
     /// Scene file; docs/scene-format.md says what is in it
     scene: PathBuf,
@@ -284,9 +285,9 @@ fn time(seconds: f64) -> String {
 
 fn measured(sources: &Sources, device: Choice) -> anyhow::Result<ExitCode> {
     let stopped = signal::stop().context("signal handler")?;
-    let all = measure(sources, device, &stopped).map_err(|error| match error {
+    let all = measure(sources, device, stopped.flag()).map_err(|error| match error {
         Some(error) => anyhow!(error),
-        None => RenderError::Cancelled.into(),
+        None => super::Interrupted(stopped.signal().unwrap_or_default()).into(),
     })?;
     Ok(super::ended(print(&sources.scene, all), ExitCode::SUCCESS))
 }

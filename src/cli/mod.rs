@@ -4,7 +4,11 @@ mod check;
 #[cfg(feature = "dev")]
 mod dev;
 mod devices;
+mod diff;
+mod merge;
+mod metadata;
 mod outputs;
+mod picture_options;
 mod progress;
 mod render;
 mod signal;
@@ -16,6 +20,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::{Parser, Subcommand};
+use wgray::compare::Unreadable;
 use wgray::error::{Error, RenderError, ShaderError, ShaderErrors};
 use wgray::scene::{Overrides, Problem, Scene, SceneError};
 
@@ -27,10 +32,11 @@ struct Cli {
 }
 
 const EXIT_CODES: &str = "\
-Exit codes: 0 done, 1 failed, 2 wrong command line, 3 bad scene, 4 no such device, 130 interrupted.";
+Exit codes: 0 done, 1 failed, 2 wrong command line, 3 bad scene, 4 no such device, 5 pictures differ, 6 device lost, \
+7 out of memory, 8 output not written, 130, 143 and 129 ended by SIGINT, SIGTERM and SIGHUP.";
 
-/// The exit code after a signal: 128 + SIGINT, as shells have it.
-const INTERRUPTED: u8 = 130;
+/// The exit code of what could not be written.
+const NOT_WRITTEN: u8 = 8;
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -42,12 +48,22 @@ enum Command {
     )]
     #[cfg_attr(not(feature = "gpu"), doc = "Validates scene files")]
     Check(check::Args),
+    /// Joins parts of a picture, which render --tile has written, to the picture
+    Merge(Box<merge::Args>),
+    /// Compares two pictures, and fails if they differ
+    Diff(Box<diff::Args>),
     /// Lists the adapters that pictures can be rendered on, and which one "auto" chooses
+    #[command(after_help = EXIT_CODES)]
     Devices,
     /// Shows a scene on a web page, and shows it anew whenever the scene file or a shader is saved
     #[cfg(feature = "dev")]
     Dev(dev::Args),
 }
+
+/// The work was ended by a signal.
+#[derive(Debug, thiserror::Error)]
+#[error("cancelled")]
+struct Interrupted(i32);
 
 /// A command line that can be read but makes no sense.
 #[derive(Debug, thiserror::Error)]
@@ -63,15 +79,18 @@ pub fn main() -> ExitCode {
     };
     let threads = match &cli.command {
         Command::Render(args) => args.threads,
-        Command::Check(_) | Command::Devices => None,
+        Command::Check(_) | Command::Diff(_) | Command::Merge(_) | Command::Devices => None,
         #[cfg(feature = "dev")]
         Command::Dev(_) => None,
     };
     prepare_environment(threads);
     signal::file_size_limit_is_an_error();
+    wgray::contain::silence(); // an error tells what a lost device has panicked for
     let result = match cli.command {
         Command::Render(args) => render::run(*args, start),
         Command::Check(args) => check::run(&args),
+        Command::Merge(args) => merge::run(&args),
+        Command::Diff(args) => diff::run(*args),
         Command::Devices => Ok(devices::run()),
         #[cfg(feature = "dev")]
         Command::Dev(args) => dev::run(args),
@@ -149,7 +168,11 @@ fn option(problem: &Problem) -> Usage {
 fn report(error: &anyhow::Error) {
     let shader = shader_errors(error);
     if shader.is_empty() {
-        say(&format!("error: {error:#}"));
+        let hint = match error.downcast_ref() {
+            Some(RenderError::OutOfMemory { .. }) => " (--crop, --size, --device cpu)",
+            _ => "",
+        };
+        say(&format!("error: {error:#}{hint}"));
     }
     for error in shader {
         say(&format!("error: {error}"));
@@ -170,7 +193,7 @@ fn ended(printed: io::Result<()>, code: ExitCode) -> ExitCode {
     match printed.and_then(|()| io::stdout().flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             say(&format!("error: standard output: cannot be written: {error}"));
-            ExitCode::FAILURE
+            ExitCode::from(NOT_WRITTEN)
         }
         _ => code,
     }
@@ -187,12 +210,18 @@ fn shader_errors(error: &anyhow::Error) -> &[ShaderError] {
 fn exit_code(error: &anyhow::Error) -> ExitCode {
     let code = if error.is::<Usage>() {
         2
+    } else if let Some(Interrupted(signal)) = error.downcast_ref() {
+        signal::exit_code(*signal)
+    } else if let Some(Unreadable::Memory { .. }) = error.downcast_ref() {
+        7
     } else if error.is::<SceneError>() {
         3
     } else {
         match error.downcast_ref::<RenderError>() {
             Some(RenderError::NoDevice(_)) => 4,
-            Some(RenderError::Cancelled) => INTERRUPTED,
+            Some(RenderError::Lost { .. }) => 6,
+            Some(RenderError::OutOfMemory { .. } | RenderError::Memory(_)) => 7,
+            Some(RenderError::Output(_)) => NOT_WRITTEN,
             _ => 1,
         }
     };

@@ -29,6 +29,8 @@ const STEPS: f64 = 1000.0;
 /// The progress of one render. The bar goes away when this is dropped.
 pub struct Progress {
     mode: Mode,
+    /// What it is of, in front of each line, and a colon; nothing where there is one picture.
+    label: String,
     start: Instant,
     bar: Option<ProgressBar>,
     /// The tenths that lines have told of, and when the last one did.
@@ -36,7 +38,8 @@ pub struct Progress {
 }
 
 impl Progress {
-    pub fn new(mode: Mode) -> Progress {
+    /// The progress of what `label` says, if there are several.
+    pub fn new(mode: Mode, label: Option<String>) -> Progress {
         let mode = if mode == Mode::Auto && !std::io::stderr().is_terminal() {
             Mode::None
         } else {
@@ -45,6 +48,7 @@ impl Progress {
         let start = Instant::now();
         Progress {
             mode,
+            label: label.map(|label| format!("{label}: ")).unwrap_or_default(),
             start,
             bar: None,
             told: (0, start),
@@ -54,15 +58,22 @@ impl Progress {
     /// Tells the share of the work that is done, from 0 to 1.
     pub fn update(&mut self, share: f64) {
         match self.mode {
-            Mode::Auto if self.start.elapsed() > PATIENCE => {
-                let bar = self.bar.get_or_insert_with(|| new_bar(self.start.elapsed()));
+            // Of several pictures each may be quick.
+            Mode::Auto if self.start.elapsed() > PATIENCE || !self.label.is_empty() => {
+                let bar = self
+                    .bar
+                    .get_or_insert_with(|| new_bar(self.start.elapsed(), &self.label));
                 bar.set_position((share * STEPS) as u64);
             }
             Mode::Plain => {
                 let tenths = (share * 10.0) as u32;
                 if tenths > self.told.0 || self.told.1.elapsed() > SILENCE {
                     let seconds = self.start.elapsed().as_secs_f64();
-                    super::say(&format!("{:3.0} % done after {seconds:.1} s", share * 100.0));
+                    super::say(&format!(
+                        "{}{:3.0} % done after {seconds:.1} s",
+                        self.label,
+                        share * 100.0
+                    ));
                     self.told = (tenths, Instant::now());
                 }
             }
@@ -105,9 +116,11 @@ fn spinner_style() -> ProgressStyle {
     ProgressStyle::with_template("{spinner} {msg}, {elapsed}").unwrap_or_else(|_| ProgressStyle::default_spinner())
 }
 
-fn new_bar(elapsed: Duration) -> ProgressBar {
-    let bar = ProgressBar::new(STEPS as u64).with_elapsed(elapsed);
-    let style = ProgressStyle::with_template("{wide_bar} {percent:>3} %  {elapsed} of {duration}");
+fn new_bar(elapsed: Duration, label: &str) -> ProgressBar {
+    let bar = ProgressBar::new(STEPS as u64)
+        .with_elapsed(elapsed)
+        .with_prefix(label.to_owned());
+    let style = ProgressStyle::with_template("{prefix}{wide_bar} {percent:>3} %  {elapsed} of {duration}");
     match style {
         Ok(style) => bar.with_style(style),
         Err(_) => bar, // the library's own style

@@ -2,22 +2,52 @@
 
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// Set by the first signal that asks the program to end; the second one ends it at once. A signal that was ignored when the
-/// program started stays so: that is how `nohup` and shells keep theirs from background jobs.
-pub fn stop() -> io::Result<Arc<AtomicBool>> {
-    let stopped = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM, HANG_UP] {
-        if !is_ignored(signal) {
-            flag::register_conditional_shutdown(signal, super::INTERRUPTED.into(), Arc::clone(&stopped))?;
-            flag::register(signal, Arc::clone(&stopped))?;
+/// Whether a signal has asked the program to end.
+#[derive(Clone, Debug, Default)]
+pub struct Stop {
+    /// The last one, or 0.
+    signal: Arc<AtomicUsize>,
+    asked: Arc<AtomicBool>,
+}
+
+impl Stop {
+    /// The signal that has come, if one has.
+    pub fn signal(&self) -> Option<i32> {
+        match self.signal.load(Ordering::Relaxed) {
+            0 => None,
+            signal => i32::try_from(signal).ok(),
         }
     }
-    Ok(stopped)
+
+    /// Whether to end.
+    #[cfg(feature = "dev")]
+    pub fn flag(&self) -> &AtomicBool {
+        &self.asked
+    }
+}
+
+/// The exit code after a signal, as shells have it: 130 after SIGINT, 143 after SIGTERM.
+pub fn exit_code(signal: i32) -> u8 {
+    128_u8.saturating_add(u8::try_from(signal).unwrap_or(0))
+}
+
+/// Notes the first signal that asks the program to end; the second one ends it at once. A signal that was ignored when the
+/// program started stays so: that is how `nohup` and shells keep theirs from background jobs.
+pub fn stop() -> io::Result<Stop> {
+    let stop = Stop::default();
+    for signal in [SIGINT, SIGTERM, HANG_UP] {
+        if !is_ignored(signal) {
+            flag::register_conditional_shutdown(signal, exit_code(signal).into(), Arc::clone(&stop.asked))?;
+            flag::register(signal, Arc::clone(&stop.asked))?;
+            flag::register_usize(signal, Arc::clone(&stop.signal), signal.unsigned_abs() as usize)?;
+        }
+    }
+    Ok(stop)
 }
 
 #[cfg(unix)]

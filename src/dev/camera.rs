@@ -110,6 +110,7 @@ pub fn merged(
             take(&mut c.look_at, &old.look_at, &new.look_at);
             take(&mut c.up, &old.up, &new.up);
             take(&mut c.fov, &old.fov, &new.fov);
+            c.path.clone_from(&new.path);
         }
         (
             CameraDescription::Orthographic(c),
@@ -120,6 +121,7 @@ pub fn merged(
             take(&mut c.look_at, &old.look_at, &new.look_at);
             take(&mut c.up, &old.up, &new.up);
             take(&mut c.height, &old.height, &new.height);
+            c.path.clone_from(&new.path);
         }
         _ => return None, // another kind of camera
     }
@@ -262,6 +264,10 @@ mod tests {
         let both = merged(&turned, &file, &wide).unwrap();
         assert_eq!(view(&both).position, view(&turned).position);
         assert!(matches!(&both, CameraDescription::Perspective(c) if c.fov == 60.0));
+        let path = "position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 45\npath.keys = [{ frame = 1, fov = 40 }]";
+        let both = merged(&turned, &file, &camera(path)).unwrap();
+        assert_eq!(view(&both).position, view(&turned).position);
+        assert_eq!(both.path(), camera(path).path(), "a path of the file is the camera's");
         let elsewhere = camera("position = [0, -5, 1]\nlook_at = [0, 0, 1]\nfov = 45");
         assert_eq!(merged(&turned, &file, &elsewhere), None, "the look_at has not moved");
         assert_eq!(merged(&turned, &file, &turned), None, "it was saved");

@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::faults::{Fault, Faults, faults, mark};
 use crate::film::{Film, mean};
-use crate::image::{self, Aov, Pixels, difference, encode};
+use crate::image::{self, Aov, Pixels, difference};
 use crate::pack::{FirstHit, NOTHING};
+use crate::scene::ViewSettings;
 
 /// What is shown of the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
@@ -139,6 +140,8 @@ pub struct Look {
     pub marks: bool,
     /// Whether negative ones are light, as under filters with negative lobes.
     pub negative: bool,
+    /// How light is shown.
+    pub view: ViewSettings,
 }
 
 /// A picture that the viewers get, as PNG files and as numbers.
@@ -152,6 +155,8 @@ pub struct Frame {
     pub content: Content,
     /// How names are given to what the numbers count.
     pub names: Names,
+    /// How light is shown.
+    pub view: ViewSettings,
 }
 
 /// How shapes and materials are called in the scene file.
@@ -179,7 +184,7 @@ impl Frame {
         };
         let light = |pixels: &Pixels| faults(&pixels.colors, look.negative, |color| *color);
         let pictures: Vec<(&'static str, Vec<u8>)> = match &content {
-            Content::Color(colors) => vec![marked("picture", display(colors), light(colors))],
+            Content::Color(colors) => vec![marked("picture", display(colors, look.view), light(colors))],
             Content::Samples(counts, total) => {
                 vec![(
                     "picture",
@@ -202,8 +207,8 @@ impl Frame {
             Content::Compare(gpu, cpu) => {
                 header.differing = difference(gpu, cpu, 0.0).map(|found| (found.unequal, found.largest));
                 vec![
-                    marked("gpu", display(gpu), light(gpu)),
-                    marked("cpu", display(cpu), light(cpu)),
+                    marked("gpu", display(gpu, look.view), light(gpu)),
+                    marked("cpu", display(cpu, look.view), light(cpu)),
                     ("difference", amplified(gpu, cpu, look.gain)),
                 ]
             }
@@ -222,6 +227,7 @@ impl Frame {
             pictures,
             content,
             names,
+            view: look.view,
         }
     }
 
@@ -236,7 +242,11 @@ impl Frame {
         }
         .index(x, y)?;
         Some(match &self.content {
-            Content::Color(pixels) => vec![("linear RGB", numbers(*pixels.colors.get(i)?))],
+            Content::Color(pixels) => {
+                let color = *pixels.colors.get(i)?;
+                let shown = self.view.rgb8(color).map(|byte| byte.to_string()).join(" ");
+                vec![("linear RGB", numbers(color)), ("shown", shown)]
+            }
             Content::Samples(counts, total) => vec![("samples", format!("{} of {total}", counts.get(i)?))],
             Content::Hits(aov, hits) => self.hit(*aov, hits.get(i)?),
             Content::Compare(gpu, cpu) => {
@@ -294,12 +304,12 @@ fn bytes<T: Sync>(pixels: &[T], color: impl Fn(&T) -> Vec3 + Sync) -> Vec<u8> {
         .collect()
 }
 
-fn display(pixels: &Pixels) -> Vec<u8> {
+fn display(pixels: &Pixels, view: ViewSettings) -> Vec<u8> {
     pixels
         .colors
         .par_iter()
         .with_min_len(1024)
-        .flat_map_iter(|color| color.map(encode))
+        .flat_map_iter(|color| view.rgb8(*color))
         .collect()
 }
 
@@ -323,8 +333,8 @@ fn amplified(gpu: &Pixels, cpu: &Pixels, gain: f32) -> Vec<u8> {
 }
 
 /// A picture of radiance as a PNG file.
-pub fn png_of(pixels: &Pixels) -> Vec<u8> {
-    png(pixels.width, pixels.height, &display(pixels))
+pub fn png_of(pixels: &Pixels, view: ViewSettings) -> Vec<u8> {
+    png(pixels.width, pixels.height, &display(pixels, view))
 }
 
 /// A PNG file of 8-bit RGB, packed for speed.

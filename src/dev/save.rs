@@ -270,6 +270,25 @@ mod tests {
     }
 
     #[test]
+    fn a_path_stays_and_the_camera_is_saved_beside_it() {
+        let path = "path.keys = [{ frame = 1, position = [0, 1, 0] }, { frame = 9, position = [0, 3, 1] }]\n";
+        let text = format!("image = {{ width = 4, height = 4 }}\n[camera]\nlook_at = [0, 0, 0]\nfov = 40\n{path}");
+        let mut new = Description::parse(&text, "s.toml").unwrap().camera;
+        assert_eq!(with_camera(&text, "s.toml", &new).unwrap(), text);
+        let CameraDescription::Perspective(moved) = &mut new else {
+            panic!("another type");
+        };
+        (moved.position, moved.fov) = ([0.0, 2.0, 0.5].into(), 50.0);
+        let saved = with_camera(&text, "s.toml", &new).unwrap();
+        assert!(
+            saved.contains("fov = 50\n") && saved.contains("position = [0, 2, 0.5]\n"),
+            "{saved}"
+        );
+        assert!(saved.contains(path.trim_end()), "{saved}");
+        assert_eq!(Description::parse(&saved, "s.toml").unwrap().camera, new);
+    }
+
+    #[test]
     fn a_save_is_taken_back_unless_the_file_was_changed_since() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("s.toml");

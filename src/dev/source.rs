@@ -115,7 +115,7 @@ impl Sources {
         // The stamps are taken first: a file that changes while it is read is read again.
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
         let text = fs::read_to_string(&self.scene).unwrap_or_default();
-        let described = Description::parse(&text, &self.scene.display().to_string());
+        let described = Description::parse_defined(&text, &self.scene.display().to_string(), &self.overrides.define);
         if let Ok(described) = &described {
             files.extend(self.assets(described).map(|path| (path.clone(), self.stamp(&path))));
         }

@@ -1,12 +1,13 @@
 //! Adapters, and the choice among them.
 
-use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::sync::mpsc;
 
 use bytemuck::{Pod, bytes_of, cast_slice};
-use wgpu::util::DeviceExt;
 use wgpu::{Backends, BufferUsages, DeviceType};
 
 use super::controls::FloatControls;
+use super::failure::{Failure, error_of_opening};
+use crate::contain::{DropContained, contained};
 use crate::error::RenderError;
 
 /// What to do where there is no adapter.
@@ -52,26 +53,12 @@ pub struct Info {
 /// A device that is ready for work; a clone is another handle to it.
 #[derive(Clone)]
 pub struct Device {
-    pub(super) device: wgpu::Device,
-    pub(super) queue: wgpu::Queue,
+    // Dropped in this order; wgpu may panic where the device is lost.
+    pub(super) queue: DropContained<wgpu::Queue>,
+    pub(super) device: DropContained<wgpu::Device>,
     failure: Failure,
     /// What it says of itself.
     pub info: Info,
-}
-
-/// What went wrong while nobody could be told, until somebody is.
-#[derive(Clone, Default)]
-struct Failure(Arc<Mutex<Option<String>>>);
-
-impl Failure {
-    fn keep(&self, what: &dyn std::fmt::Display) {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.get_or_insert_with(|| what.to_string());
-    }
-
-    fn take(&self) -> Option<String> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
-    }
 }
 
 /// Every adapter that wgpu finds, in the order in which [`Choice::Auto`] prefers them.
@@ -86,10 +73,20 @@ pub fn adapters() -> Vec<Info> {
 /// [`RenderError::NoDevice`] if no adapter fits, or several of different names do, and that of the last one if none that
 /// fits can be opened.
 pub fn choose(choice: &Choice) -> Result<Device, RenderError> {
+    choose_among(choice, &|_| true)
+}
+
+/// As [`choose`], of the adapters that are wanted.
+///
+/// # Errors
+///
+/// As those of [`choose`].
+pub fn choose_among(choice: &Choice, wanted: &dyn Fn(&Info) -> bool) -> Result<Device, RenderError> {
     let adapters = enumerate();
     let infos: Vec<Info> = adapters.iter().map(info).collect();
     let mut failure = None;
-    for i in fitting(&infos, choice).map_err(RenderError::NoDevice)? {
+    let fitting = fitting(&infos, choice).map_err(RenderError::NoDevice)?;
+    for i in fitting.into_iter().filter(|i| wanted(&infos[*i])) {
         match open(&adapters[i]) {
             Ok(device) => return Ok(device),
             Err(error) => failure = Some(error),
@@ -144,8 +141,12 @@ fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, String> {
 }
 
 fn enumerate() -> Vec<wgpu::Adapter> {
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
-    let mut adapters = pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY));
+    // A driver that is being reset may fail where wgpu does not expect it: then there is none.
+    let adapters = contained(|| {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+        pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY))
+    });
+    let mut adapters = adapters.unwrap_or_default();
     adapters.sort_by_key(|adapter| preference(&adapter.get_info()));
     adapters
 }
@@ -223,22 +224,22 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
         memory_hints: wgpu::MemoryHints::MemoryUsage,
         trace: wgpu::Trace::Off,
     };
-    let (device, queue) =
-        pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| RenderError::Device {
-            device: info.name.clone(),
-            message: error.to_string(),
-        })?;
-    // By default wgpu panics. What goes wrong outside of `Device::checked`, or while nobody waits, is told by the next call.
+    let opened = contained(|| pollster::block_on(adapter.request_device(&descriptor)));
+    let (device, queue) = match opened {
+        Ok(Ok(opened)) => opened,
+        Ok(Err(error)) => return Err(error_of_opening(&info.name, &error)),
+        Err(message) => {
+            return Err(RenderError::Device {
+                device: info.name,
+                message,
+            });
+        }
+    };
     let failure = Failure::default();
-    let (uncaptured, lost) = (failure.clone(), failure.clone());
-    device.on_uncaptured_error(Arc::new(move |error| uncaptured.keep(&error)));
-    device.set_device_lost_callback(move |reason, message| match reason {
-        wgpu::DeviceLostReason::Destroyed => {} // given up, or dropped
-        _ => lost.keep(&format!("the device was lost: {message}")),
-    });
+    failure.listen(&device);
     Ok(Device {
-        device,
-        queue,
+        queue: DropContained::new(queue),
+        device: DropContained::new(device),
         failure,
         info,
     })
@@ -261,38 +262,36 @@ impl Device {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let value = calls();
+        let value = contained(calls);
         let errors = [validation.pop(), internal.pop(), memory.pop()].map(pollster::block_on);
-        match errors.into_iter().flatten().next() {
-            Some(error) => Err(self.error(error)),
-            None => self
-                .failure
-                .take()
-                .map_or(Ok(value), |message| Err(self.error(message))),
-        }
+        let [validation, internal, memory] = errors;
+        // A buffer that was refused for want of memory is refused again by whatever uses it: the cause is told.
+        let first = [memory, validation, internal].into_iter().flatten().next();
+        self.failure.judge(&self.info.name, value, first.as_ref())
     }
 
+    /// An error of the device: of its loss, if it is lost.
     pub(super) fn error(&self, error: impl std::fmt::Display) -> RenderError {
-        RenderError::Device {
-            device: self.info.name.clone(),
-            message: error.to_string(),
-        }
+        self.failure.error(&self.info.name, &error)
     }
 
     /// Lets wgpu notice what has ended. It does not wait.
     pub(super) fn poll(&self) -> Result<(), RenderError> {
-        self.device
-            .poll(wgpu::PollType::Poll)
-            .map_err(|error| self.error(error))?;
-        Ok(())
+        self.poll_for(wgpu::PollType::Poll)
     }
 
     /// Waits until all submitted work has ended.
     pub(super) fn wait(&self) -> Result<(), RenderError> {
-        self.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|error| self.error(error))?;
-        Ok(())
+        self.poll_for(wgpu::PollType::wait_indefinitely())
+    }
+
+    /// wgpu panics here where the device is lost.
+    fn poll_for(&self, what: wgpu::PollType) -> Result<(), RenderError> {
+        match contained(|| self.device.poll(what)) {
+            Ok(Ok(_)) => Ok(()),
+            Ok(Err(error)) => Err(self.error(error)),
+            Err(message) => Err(self.error(message)),
+        }
     }
 
     pub(super) fn buffer(&self, size: u64, usage: BufferUsages) -> wgpu::Buffer {
@@ -313,12 +312,20 @@ impl Device {
         } else {
             cast_slice(records)
         };
-        let descriptor = wgpu::util::BufferInitDescriptor {
+        let descriptor = wgpu::BufferDescriptor {
             label: None,
-            contents,
+            size: (contents.len() as u64).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
             usage,
+            mapped_at_creation: true,
         };
-        self.device.create_buffer_init(&descriptor)
+        let buffer = self.device.create_buffer(&descriptor);
+        // One that was refused cannot be written to; whoever checks these calls is told why.
+        if let Ok(mut view) = buffer.get_mapped_range_mut(..) {
+            view.slice(..contents.len()).copy_from_slice(contents);
+            drop(view);
+            buffer.unmap();
+        }
+        buffer
     }
 
     /// What a buffer holds.

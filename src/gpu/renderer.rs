@@ -9,6 +9,7 @@ use wgpu::BufferUsages;
 use super::bake::bake_if_small;
 use super::compose::{ADAPTIVE, FIRST_HITS, Kernel, RENDER, Shaders};
 use super::device::{Device, Mapping};
+use super::memory::{Asked, Held};
 use super::pipeline::{WORKGROUP, bind_group, bind_group_layouts, pipeline};
 use super::rounding::Rounding;
 use super::rounds::samples_per_call;
@@ -214,13 +215,29 @@ impl Gpu {
 
     fn target(&self, record: usize, region: Region) -> Result<Target, RenderError> {
         let size = region.pixels().max(1) * record as u64; // a binding cannot be empty
-        self.device.checked(|| {
+        let target = self.device.checked(|| {
             let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
             let buffer = self.device.buffer(size, usage);
             let buffers = [&self.work, &buffer, &self.receipt[0]];
             let group = bind_group(&self.device, &self.kernels.layouts[0], &buffers);
             Target { region, buffer, group }
-        })
+        });
+        let what = format!("a film of {} x {} pixels", region.width(), region.height());
+        self.explained(target, Some((what, size)))
+    }
+
+    /// What there is on the device.
+    fn held(&self) -> Held {
+        Held {
+            scene: self.scene.bytes,
+            film: self.film.as_ref().map_or(0, |(film, _)| film.buffer.size()),
+            copies: self.before.as_ref().map_or(0, |before| before.size()),
+        }
+    }
+
+    /// An error for want of memory tells the sizes.
+    fn explained<T>(&self, result: Result<T, RenderError>, asked: Option<Asked>) -> Result<T, RenderError> {
+        result.map_err(|error| self.held().explain(error, asked.as_ref()))
     }
 
     /// Runs a kernel over a tile of a target, after these copies. Its receipt is asked for.
@@ -282,10 +299,12 @@ impl Gpu {
         let rows = Rows::of(film, tile);
         let before = match self.before.take().filter(|before| before.size() >= rows.bytes()) {
             Some(before) => before,
-            None => self.device.checked(|| {
-                self.device
-                    .buffer(rows.bytes(), BufferUsages::COPY_SRC | BufferUsages::COPY_DST)
-            })?,
+            None => {
+                let usage = BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
+                let before = self.device.checked(|| self.device.buffer(rows.bytes(), usage));
+                let what = format!("a copy of {} rows of the film", tile.height());
+                self.explained(before, Some((what, rows.bytes())))?
+            }
         };
         let most = self.rules.end_of_part(&samples) - samples.start;
         let end = samples.start + self.samples_per_call.min(most);
@@ -358,6 +377,7 @@ impl Gpu {
 
     /// After an error there is no film. The receipt may still be mapped then, and takes no copy: there is a new one.
     fn or_lost<T>(&mut self, result: Result<T, RenderError>) -> Result<T, RenderError> {
+        let result = self.explained(result, None);
         if result.is_err() {
             self.pending = None;
             self.film = None;
@@ -475,6 +495,7 @@ impl Backend for Gpu {
             return Ok(self.rules.empty_film(region));
         }
         let result = self.device.download(&film.buffer);
+        let result = self.explained(result, Some(("a copy of the film".to_string(), film.buffer.size())));
         let records: Vec<Vec4> = self.or_lost(result)?;
         Ok(film_of(region, self.rules.form(), &records))
     }

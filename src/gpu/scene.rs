@@ -6,6 +6,7 @@ use wgpu::BufferUsages;
 
 use super::bake::{mesh_rows, node_rows, rows};
 use super::device::Device;
+use super::memory::Held;
 use super::pipeline::bind_group;
 use super::texels::TexelParts;
 use crate::error::RenderError;
@@ -16,6 +17,8 @@ pub struct SceneBuffers {
     camera: wgpu::Buffer,
     /// The groups of `shaders/bindings.wgsl` behind the first: what changes with the scene, and with its shapes.
     pub groups: [wgpu::BindGroup; 2],
+    /// What they take, in bytes.
+    pub bytes: u64,
 }
 
 impl SceneBuffers {
@@ -27,30 +30,44 @@ impl SceneBuffers {
         layouts: &[wgpu::BindGroupLayout],
     ) -> Result<SceneBuffers, RenderError> {
         let storage = BufferUsages::STORAGE;
-        let texels = texels.split(&packed.texels);
-        let texels = texels.map(|part| device.checked(|| device.upload(storage, part)));
-        let texels: Vec<wgpu::Buffer> = texels.collect::<Result<_, _>>()?;
+        let (rows, nodes, meshes) = (rows(packed), node_rows(packed), mesh_rows(packed));
         let mut filter_table = packed.filter_table.clone();
         filter_table.resize(BINS as usize, Vec4::ZERO);
-        device.checked(|| {
-            let camera = device.upload(BufferUsages::UNIFORM | BufferUsages::COPY_DST, &[packed.camera]);
-            let of_scene = [
-                device.upload(BufferUsages::UNIFORM, &[packed.environment]),
-                device.upload(BufferUsages::UNIFORM, &[packed.counts]),
-                device.upload(BufferUsages::UNIFORM, &filter_table),
-                device.upload(storage, &rows(packed)),
-            ];
-            let of_scene: Vec<_> = [&camera].into_iter().chain(&of_scene).chain(&texels).collect();
-            let primitives = device.upload(storage, &packed.primitives);
-            let bounds = device.upload(storage, &packed.bounds);
-            let nodes = device.upload(storage, &node_rows(packed));
-            let meshes = device.upload(storage, &mesh_rows(packed));
-            let groups = [
-                bind_group(device, &layouts[1], &of_scene),
-                bind_group(device, &layouts[2], &[&primitives, &bounds, &nodes, &meshes]),
-            ];
-            SceneBuffers { camera, groups }
-        })
+        let sizes = [
+            size_of_val(packed.texels.as_slice()),
+            size_of_val(rows.as_slice()),
+            size_of_val(nodes.as_slice()),
+            size_of_val(meshes.as_slice()),
+            size_of_val(packed.primitives.as_slice()),
+            size_of_val(packed.bounds.as_slice()),
+            size_of_val(filter_table.as_slice()),
+        ];
+        let bytes = sizes.iter().map(|size| *size as u64).sum();
+        let uploaded = || {
+            let texels = texels.split(&packed.texels);
+            let texels = texels.map(|part| device.checked(|| device.upload(storage, part)));
+            let texels: Vec<wgpu::Buffer> = texels.collect::<Result<_, _>>()?;
+            device.checked(|| {
+                let camera = device.upload(BufferUsages::UNIFORM | BufferUsages::COPY_DST, &[packed.camera]);
+                let of_scene = [
+                    device.upload(BufferUsages::UNIFORM, &[packed.environment]),
+                    device.upload(BufferUsages::UNIFORM, &[packed.counts]),
+                    device.upload(BufferUsages::UNIFORM, &filter_table),
+                    device.upload(storage, &rows),
+                ];
+                let of_scene: Vec<_> = [&camera].into_iter().chain(&of_scene).chain(&texels).collect();
+                let primitives = device.upload(storage, &packed.primitives);
+                let bounds = device.upload(storage, &packed.bounds);
+                let nodes = device.upload(storage, &nodes);
+                let meshes = device.upload(storage, &meshes);
+                let groups = [
+                    bind_group(device, &layouts[1], &of_scene),
+                    bind_group(device, &layouts[2], &[&primitives, &bounds, &nodes, &meshes]),
+                ];
+                SceneBuffers { camera, groups, bytes }
+            })
+        };
+        uploaded().map_err(|error| Held::default().explain(error, Some(&("the scene".to_string(), bytes))))
     }
 
     /// Changes the camera.

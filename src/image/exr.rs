@@ -1,36 +1,37 @@
-//! OpenEXR files: scan lines of 32-bit samples, compressed without loss, written block by block.
+//! OpenEXR files: scan lines of 32-bit or 16-bit samples, compressed without loss, written block by block.
 
 use std::io::{self, Seek, Write};
 use std::path::Path;
 
 use ::exr::block::writer::{ChunkWriter, ChunksWriter};
 use ::exr::block::{BlockIndex, UncompressedBlock, write as write_blocks};
-use ::exr::compression::Compression;
 use ::exr::error::{Error, UnitResult};
 use ::exr::math::Vec2;
-use ::exr::meta::attribute::{ChannelDescription, IntegerBounds, LineOrder, SampleType};
+use ::exr::meta::attribute::{ChannelDescription, IntegerBounds, LineOrder, SampleType, Text};
 use ::exr::meta::header::{Header, ImageAttributes};
 use ::exr::meta::{BlockDescription, MetaData};
-use ::exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel};
+use ::exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel, f16};
 use rayon::prelude::*;
 
 use super::aov::Channel;
-use super::{Band, Layout, Pending, Pixels, Sink};
+use super::{Band, ExrType, Layout, Pending, Pixels, SaveOptions, Sink};
 use crate::error::RenderError;
 use crate::film::mean;
 
-/// Rows that are compressed together; the format fixes it for [`Compression::ZIP16`].
-const BLOCK_ROWS: usize = 16;
-
 /// Writes the radiance as R, G, B, its alpha as A, by which the colours are weighted as the format has it, and the AOVs as further channels of the same part. The display window is the whole
-/// picture, the data window the region.
+/// picture, the data window the region. Returns how many finite values became infinite.
 pub fn write(
-    file: &mut Pending,
+    files: &mut [Pending],
     layout: &Layout,
+    options: &SaveOptions,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
-) -> Result<(), RenderError> {
+) -> Result<u64, RenderError> {
+    let [file] = files else {
+        return Err(io::Error::other("an EXR is one file").into()); // and so it is: `target::files` has no more for it
+    };
     let columns = columns(layout);
-    let header = header(layout, &columns);
+    let header = header(layout, options, &columns);
+    let mut too_large = 0;
     // The library calls us back, so an error of the render goes around it.
     let mut failed = None;
     let written = write_blocks(file, [header].into_iter().collect(), true, |meta, writer| {
@@ -39,10 +40,14 @@ pub fn write(
             layout,
             meta,
             writer,
+            half: options.exr_type == ExrType::Half,
+            block_rows: options.exr_compression.method().scan_lines_per_block(),
             lines: Vec::new(),
             next: 0,
+            too_large: 0,
         };
         let rendered = render(&mut |band| Ok(rows.take(band).map_err(plain)?));
+        too_large = rows.too_large;
         rendered.map_err(|error| {
             failed = Some(error);
             Error::Aborted
@@ -50,7 +55,7 @@ pub fn write(
     });
     match failed {
         Some(error) => Err(error),
-        None => Ok(written.map_err(plain)?),
+        None => Ok(written.map(|()| too_large).map_err(plain)?),
     }
 }
 
@@ -74,28 +79,48 @@ fn columns(layout: &Layout) -> Vec<(&'static str, Column)> {
     columns
 }
 
-fn header(layout: &Layout, columns: &[(&str, Column)]) -> Header {
+impl Column {
+    fn is_whole(&self) -> bool {
+        matches!(self, Column::Aov(channel) if channel.is_whole())
+    }
+}
+
+fn header(layout: &Layout, options: &SaveOptions, columns: &[(&str, Column)]) -> Header {
     let channel = |(name, column): &(&str, Column)| {
-        let sample = match column {
-            Column::Aov(channel) if channel.is_whole() => SampleType::U32,
-            _ => SampleType::F32,
+        let sample = match (column.is_whole(), options.exr_type) {
+            (true, _) => SampleType::U32,
+            (false, ExrType::Float) => SampleType::F32,
+            (false, ExrType::Half) => SampleType::F16,
         };
         ChannelDescription::named(*name, sample)
     };
     let channels = columns.iter().map(channel).collect();
     let (width, height) = layout.picture;
     let region = layout.region;
-    Header::new(
+    let mut header = Header::new(
         "wgray".into(),
         Vec2(region.width() as usize, region.height() as usize),
         channels,
     )
-    .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing)
+    .with_encoding(
+        options.exr_compression.method(),
+        BlockDescription::ScanLines,
+        LineOrder::Increasing,
+    )
     .with_position(Vec2(region.x0 as i32, region.y0 as i32))
     .with_shared_attributes(ImageAttributes::new(IntegerBounds::from_dimensions(Vec2(
         width as usize,
         height as usize,
-    ))))
+    ))));
+    // Attributes of other names would come in another order each time, as the library keeps them in a hash map.
+    header.own_attributes.software_name = options.metadata.software().map(text);
+    header.own_attributes.comments = options.metadata.lines().as_deref().map(text);
+    header
+}
+
+/// A text as the format has it, which knows bytes alone: UTF-8.
+fn text(text: &str) -> Text {
+    Text::from_bytes_unchecked(text.as_bytes().iter().copied().collect())
 }
 
 /// Gathers rows to blocks.
@@ -104,10 +129,16 @@ struct Rows<'a, W: Write + Seek> {
     layout: &'a Layout,
     meta: MetaData,
     writer: &'a mut ChunkWriter<W>,
+    /// Whether measures have 16 bits.
+    half: bool,
+    /// Rows that are compressed together.
+    block_rows: usize,
     /// Rows that wait for the rest of their block.
     lines: Vec<Vec<u8>>,
     /// The number of the next block.
     next: usize,
+    /// Finite values that became infinite.
+    too_large: u64,
 }
 
 impl<W: Write + Seek> Rows<'_, W> {
@@ -116,20 +147,23 @@ impl<W: Write + Seek> Rows<'_, W> {
         let rows = band.film.region.height() as usize;
         let lines = (0..rows)
             .into_par_iter()
-            .map(|y| line(self.columns, band, y * width..(y + 1) * width));
-        self.lines.extend(lines.collect::<Vec<_>>());
+            .map(|y| line(self.columns, band, y * width..(y + 1) * width, self.half));
+        for (line, too_large) in lines.collect::<Vec<_>>() {
+            self.lines.push(line);
+            self.too_large += too_large;
+        }
         let height = self.layout.region.height() as usize;
-        let last = self.next * BLOCK_ROWS + self.lines.len() == height;
-        let whole = self.lines.len() / BLOCK_ROWS * BLOCK_ROWS;
+        let last = self.next * self.block_rows + self.lines.len() == height;
+        let whole = self.lines.len() / self.block_rows * self.block_rows;
         let ready: Vec<Vec<u8>> = self
             .lines
             .drain(..if last { self.lines.len() } else { whole })
             .collect();
-        let (first, headers) = (self.next, &self.meta.headers);
-        let chunks = ready.par_chunks(BLOCK_ROWS).enumerate().map(|(i, lines)| {
+        let (first, headers, block_rows) = (self.next, &self.meta.headers, self.block_rows);
+        let chunks = ready.par_chunks(block_rows).enumerate().map(|(i, lines)| {
             let index = BlockIndex {
                 layer: 0,
-                pixel_position: Vec2(0, (first + i) * BLOCK_ROWS),
+                pixel_position: Vec2(0, (first + i) * block_rows),
                 pixel_size: Vec2(width, lines.len()),
                 level: Vec2(0, 0),
             };
@@ -147,19 +181,29 @@ impl<W: Write + Seek> Rows<'_, W> {
     }
 }
 
-/// A row's bytes: all samples of the first channel, then all of the second ...
-fn line(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>) -> Vec<u8> {
+/// A row's bytes: all samples of the first channel, then all of the second ... With them the finite values that 16 bits made
+/// infinite.
+fn line(columns: &[(&str, Column)], band: Band, pixels: std::ops::Range<usize>, half: bool) -> (Vec<u8>, u64) {
     let mut bytes = Vec::with_capacity(4 * columns.len() * pixels.len());
+    let mut too_large = 0;
     for (_, column) in columns {
         for i in pixels.clone() {
-            bytes.extend(match column {
+            let sample = match column {
                 Column::Radiance(channel) => mean(band.film.sums[i])[*channel].to_ne_bytes(),
                 Column::Alpha => band.film.alpha(i).to_ne_bytes(),
                 Column::Aov(channel) => channel.bytes(band, i),
-            });
+            };
+            if half && !column.is_whole() {
+                let value = f32::from_ne_bytes(sample);
+                let rounded = f16::from_f32(value); // to the nearest, halves to even
+                too_large += u64::from(value.is_finite() && rounded.is_infinite());
+                bytes.extend(rounded.to_ne_bytes());
+            } else {
+                bytes.extend(sample);
+            }
         }
     }
-    bytes
+    (bytes, too_large)
 }
 
 fn plain(error: Error) -> io::Error {

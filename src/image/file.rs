@@ -195,7 +195,11 @@ const RANDOM: usize = 6;
 
 /// A temporary file in the folder of what it becomes, locked as long as it is open: by that others know that its process
 /// lives.
-fn beside(path: &Path) -> io::Result<NamedTempFile> {
+///
+/// # Errors
+///
+/// Folders that may not be written.
+pub fn beside(path: &Path) -> io::Result<NamedTempFile> {
     let folder = path.parent().unwrap_or(Path::new("."));
     let name = Name::of(path);
     remove_stale(folder, &name);
@@ -220,6 +224,10 @@ fn beside(path: &Path) -> io::Result<NamedTempFile> {
 }
 
 /// Removes what processes left that were killed on the way to the same file. Nothing here must end a render.
+pub fn remove_stale_beside(path: &Path) {
+    remove_stale(path.parent().unwrap_or(Path::new(".")), &Name::of(path));
+}
+
 fn remove_stale(folder: &Path, name: &Name) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {

@@ -1,45 +1,34 @@
-//! Pictures as files: 8-bit PNG as a screen shows it, OpenEXR with the linear values. Rows are written as they come, so
-//! that a picture need not fit memory, and under another name until all are there, so that no half file is ever seen.
+//! Pictures as files: PNG, JPEG and WebP as a screen shows them, OpenEXR with the linear values. Rows of PNG and OpenEXR are
+//! written as they come, so that a picture need not fit memory, and all under another name until they are whole, so that no
+//! half file is ever seen.
 
+mod agx;
 mod aov;
 mod difference;
 mod exr;
 mod file;
+mod flat;
 mod output;
 mod png;
-
-use std::path::{Path, PathBuf};
+mod save_options;
+mod target;
+mod view;
 
 use crate::error::RenderError;
 use crate::film::{Film, Region};
 use crate::pack::FirstHit;
+use crate::scene::ViewSettings;
 
 pub use aov::{Aov, AovSource};
 pub use difference::{Difference, difference};
 pub use exr::read_exr;
 pub use file::Pending;
+pub(crate) use file::{beside, remove_stale_beside};
 pub use output::Output;
-pub use png::{encode, in_memory, straight};
-
-/// A kind of picture file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// RGB of 8 bits a channel, clamped to [0, 1] and raised to the power 1/2.2, and alpha where the picture has it, which is
-    /// linear. Every [`Aov`] is a file of its own.
-    Png,
-    /// RGB of 32-bit floats, linear, and alpha where the picture has it; [`Aov`]s are further layers.
-    Exr,
-}
-
-impl Format {
-    /// The format that a file's name asks for by its end, `.png` or `.exr`.
-    pub fn of(path: &Path) -> Option<Format> {
-        let extension = path.extension()?.to_str()?;
-        [("png", Format::Png), ("exr", Format::Exr)]
-            .into_iter()
-            .find_map(|(known, format)| extension.eq_ignore_ascii_case(known).then_some(format))
-    }
-}
+pub use png::in_memory;
+pub use save_options::{BitDepth, ExrCompression, ExrType, Metadata, SaveOptions};
+pub use target::{Format, Layers, Saved, Target, files, save};
+pub use view::{encode, to_8_bits, to_16_bits};
 
 /// What a picture file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,6 +45,8 @@ pub struct Layout {
     pub middle_depth: f32,
     /// The number of samples that is bright in a PNG of their counts.
     pub most_samples: u32,
+    /// How it is shown, but in an EXR.
+    pub view: ViewSettings,
 }
 
 /// Some whole rows of a region, in full width.
@@ -79,36 +70,4 @@ pub struct Pixels {
     pub height: u32,
     /// Linear RGB, row by row from the top.
     pub colors: Vec<[f32; 3]>,
-}
-
-/// The files that a picture is written to: the path itself, and `NAME.normal.png` and the like for a PNG's [`Aov`]s.
-pub fn files(path: &Path, format: Format, aovs: &[Aov]) -> Vec<PathBuf> {
-    let mut files = vec![path.to_owned()];
-    if format == Format::Png {
-        files.extend(
-            aovs.iter()
-                .map(|aov| path.with_extension(format!("{}.png", aov.name()))),
-        );
-    }
-    files
-}
-
-/// Writes what `render` hands to the sink, the picture to the first of the files, those of its AOVs to the others, in the
-/// order of [`files`]. They have their names when all rows are written; if anything fails they are as they were before.
-///
-/// # Errors
-///
-/// The errors of `render`, and [`RenderError::Output`] if a file cannot be written.
-pub fn save(
-    mut pending: Vec<Pending>,
-    format: Format,
-    layout: &Layout,
-    render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
-) -> Result<(), RenderError> {
-    match (format, pending.first_mut()) {
-        (Format::Exr, Some(first)) => exr::write(first, layout, render)?,
-        _ => png::write(&mut pending, layout, render)?,
-    }
-    pending.iter_mut().try_for_each(Pending::complete)?;
-    Ok(pending.into_iter().try_for_each(Pending::finish)?)
 }

@@ -2,34 +2,13 @@
 
 use std::io::{self, Write};
 
-use ::png::{BitDepth, ColorType, Compression, Encoder, EncodingError, ScaledFloat};
+use ::png::{BitDepth as Bits, ColorType, Compression, Encoder, EncodingError, ScaledFloat, SrgbRenderingIntent};
 use rayon::prelude::*;
 
-use super::{Aov, Band, Layout, Pending, Sink};
+use super::view::GAMMA;
+use super::{Aov, Band, BitDepth, Layout, Metadata, Pending, SaveOptions, Sink, to_8_bits, to_16_bits};
 use crate::error::RenderError;
 use crate::film::mean;
-
-/// The exponent of the course's display curve.
-const DISPLAY: f64 = 1.0 / 2.2;
-
-/// A linear value as 8 bits: clamped to [0, 1], raised to the power 1/2.2, times 255, rounded to the nearest whole
-/// number; 0 if it is no number.
-pub fn encode(linear: f32) -> u8 {
-    quantize(f64::from(linear.clamp(0.0, 1.0)).powf(DISPLAY))
-}
-
-/// A pixel of a picture with alpha as a PNG has it: red, green and blue of what is there by itself, and the share that it
-/// covers, linear. Where nothing is it is black.
-pub fn straight([r, g, b]: [f32; 3], alpha: f32) -> [u8; 4] {
-    let by_itself = |value: f32| if alpha > 0.0 { encode(value / alpha) } else { 0 };
-    let share = quantize(f64::from(alpha.clamp(0.0, 1.0)));
-    [by_itself(r), by_itself(g), by_itself(b), share]
-}
-
-/// The nearest of 256 steps from 0 to 1; halves go up.
-fn quantize(value: f64) -> u8 {
-    (value * 255.0 + 0.5) as u8 // the conversion saturates, and takes NaN to 0
-}
 
 /// A PNG file of 8-bit RGB in memory, packed for speed.
 ///
@@ -38,7 +17,7 @@ fn quantize(value: f64) -> u8 {
 /// Sizes that do not fit the number of bytes.
 pub fn in_memory(width: u32, height: u32, rgb: &[u8]) -> io::Result<Vec<u8>> {
     let mut file = Vec::new();
-    let mut png = png8(&mut file, (width, height), ColorType::Rgb);
+    let mut png = encoder(&mut file, (width, height), ColorType::Rgb, BitDepth::Eight);
     png.set_compression(Compression::Fast);
     png.write_header()
         .and_then(|mut writer| writer.write_image_data(rgb))
@@ -46,10 +25,13 @@ pub fn in_memory(width: u32, height: u32, rgb: &[u8]) -> io::Result<Vec<u8>> {
     Ok(file)
 }
 
-fn png8<W: Write>(file: W, (width, height): (u32, u32), color: ColorType) -> Encoder<'static, W> {
+fn encoder<W: Write>(file: W, (width, height): (u32, u32), color: ColorType, depth: BitDepth) -> Encoder<'static, W> {
     let mut png = Encoder::new(file, width, height);
     png.set_color(color);
-    png.set_depth(BitDepth::Eight);
+    png.set_depth(match depth {
+        BitDepth::Eight => Bits::Eight,
+        BitDepth::Sixteen => Bits::Sixteen,
+    });
     png
 }
 
@@ -57,8 +39,10 @@ fn png8<W: Write>(file: W, (width, height): (u32, u32), color: ColorType) -> Enc
 pub fn write(
     files: &mut [Pending],
     layout: &Layout,
+    options: &SaveOptions,
     render: &mut dyn FnMut(&mut Sink) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
+    let depth = options.bit_depth;
     let mut writers = Vec::new();
     let contents = [None].into_iter().chain(layout.aovs.iter().copied().map(Some));
     for (file, content) in files.iter_mut().zip(contents) {
@@ -66,23 +50,23 @@ pub fn write(
             true => ColorType::Rgba,
             false => ColorType::Rgb,
         };
-        let mut png = png8(file, (layout.region.width(), layout.region.height()), color);
+        let mut png = encoder(file, (layout.region.width(), layout.region.height()), color, depth);
         if content.is_none() {
-            png.set_source_gamma(ScaledFloat::new(DISPLAY as f32));
+            match layout.view.is_srgb() {
+                true => png.set_source_srgb(SrgbRenderingIntent::Perceptual),
+                false => png.set_source_gamma(ScaledFloat::new(GAMMA as f32)),
+            }
         }
+        tell(&mut png, &options.metadata).map_err(plain)?;
         writers.push((png.write_header().map_err(plain)?, content));
     }
     let mut streams = Vec::new();
     for (writer, content) in &mut writers {
-        streams.push((writer.stream_writer().map_err(plain)?, content));
+        streams.push((writer.stream_writer().map_err(plain)?, *content));
     }
     render(&mut |band| {
         for (stream, content) in &mut streams {
-            let bytes = match &*content {
-                None => radiance(band, layout.alpha),
-                Some(aov) => colors(band, *aov, layout),
-            };
-            stream.write_all(&bytes)?;
+            stream.write_all(&bytes(band, *content, layout, depth))?;
         }
         Ok(())
     })?;
@@ -95,24 +79,47 @@ pub fn write(
     Ok(())
 }
 
-fn radiance(band: Band, alpha: bool) -> Vec<u8> {
-    let sums = &band.film.sums;
-    if alpha {
-        let color = |i| straight(mean(sums[i]), band.film.alpha(i));
-        return (0..sums.len()).into_par_iter().flat_map_iter(color).collect();
+/// Puts texts into a file's header: as Latin-1 where they are that, as every reader knows, else as UTF-8.
+fn tell<W: Write>(png: &mut Encoder<'static, W>, metadata: &Metadata) -> Result<(), EncodingError> {
+    for (name, text) in metadata.pairs.iter().cloned() {
+        match text.chars().all(|c| c <= '\u{ff}') {
+            true => png.add_text_chunk(name, text)?,
+            false => png.add_itxt_chunk(name, text)?,
+        }
     }
-    sums.par_iter().flat_map_iter(|sum| mean(*sum).map(encode)).collect()
+    Ok(())
 }
 
-fn colors(band: Band, aov: Aov, layout: &Layout) -> Vec<u8> {
-    let color = |i| {
-        let color = aov.color(band, i, layout).to_array();
-        color.map(|value| match aov.light() {
-            Some(_) => encode(value),
-            None => quantize(f64::from(value)),
-        })
-    };
-    (0..band.film.sums.len()).into_par_iter().flat_map_iter(color).collect()
+/// The bytes of all pixels of a band: of the radiance, or of an AOV.
+fn bytes(band: Band, content: Option<Aov>, layout: &Layout, depth: BitDepth) -> Vec<u8> {
+    match (content, layout.alpha) {
+        (None, true) => rounded(band, depth, |i| {
+            layout
+                .view
+                .display_straight(mean(band.film.sums[i]), band.film.alpha(i))
+        }),
+        (None, false) => rounded(band, depth, |i| layout.view.display(mean(band.film.sums[i]))),
+        (Some(aov), _) => rounded(band, depth, |i| {
+            let color = aov.color(band, i, layout).to_array();
+            match (aov, aov.light()) {
+                (Aov::Albedo, _) => layout.view.display_share(color),
+                (_, Some(_)) => layout.view.display(color),
+                (_, None) => color.map(f64::from),
+            }
+        }),
+    }
+}
+
+/// All pixels of a band, from values of 0 to 1.
+fn rounded<const N: usize>(band: Band, depth: BitDepth, pixel: impl Fn(usize) -> [f64; N] + Sync) -> Vec<u8> {
+    let pixels = (0..band.film.sums.len()).into_par_iter();
+    match depth {
+        BitDepth::Eight => pixels.flat_map_iter(|i| pixel(i).map(to_8_bits)).collect(),
+        BitDepth::Sixteen => {
+            let values = pixels.flat_map_iter(|i| pixel(i).map(to_16_bits));
+            values.flat_map_iter(u16::to_be_bytes).collect()
+        }
+    }
 }
 
 fn plain(error: EncodingError) -> io::Error {

@@ -9,6 +9,7 @@ use serde::Deserialize;
 use serde_json::value::RawValue;
 use toml::Value;
 
+use super::define::Defines;
 use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
 use super::validate::{light, point};
 use super::{
@@ -104,17 +105,23 @@ pub(super) fn asset_root(folder: &Path) -> PathBuf {
 }
 
 /// Reads the text of a file; `origin` is its name in messages.
-pub(super) fn read(text: &str, origin: &str) -> Result<Description, SceneError> {
-    let course = read_json(text).map_err(|broken| broken.told(text, origin))?;
+pub(super) fn read(text: &str, origin: &str, defines: &mut Defines) -> Result<Description, SceneError> {
+    let course = read_json(text, defines).map_err(|broken| match broken {
+        Broken::Value(problem) if defines.brought(&problem.key) => SceneError::Override(problem.at("define")),
+        broken => broken.told(text, origin),
+    })?;
     let description = check(&course).and_then(|()| description(&course));
-    description.map_err(|problem| invalid(text, origin, problem))
+    description.map_err(|problem| invalid(text, origin, problem, defines))
 }
 
 /// The error of a text whose description has a bad value at the problem's path, or which has one there itself.
-pub(super) fn invalid(text: &str, origin: &str, problem: Problem) -> SceneError {
-    let key = key_in_file(text, &problem.key);
+pub(super) fn invalid(text: &str, origin: &str, problem: Problem, defines: &Defines) -> SceneError {
+    let key = key_in_file(text, &problem.key, defines);
     // There it has another name.
     let message = problem.message.replace("\"conductor\"", "\"specular\"");
+    if defines.brought(&key) {
+        return SceneError::Override(Problem { key, message }.at("define"));
+    }
     SceneError::Invalid {
         origin: origin.to_owned(),
         line: place(text, begin(text, &key)).0,
@@ -167,7 +174,7 @@ impl Broken {
     }
 }
 
-fn read_json(text: &str) -> Result<Course, Broken> {
+fn read_json(text: &str, defines: &mut Defines) -> Result<Course, Broken> {
     if text.len() > LARGEST {
         return Err(Broken::Large);
     }
@@ -178,10 +185,11 @@ fn read_json(text: &str) -> Result<Course, Broken> {
     })?;
     let end = deserializer.end();
     end.map_err(|error| Broken::Text(error, KeyPath::default()))?;
-    let Value::Table(table) = value else {
+    let Value::Table(mut table) = value else {
         let message = format!("{} must be an object: {{ \"spp\": ... }}", cut(&one_line(text)));
         return Err(Broken::Value(Problem::new(message)));
     };
+    defines.put(&[], &mut table, |_| false).map_err(Broken::Value)?;
     parse::read_for(table, Integrator::Path).map_err(|problem| {
         // It is told in TOML's words.
         let shown = find(text, &problem.key).filter(|value| value.starts_with('{'));
@@ -291,7 +299,7 @@ fn description(course: &Course) -> Result<Description, Problem> {
 }
 
 /// The path in the file of a value that is at a path of its description. A path of the file stays.
-fn key_in_file(text: &str, key: &KeyPath) -> KeyPath {
+fn key_in_file(text: &str, key: &KeyPath, defines: &Defines) -> KeyPath {
     let renamed = |segment: &Segment| match segment {
         Segment::Key(key) => Segment::from(match key.as_str() {
             "up" => "ref_up",
@@ -329,7 +337,7 @@ fn key_in_file(text: &str, key: &KeyPath) -> KeyPath {
                 .collect()
         }
         ("materials", [Segment::Key(name), rest @ ..]) => {
-            let course = read_json(text).ok();
+            let course = read_json(text, &mut defines.anew()).ok();
             let index = course.and_then(|course| course.materials.iter().position(|material| material.name == *name));
             let key = match rest {
                 [Segment::Key(key)] if key == "type" => "type",

@@ -6,8 +6,9 @@ use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 use super::course;
+use super::define::{Define, Defines};
 use super::error::{At, Problem, SceneError};
-use super::parse::{NOT_UTF8, invalid, syntax_error};
+use super::parse::{NOT_UTF8, invalid, line_of_path, syntax_error};
 use super::validate::{LIGHT_SAMPLES, adaptive, adaptive_error, max_depth, sample_count, side};
 use super::{AdaptiveDescription, Assets, Description, Integrator, Pattern, SamplesDescription, Scene};
 
@@ -36,6 +37,11 @@ pub struct Overrides {
     pub max_depth: Option<u32>,
     /// The folder that files named by the scene must lie in, instead of the scene's own.
     pub asset_root: Option<PathBuf>,
+    /// The frame that [`Scene::camera`] is of, if the camera moves. Without it the camera is as the file has it by itself, or
+    /// as in the first key of its path.
+    pub frame: Option<f64>,
+    /// Values for any keys of the file, one after the other; the fields above go before them.
+    pub define: Vec<Define>,
 }
 
 impl Overrides {
@@ -146,7 +152,8 @@ fn parse_beside(
     overrides: &Overrides,
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<Scene, SceneError> {
-    let mut description = Description::parse(text, origin)?;
+    let mut defines = Defines::new(&overrides.define);
+    let mut description = Description::parse_with(text, origin, &mut defines)?;
     overrides.apply(&mut description).map_err(SceneError::Override)?;
     let mut assets = Assets::beside(folder);
     let is_course = course::is_course(Path::new(origin));
@@ -159,9 +166,15 @@ fn parse_beside(
     let mut scene = description
         .validate_and_list(&assets, files)
         .map_err(|problem| match is_course {
-            true => course::invalid(text, origin, problem),
-            false => invalid(text, origin, problem),
+            true => course::invalid(text, origin, problem, &defines),
+            false => invalid(text, origin, problem, &defines),
         })?;
+    if let Some(path) = &mut scene.camera_path {
+        path.set_place(origin, line_of_path(text));
+    }
+    if let Some(frame) = overrides.frame {
+        scene.camera = scene.camera_at(frame)?;
+    }
     // The count may be the default, and yet somebody asked for it.
     let is_asked = overrides.light_samples.is_some() && scene.render.integrator == Integrator::Path;
     if is_asked && !scene.notes.iter().any(|note| note == LIGHT_SAMPLES) {
@@ -208,6 +221,8 @@ light_samples = { pattern = 'random', count = 5 }
             integrator: None,
             max_depth: None,
             asset_root: None,
+            frame: None,
+            define: Vec::new(),
         };
         let scene = Scene::parse_with(SCENE, "s.toml", &overrides).unwrap();
         let render = scene.render;

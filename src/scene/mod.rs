@@ -3,8 +3,10 @@
 //! The way from the file: text → [`Description`] (what it says, field for field) → [`Scene`] (by
 //! [`Description::validate`] alone). Nothing behind a `Scene` checks again.
 
+mod camera_path;
 mod course;
 mod decode;
+mod define;
 mod description;
 mod error;
 mod gray_exr;
@@ -12,8 +14,10 @@ pub(crate) mod image_file;
 mod load;
 mod mesh_file;
 mod parse;
+mod spline;
 pub(crate) mod texture;
 mod validate;
+mod view;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -23,13 +27,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::mesh::Mesh;
 
+pub use camera_path::CameraPath;
 #[cfg(feature = "dev")]
 pub(crate) use course::is_course;
+pub use define::Define;
 pub use description::*;
 pub use error::{KeyPath, Problem, SceneError};
 pub use image_file::Assets;
 pub use load::Overrides;
 pub use texture::{Color, Encoding, Image, NormalMap, Texels, Texture, TextureFilter, TextureKind, Value, Wrap};
+pub use view::{ViewSettings, ViewTransform};
 
 /// A checked scene. Lengths have no unit; colours are linear RGB; angles are radians.
 ///
@@ -42,8 +49,12 @@ pub struct Scene {
     pub width: u32,
     /// Height of the picture in pixels, 1 to 65,536.
     pub height: u32,
+    /// How it is shown.
+    pub view: ViewSettings,
     /// Where the picture is seen from.
     pub camera: Camera,
+    /// How the camera moves from frame to frame, if it does; [`Scene::camera_at`] has it at a frame.
+    pub camera_path: Option<CameraPath>,
     /// How it is rendered.
     pub render: Render,
     /// The textures that materials name by index: those of the scene file in the order of their names, then those of MTL files.

@@ -69,9 +69,12 @@ fn wrong_command_lines_exit_with_2() {
         ),
         (&["--progress", "loud"], "--progress"),
         (&["-q", "-v"], "cannot be used with"),
-        (&["-o", "picture.jpg"], "picture.jpg: must end in .png or .exr"),
-        (&["-o", "picture"], "must end in .png or .exr"),
-        (&["-o", ".png"], "must end in .png or .exr"),
+        (
+            &["-o", "picture.gif"],
+            "picture.gif: must end in .png, .exr, .jpg, .jpeg or .webp",
+        ),
+        (&["-o", "picture"], "must end in .png, .exr"),
+        (&["-o", ".png"], "must end in .png, .exr"),
         (&["another.toml"], "another.toml"),
         (&["--unknown"], "--unknown"),
     ];

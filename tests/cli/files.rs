@@ -5,7 +5,7 @@ use std::fs;
 use super::Place;
 
 #[test]
-fn a_file_that_cannot_be_written_fails_with_1() {
+fn a_file_that_cannot_be_written_fails_with_8() {
     let place = Place::new();
     fs::create_dir(place.path("folder.png")).unwrap();
     for (output, message) in [
@@ -17,12 +17,12 @@ fn a_file_that_cannot_be_written_fails_with_1() {
         ("folder.png", "folder.png: cannot be written: it is a folder"),
     ] {
         let ran = place.run(&["render", "small.toml", "-o", output]);
-        assert_eq!((ran.code, ran.stdout.as_str()), (1, ""), "{}", ran.stderr);
+        assert_eq!((ran.code, ran.stdout.as_str()), (8, ""), "{}", ran.stderr);
         assert!(ran.stderr.starts_with(&format!("error: {message}")), "{}", ran.stderr);
         assert_eq!(place.files(), ["folder.png"]);
     }
     let ran = place.run(&["render", "small.toml", "--stats", "nowhere/stats.json"]);
-    assert_eq!(ran.code, 1);
+    assert_eq!(ran.code, 8);
     assert_eq!(place.files(), ["folder.png"], "it is told before the render");
     assert!(
         ran.stderr.contains("nowhere/stats.json: cannot be written"),
@@ -73,7 +73,7 @@ mod unix {
                 .output()
                 .unwrap();
             let stderr = String::from_utf8(output.stderr).unwrap();
-            assert_eq!(output.status.code(), Some(1), "{stderr}");
+            assert_eq!(output.status.code(), Some(8), "{stderr}");
             assert!(stderr.contains(": cannot be written: File too large"), "{stderr}");
         }
         assert_eq!(place.files(), ["out.exr", "out.png"]);
@@ -128,13 +128,18 @@ mod unix {
     #[test]
     fn an_interrupted_render_leaves_no_trace() {
         crate::cli::heed_interrupts();
-        for (device, signal) in [("cpu", "-INT"), ("gpu", "-INT"), ("cpu", "-TERM"), ("cpu", "-HUP")] {
+        for (device, signal, code) in [
+            ("cpu", "-INT", 130),
+            ("gpu", "-INT", 130),
+            ("cpu", "-TERM", 143),
+            ("cpu", "-HUP", 129),
+        ] {
             let place = Place::new();
             place.write("out.exr", "old");
             let mut child = long_render(&place, "", &["--spp", "400", "--device", device]);
             std::thread::sleep(Duration::from_millis(100)); // for the handler, which comes after the file
             send(signal, &child);
-            assert_eq!(child.wait().unwrap().code(), Some(130), "{signal}");
+            assert_eq!(child.wait().unwrap().code(), Some(code), "{signal}");
             assert_eq!(place.files(), ["out.exr"]);
             assert_eq!(place.read("out.exr"), b"old");
         }

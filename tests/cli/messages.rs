@@ -48,7 +48,7 @@ mod unix {
                 ("render bad.toml", 3),
                 ("render small.toml --device abacus", 4),
                 ("render small.toml --colour", 2),
-                ("render small.toml -o nowhere/a.png", 1),
+                ("render small.toml -o nowhere/a.png", 8),
                 ("dev bad.toml --no-page", 2),
                 ("", 2),
             ] {
@@ -65,7 +65,7 @@ mod unix {
         let place = Place::new();
         for command in ["devices", "check small.toml", "--help", "render --help", "--version"] {
             let full = sh(&place, &format!("$0 {command} > /dev/full"));
-            assert_eq!(full.code, 1, "{command}: {}", full.stderr);
+            assert_eq!(full.code, 8, "{command}: {}", full.stderr);
             assert!(
                 full.stderr
                     .starts_with("error: standard output: cannot be written: No space left"),

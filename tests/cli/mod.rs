@@ -2,11 +2,16 @@
 
 mod bad_input;
 mod commands;
+mod diff;
 mod files;
+mod frames;
+mod golden;
+mod jobs;
 mod messages;
 mod options;
 mod output;
 mod outputs;
+mod pictures;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -107,14 +107,22 @@ fn a_crop_has_the_pixels_of_the_whole() {
 #[test]
 fn devices_are_chosen_by_kind_and_by_part_of_a_name() {
     let place = Place::new();
-    place.quietly(&["render", "small.toml", "-o", "auto.exr"]);
+    place.quietly(&["render", "small.toml", "--reproducible", "-o", "auto.exr"]);
     let listed = place.run(&["devices"]).stdout;
     let mut names = vec!["gpu", "cpu", "auto"];
     if listed.contains("llvmpipe") {
         names.extend(["lavapipe", "LAVApipe", "llvmp", "software"]);
     }
     for name in names {
-        place.quietly(&["render", "small.toml", "-o", "named.exr", "--device", name]);
+        place.quietly(&[
+            "render",
+            "small.toml",
+            "--reproducible",
+            "-o",
+            "named.exr",
+            "--device",
+            name,
+        ]);
         assert_eq!(place.read("named.exr"), place.read("auto.exr"), "{name}");
     }
 }
@@ -134,11 +142,12 @@ fn rounding_in_software_gives_the_same_picture() {
 #[test]
 fn any_number_of_threads_gives_the_same_picture() {
     let place = Place::new();
-    place.quietly(&["render", "small.toml", "-o", "all.exr"]);
+    place.quietly(&["render", "small.toml", "--reproducible", "-o", "all.exr"]);
     for (device, threads) in [("auto", "1"), ("cpu", "1"), ("cpu", "3")] {
         place.quietly(&[
             "render",
             "small.toml",
+            "--reproducible",
             "-o",
             "some.exr",
             "--device",
@@ -171,8 +180,8 @@ fn progress_is_told_as_asked() {
 #[test]
 fn without_a_driver_auto_renders_on_the_cpu_and_says_so_in_a_line() {
     let place = Place::new();
-    place.quietly(&["render", "small.toml", "-o", "gpu.exr"]);
-    let ran = place.run_with(&["render", "small.toml", "-o", "cpu.exr"], &NO_DRIVER);
+    place.quietly(&["render", "small.toml", "--reproducible", "-o", "gpu.exr"]);
+    let ran = place.run_with(&["render", "small.toml", "--reproducible", "-o", "cpu.exr"], &NO_DRIVER);
     assert_eq!((ran.code, ran.stdout.as_str()), (0, ""));
     assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
     assert!(

@@ -404,11 +404,13 @@ fn stats_have_the_promised_fields() {
         "width",
         "height",
         "pixel_samples",
+        "least_samples",
         "light_samples",
         "setup_s",
         "render_s",
         "total_s",
         "camera_rays",
+        "share_rendered",
         "shadow_rays",
         "nominal_mrays_per_s",
     ];
@@ -417,8 +419,8 @@ fn stats_have_the_promised_fields() {
     assert_eq!(names, expected);
     let number = |name: &str| fields[name].as_f64().unwrap_or_else(|| panic!("{name} is no number"));
     assert_eq!(
-        ["width", "height", "pixel_samples", "light_samples"].map(number),
-        [5.0, 4.0, 3.0, 9.0]
+        ["width", "height", "pixel_samples", "least_samples", "light_samples"].map(number),
+        [5.0, 4.0, 3.0, 3.0, 9.0]
     );
     assert_eq!(number("camera_rays"), 60.0);
     assert!(fields["shadow_rays"].is_null());
@@ -452,6 +454,7 @@ fn a_sample_too_long_for_the_driver_is_rendered_all_the_same() {
         let more = [
             "--device",
             device,
+            "--reproducible",
             "-o",
             out,
             "--aov",

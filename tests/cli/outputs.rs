@@ -91,7 +91,7 @@ fn a_mesh_has_the_colours_of_its_file() {
 
 /// The render refused, and every file is as it was.
 #[track_caller]
-fn refused(place: &Place, arguments: &[&str], code: i32, message: &str) {
+pub fn refused(place: &Place, arguments: &[&str], code: i32, message: &str) {
     let content = |place: &Place| -> Vec<(String, Vec<u8>)> {
         let files = place.files().into_iter().filter(|name| place.path(name).is_file());
         files.map(|name| (name.clone(), place.read(&name))).collect()
@@ -212,10 +212,10 @@ fn the_picture_of_the_development_mode_is_no_input() {
             "--out: ./spare.png: is a file that the scene is made of",
         ),
         ("tiles.toml", 2, "--out: tiles.toml: must end in .png"),
-        ("folder.png", 1, "folder.png: cannot be written: it is a folder"),
+        ("folder.png", 8, "folder.png: cannot be written: it is a folder"),
         (
             "nowhere/a.png",
-            1,
+            8,
             "nowhere/a.png: cannot be written: the folder nowhere is not there",
         ),
     ] {
@@ -238,7 +238,7 @@ fn the_format_is_told_by_the_name_or_the_option() {
         &place,
         &["small.toml", "-o", "q.gif"],
         2,
-        "q.gif: must end in .png or .exr, or --format must say which",
+        "q.gif: must end in .png, .exr, .jpg, .jpeg or .webp, or --format must say which",
     );
     place.quietly(&["render", "small.toml", "-o", "q", "--format", "exr", "--device", "cpu"]);
     place.quietly(&[
@@ -358,7 +358,7 @@ mod unix {
             &place,
             "ulimit -f 1; $0 render small.toml --device cpu --size 200x200 --spp 1 -o big.exr",
         );
-        assert_eq!(ran.code, 1, "{}", ran.stderr);
+        assert_eq!(ran.code, 8, "{}", ran.stderr);
         assert!(
             ran.stderr.starts_with("error: big.exr: cannot be written: "),
             "{}",
@@ -395,7 +395,7 @@ mod unix {
             ),
         ] {
             let ran = bash(&place, line);
-            assert_eq!(ran.code, 1, "{line}: {}", ran.stderr);
+            assert_eq!(ran.code, 8, "{line}: {}", ran.stderr);
             assert!(ran.stderr.starts_with(told), "{line}: {}", ran.stderr);
         }
     }
@@ -407,7 +407,7 @@ mod unix {
             &["render", "small.toml", "-o", "-", "--device", "cpu"],
             &[("TMPDIR", "/nonexistent")],
         );
-        assert_eq!((ran.code, ran.stdout.as_str()), (1, ""));
+        assert_eq!((ran.code, ran.stdout.as_str()), (8, ""));
         assert!(
             ran.stderr
                 .contains("standard output: cannot be written: it must first be whole in /nonexistent"),
@@ -417,7 +417,7 @@ mod unix {
         refused(
             &place,
             &["small.toml", "-o", "out.png/"],
-            1,
+            8,
             "out.png/: cannot be written: it is a folder",
         );
     }
@@ -441,7 +441,7 @@ mod unix {
         refused(
             &place,
             &["small.toml", "-o", "ring.png"],
-            1,
+            8,
             "ring.png: cannot be written: ",
         );
     }
@@ -457,13 +457,13 @@ mod unix {
         refused(
             &place,
             &["small.toml", "-o", "fixed.png"],
-            1,
+            8,
             "fixed.png: cannot be written: it is read-only",
         );
         refused(
             &place,
             &["small.toml", "--format", "exr", "-o", "q", "--stats", "nowhere/s"],
-            1,
+            8,
             "nowhere/s: cannot be written: the folder nowhere is not there",
         );
         place.quietly(&["render", "small.toml", "-o", "open.png", "--device", "cpu"]);

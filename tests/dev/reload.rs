@@ -6,7 +6,7 @@ use std::time::Duration;
 use wgray::dev::{Command, Move};
 use wgray::gpu::compose::Shaders;
 
-use super::running::{Files, KERNEL, RADIANCE, SCENE, SETTLED};
+use super::running::{Files, KERNEL, RADIANCE, Running, SCENE, SETTLED};
 
 #[test]
 fn the_first_picture_is_what_render_makes() {
@@ -20,7 +20,8 @@ fn the_first_picture_is_what_render_makes() {
     let (x, y) = (20, 20);
     let [r, g, b] = colors[y * 40 + x];
     let told = frame.pixel(x as u32, y as u32).unwrap();
-    assert_eq!(told, [("linear RGB", format!("{r}  {g}  {b}"))]);
+    let shown = [r, g, b].map(|value| wgray::image::encode(value).to_string()).join(" ");
+    assert_eq!(told, [("linear RGB", format!("{r}  {g}  {b}")), ("shown", shown)]);
     assert_eq!(frame.pixel(40, 0), None);
 }
 
@@ -51,6 +52,30 @@ fn a_saved_scene_is_uploaded_and_what_it_did_not_use_is_compiled() {
     assert_ne!(running.state().compile_seconds, compiled, "another kernel was compiled");
     files.edit("scene.toml", "width = 40", "width = 33");
     running.wait_rendered(&files);
+}
+
+#[test]
+fn a_view_transform_is_shown_without_rendering_anew() {
+    let files = Files::new(SCENE);
+    let out = files.path("out.png");
+    let running = Running::start(files.sources(), Some(out.clone()));
+    running.wait_rendered(&files);
+    let (linear, revision) = (running.colors(), running.revision());
+    let keys = "width = 40\nview_transform = 'agx'\nexposure = 1";
+    files.edit("scene.toml", "width = 40", keys);
+    let frame = running.wait_done(revision);
+    let settings = wgray::scene::ViewSettings {
+        transform: wgray::scene::ViewTransform::Agx,
+        exposure: 1.0,
+    };
+    let expected: Vec<u8> = linear.colors.iter().flat_map(|color| settings.rgb8(*color)).collect();
+    let page = image::load_from_memory(&frame.pictures[0]).unwrap().into_rgb8();
+    assert_eq!(*page.as_raw(), expected);
+    assert_eq!(running.colors(), linear);
+    running.wait("the file", |_| {
+        let picture = image::open(&out).ok()?.into_rgb8();
+        (*picture.as_raw() == expected).then_some(())
+    });
 }
 
 #[test]

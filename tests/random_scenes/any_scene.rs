@@ -451,6 +451,7 @@ fn camera() -> impl Strategy<Value = CameraDescription> {
                 look_at,
                 up,
                 height,
+                path: None,
             })
         } else {
             let focal_length = 1.0;
@@ -460,6 +461,7 @@ fn camera() -> impl Strategy<Value = CameraDescription> {
                 up,
                 fov,
                 focal_length,
+                path: None,
             })
         }
     })
@@ -561,7 +563,7 @@ fn described(
                 let names = ["a", "b", "c"].map(str::to_string);
                 let mut d = Description {
                     environment: None,
-                    image: ImageDescription { width, height },
+                    image: ImageDescription::new(width, height),
                     camera,
                     render,
                     textures,

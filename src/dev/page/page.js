@@ -211,12 +211,9 @@ function showPixel({ x, y, values }) {
   const parts = [bold("pixel "), `${x} ${y}`];
   for (const [name, value] of values) parts.push(bold(`   ${name} `), value);
   element("values").replaceChildren(...parts);
-  const linear = values.find(([name]) => name === "linear RGB")?.[1].split(/\s+/).map(Number);
-  element("swatch").hidden = !linear;
-  if (linear) {
-    const bytes = linear.map((v) => Math.round(255 * Math.min(1, Math.max(0, v)) ** (1 / 2.2)));
-    element("swatch").style.background = `rgb(${bytes.join(" ")})`;
-  }
+  const shown = values.find(([name]) => name === "shown")?.[1];
+  element("swatch").hidden = !shown;
+  if (shown) element("swatch").style.background = `rgb(${shown})`;
 }
 
 function withPrefix(n) {

@@ -206,6 +206,7 @@ impl Painter {
         {
             self.saved = None; // nothing of the save is there to be taken back
         }
+        let mut shown_otherwise = false;
         match snapshot.scene {
             Ok(loaded) => {
                 self.problems.scene = None;
@@ -222,6 +223,8 @@ impl Painter {
                 for note in loaded.scene.notes.iter().filter(|note| !known.contains(note)) {
                     (self.report)(Report::Note(note.clone()));
                 }
+                let known = self.loaded.as_ref();
+                shown_otherwise = known.is_some_and(|old| old.scene.view != loaded.scene.view);
                 self.loaded = Some(loaded);
             }
             Err(problem) => self.problems.scene = Some(problem),
@@ -238,6 +241,12 @@ impl Painter {
         }
         self.failures = 0;
         self.settle((noticed, true));
+        // What is rendered may be the same; if it is not, its first picture comes by itself.
+        let picture = self.running.as_ref().filter(|running| !running.canvas.is_new());
+        if shown_otherwise && self.pending.is_none() && picture.is_some() {
+            self.changed((noticed, true));
+            self.show();
+        }
     }
 
     /// The scene, and the shaders that it is to be rendered with: the newest, or where these are known to be wrong for

@@ -10,6 +10,7 @@ use crate::dev::diagnostic::Diagnostic;
 use crate::dev::messages::Report;
 use crate::dev::picture::{Content, Frame, Header, Look, Names, View, png_of};
 use crate::dev::save::replace;
+use crate::scene::ViewSettings;
 
 /// What is wrong, by where it comes from.
 #[derive(Default)]
@@ -50,8 +51,9 @@ impl Painter {
         let ([width, height], (samples, total), speed) = (canvas.size(), canvas.samples(), canvas.speed());
         let finest = canvas.finest_size();
         let whole = sent == finest && samples > 0;
+        let settings = (self.loaded.as_ref()).map_or(ViewSettings::default(), |loaded| loaded.scene.view);
         if let (Content::Color(colors), true) = (&content, whole) {
-            self.write_out(|| png_of(colors), done);
+            self.write_out(|| png_of(colors, settings), done);
         }
         let since = self.since.take();
         self.latency = since
@@ -83,6 +85,7 @@ impl Painter {
             gain: self.gain,
             marks: self.marks,
             negative: bins.into_iter().any(|bin| bin.z < 0.0),
+            view: settings,
         };
         let frame = Frame::new(header, content, names.unwrap_or_default(), look);
         self.frame_sender.send_replace(Some(Arc::new(frame)));

@@ -266,6 +266,44 @@ fn overrides_stand_in_for_the_files_values() {
 }
 
 #[test]
+fn defines_have_the_files_own_keys() {
+    let load = |define: &str| {
+        let overrides = Overrides {
+            define: vec![define.parse().unwrap()],
+            ..Overrides::default()
+        };
+        load("a.json", GOOD, &overrides)
+    };
+    let scene = load("spp=5").unwrap();
+    assert_eq!(scene.render.pixel_samples.count, 5);
+    let scene = load("cam_config.position[1]=-3.5").unwrap();
+    assert_eq!(scene.camera.position.z, -3.5, "+Y is up there");
+    for (define, told) in [
+        ("spp=0", "define.spp: 0 must be from 1 to 65536"),
+        ("spp=many", "define.spp: \"many\" must be a whole number"),
+        ("render.seed=3", "define.render: unknown key; the keys here are \"spp\""),
+        ("cam_config.fov=3", "define.cam_config.fov: unknown key"),
+        (
+            "cam_config.vertical_fov=180",
+            "define.cam_config.vertical_fov: 180 must be from",
+        ),
+        ("materials[0].color=[2, 0, 0]", "define.materials[0].color: "),
+        (
+            "materials[9].color=[2, 0, 0]",
+            "define.materials[9]: is not in the scene; the list has",
+        ),
+        (
+            "materials.first.color=[2, 0, 0]",
+            "define.materials: is a list: the number",
+        ),
+        ("objects[0].scale=0", "define.objects[0].scale: "),
+    ] {
+        let message = load(define).unwrap_err().to_string();
+        assert!(message.starts_with(told), "{define}: {message}");
+    }
+}
+
+#[test]
 fn meshes_lie_in_the_folder_above_or_where_it_is_told() {
     let folder = folder();
     let configs = folder.path().join("configs");

@@ -4,6 +4,8 @@
 //! It is read from a file, or made in code by [`Description::new`] and the constructors of its parts.
 //! Serializing a `Description` with the `toml` crate gives a file that reads back as the same `Description`.
 
+mod camera;
+mod camera_path;
 mod light;
 mod material;
 mod mesh;
@@ -17,11 +19,11 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use toml::Table;
 
-use self::tagged::{ReadError, Tagged, tagged};
-use super::Assets;
+use super::{Assets, ViewTransform};
 
+pub use self::camera::*;
+pub use self::camera_path::*;
 pub use self::light::*;
 pub use self::material::*;
 pub use self::mesh::*;
@@ -61,7 +63,7 @@ impl Description {
     /// An empty scene for a picture of this size, in pixels, rendered by the settings' defaults.
     pub fn new(width: u32, height: u32, camera: impl Into<CameraDescription>) -> Self {
         Self {
-            image: ImageDescription { width, height },
+            image: ImageDescription::new(width, height),
             camera: camera.into(),
             render: RenderDescription::default(),
             environment: None,
@@ -147,7 +149,7 @@ impl Description {
     }
 }
 
-/// The size of the picture.
+/// The picture: its size, and how it is shown.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImageDescription {
@@ -155,72 +157,22 @@ pub struct ImageDescription {
     pub width: u32,
     /// In pixels.
     pub height: u32,
+    /// From linear light to what a display is sent.
+    #[serde(default)]
+    pub view_transform: ViewTransform,
+    /// In stops: light is multiplied by 2 to this power before it is shown.
+    #[serde(default)]
+    pub exposure: f64,
 }
 
-tagged! {
-    /// `[camera]`
-    CameraDescription {
-        /// All rays start at the camera's position.
-        "perspective" => Perspective(PerspectiveDescription),
-        /// All rays are parallel.
-        "orthographic" => Orthographic(OrthographicDescription),
-    }
-}
-
-/// A pinhole camera.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct PerspectiveDescription {
-    /// The centre of projection.
-    pub position: DVec3,
-    /// The point in the middle of the picture.
-    pub look_at: DVec3,
-    /// Which way is up.
-    #[serde(default = "z_up")]
-    pub up: DVec3,
-    /// Vertical field of view in degrees.
-    pub fov: f64,
-    /// Distance of the image plane, without effect in a pinhole camera.
-    #[serde(default = "one")]
-    pub focal_length: f64,
-}
-
-impl PerspectiveDescription {
-    /// A camera with z upwards. `fov` is vertical, in degrees.
-    pub fn new(position: impl Into<DVec3>, look_at: impl Into<DVec3>, fov: f64) -> Self {
+impl ImageDescription {
+    /// A picture of this size, shown as it is unless something else is said.
+    pub fn new(width: u32, height: u32) -> Self {
         Self {
-            position: position.into(),
-            look_at: look_at.into(),
-            up: z_up(),
-            fov,
-            focal_length: one(),
-        }
-    }
-}
-
-/// A camera of parallel rays.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct OrthographicDescription {
-    /// The middle of the image plane, where the rays start.
-    pub position: DVec3,
-    /// The point in the middle of the picture.
-    pub look_at: DVec3,
-    /// Which way is up.
-    #[serde(default = "z_up")]
-    pub up: DVec3,
-    /// Height of the seen rectangle in scene units.
-    pub height: f64,
-}
-
-impl OrthographicDescription {
-    /// A camera with z upwards. `height` is that of the seen rectangle, in scene units.
-    pub fn new(position: impl Into<DVec3>, look_at: impl Into<DVec3>, height: f64) -> Self {
-        Self {
-            position: position.into(),
-            look_at: look_at.into(),
-            up: z_up(),
+            width,
             height,
+            view_transform: ViewTransform::default(),
+            exposure: 0.0,
         }
     }
 }
@@ -238,10 +190,6 @@ impl EnvironmentDescription {
     pub fn new(color: impl Into<DVec3>) -> Self {
         Self { color: color.into() }
     }
-}
-
-fn z_up() -> DVec3 {
-    DVec3::Z
 }
 
 fn one() -> f64 {

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
 
+use glam::DVec3;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue};
@@ -15,10 +16,13 @@ use toml::{Table, Value};
 use self::parts::{Broken, Kind, LARGEST, Parts};
 use super::Integrator;
 use super::course;
+#[cfg(feature = "dev")]
+use super::define::Define;
+use super::define::Defines;
 use super::description::tagged::{ReadError, Tagged};
 use super::description::{
-    Description, InstanceDescription, LightDescription, MaterialDescription, MeshFileDescription, ShapeDescription,
-    TextureDescription,
+    CameraDescription, CameraKeyDescription, CameraPathDescription, Description, InstanceDescription, LightDescription,
+    MaterialDescription, MeshFileDescription, ShapeDescription, TextureDescription,
 };
 use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
 use super::validate::{DEEPEST, MOST, depths};
@@ -33,25 +37,47 @@ impl Description {
     ///
     /// Text that is no TOML or JSON, unknown and missing keys, unknown types, and values of the wrong type.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SceneError> {
+        Description::parse_with(text, origin, &mut Defines::new(&[]))
+    }
+
+    /// [`Description::parse`], with other values in place of some of the text's, and no trace of them.
+    #[cfg(feature = "dev")]
+    pub(crate) fn parse_defined(text: &str, origin: &str, values: &[Define]) -> Result<Self, SceneError> {
+        Description::parse_with(text, origin, &mut Defines::new(values))
+    }
+
+    /// [`Description::parse`], with other values in place of some of the text's.
+    pub(super) fn parse_with(text: &str, origin: &str, defines: &mut Defines) -> Result<Self, SceneError> {
         if course::is_course(Path::new(origin)) {
-            return course::read(text, origin);
+            return course::read(text, origin, defines);
         }
         let broken = |broken: Broken| syntax_error(text, origin, broken.at, &broken.message);
         let parts = Parts::of(text);
         if let Some(large) = parts.too_large() {
             return Err(broken(large));
         }
-        let read = match read_parts(&parts).map_err(broken)? {
+        let read = match read_parts(&parts, defines).map_err(broken)? {
             Some(read) => read,
-            None if text.len() > LARGEST => return Err(broken(Broken::whole(text))),
-            None => read_file(toml::from_str(text).map_err(|error| broken(Broken::of(0, &error)))?),
+            None if text.len() > LARGEST => match defines.left() {
+                Some(key) => Err(defines.not_there(key)),
+                None => return Err(broken(Broken::whole(text))),
+            },
+            None => {
+                let mut file = toml::from_str(text).map_err(|error| broken(Broken::of(0, &error)))?;
+                defines.restart();
+                let put = defines.put(&[], &mut file, |_| false);
+                put.and_then(|()| read_file(file))
+            }
         };
-        read.map_err(|problem| invalid(text, origin, problem))
+        read.map_err(|problem| invalid(text, origin, problem, defines))
     }
 }
 
-/// The error of a text whose value at the problem's path is bad.
-pub(super) fn invalid(text: &str, origin: &str, problem: Problem) -> SceneError {
+/// The error of a text whose value at the problem's path is bad, or of the value that was brought to that path.
+pub(super) fn invalid(text: &str, origin: &str, problem: Problem, defines: &Defines) -> SceneError {
+    if defines.brought(&problem.key) {
+        return SceneError::Override(problem.at("define"));
+    }
     SceneError::Invalid {
         origin: origin.to_owned(),
         line: locate(text, &problem.key),
@@ -66,6 +92,11 @@ fn locate(text: &str, path: &KeyPath) -> usize {
         false => place_in(text, path),
     };
     line_number(text, at)
+}
+
+/// The line, from 1, of a camera's path.
+pub(super) fn line_of_path(text: &str) -> usize {
+    locate(text, &KeyPath(["camera", "path"].map(Segment::from).to_vec()))
 }
 
 /// The byte where the key at the end of a path begins, in a text that is too large to be read as a whole.
@@ -134,7 +165,7 @@ fn read_file(file: Table) -> Result<Description, Problem> {
     let sections: Sections = read(file)?;
     Ok(Description {
         image: read(sections.image).at("image")?,
-        camera: read_tagged(sections.camera, Some("perspective")).at("camera")?,
+        camera: read_camera(sections.camera).at("camera")?,
         render: read(sections.render).at("render")?,
         environment: sections.environment.map(read).transpose().at("environment")?,
         textures: read_map(sections.textures, tagged).at("textures")?,
@@ -146,13 +177,40 @@ fn read_file(file: Table) -> Result<Description, Problem> {
     })
 }
 
+/// Reads a camera. What it does not say itself is as in the first of its path's keys that does.
+fn read_camera(mut camera: Table) -> Result<CameraDescription, Problem> {
+    if let Some(Value::Table(path)) = camera.get("path") {
+        // First by itself, so that what is wrong with a key is told there.
+        let path: CameraPathDescription = read(path.clone()).at("path")?;
+        let point = |point: DVec3| Value::from(point.to_array().to_vec());
+        let first = |of: fn(&CameraKeyDescription) -> Option<DVec3>| path.keys.iter().find_map(of).map(point);
+        let points = [
+            ("position", first(|key| key.position)),
+            ("look_at", first(|key| key.look_at)),
+            ("up", first(|key| key.up)),
+        ];
+        let extent = match camera.get("type").and_then(Value::as_str) {
+            Some("orthographic") => ("height", path.keys.iter().find_map(|key| key.height)),
+            _ => ("fov", path.keys.iter().find_map(|key| key.fov)),
+        };
+        let extent = (extent.0, extent.1.map(Value::from));
+        for (name, value) in points.into_iter().chain([extent]) {
+            if let (false, Some(value)) = (camera.contains_key(name), value) {
+                camera.insert(name.to_owned(), value);
+            }
+        }
+    }
+    read_tagged(camera, Some("perspective"))
+}
+
 /// What was read of the parts of one kind, or the first problem among them.
 type Read<T> = Result<T, Problem>;
 
 /// A file's description from its parts, one after the other; `None` if they depend on each other, and the file must be
 /// read as a whole.
-fn read_parts(parts: &Parts) -> Result<Option<Read<Description>>, Broken> {
+fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Read<Description>>, Broken> {
     let rest = parts.read_rest();
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut names = BTreeSet::new();
     let mut textures: Read<BTreeMap<String, TextureDescription>> = Ok(BTreeMap::new());
     let mut materials: Read<BTreeMap<String, MaterialDescription>> = Ok(BTreeMap::new());
@@ -167,9 +225,15 @@ fn read_parts(parts: &Parts) -> Result<Option<Read<Description>>, Broken> {
             Ok(rest) if rest.contains_key(part.kind.name()) => return Ok(None),
             _ => {}
         }
-        let Some((name, table)) = parts.read(part)? else {
+        let Some((name, mut table)) = parts.read(part)? else {
             return Ok(None);
         };
+        let count = counts.entry(part.kind.name()).or_default();
+        let step = name.as_deref().map_or(Segment::Index(*count), Segment::from);
+        *count += 1;
+        if let Err(problem) = defines.put(&[Segment::from(part.kind.name()), step], &mut table, |_| false) {
+            return Ok(Some(Err(problem)));
+        }
         if let Some(name) = &name
             && !names.insert((part.kind.name(), name.clone()))
         {
@@ -185,8 +249,16 @@ fn read_parts(parts: &Parts) -> Result<Option<Read<Description>>, Broken> {
             _ => return Ok(None),
         }
     }
-    let others = read_file(rest?);
     let has = |kind: Kind| parts.parts.iter().any(|part| part.kind == kind);
+    let mut rest = rest?;
+    let is_in_parts = |key: &str| Kind::ALL.into_iter().any(|kind| kind.name() == key && has(kind));
+    if let Err(problem) = defines.put(&[], &mut rest, is_in_parts) {
+        return Ok(Some(Err(problem)));
+    }
+    if defines.left().is_some() {
+        return Ok(None); // a whole list, or a name or number that there is not
+    }
+    let others = read_file(rest);
     let together = |mut all: Description| {
         // A kind is in parts or in what is outside of them, not in both.
         if has(Kind::Textures) {
@@ -339,6 +411,7 @@ fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator)
             "an array of length 4" => "a list of 4 points",
             "fewer elements in array" => "a shorter list",
             "a map" => "a table",
+            table if table.starts_with("struct ") => "a table",
             "a sequence" => "a list of tables, each under its own [[header]]",
             other => &other.replace('`', "\""),
         };

@@ -33,7 +33,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "far = 3",
             1,
-            "camera.far: unknown key; the keys here are \"type\", \"position\", \"look_at\", \"up\", \"fov\", \"focal_length\"",
+            "camera.far: unknown key; the keys here are \"type\", \"position\", \"look_at\", \"up\", \"fov\", \"focal_length\", \"path\"",
         ),
         (
             "[film]\n",
@@ -285,6 +285,8 @@ fn the_page_has_every_key() {
     check_keys(&format!("{START}[render.pixel_samples]"), "### Samples");
     check_keys(&format!("{START}[environment]"), "## `[environment]`");
     check_types::<CameraDescription>(image, "[camera]", "[camera]");
+    check_keys(&format!("{START}[camera.path]"), "### The camera's path");
+    check_keys(&format!("{START}[[camera.path.keys]]"), "### Keys of the path");
     check_types::<TextureDescription>(START, "[textures.a]", "[textures.NAME]");
     check_types::<MaterialDescription>(START, "[materials.a]", "[materials.NAME]");
     check_types::<LightDescription>(START, "[[lights]]", "[[lights]]");

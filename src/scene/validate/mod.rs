@@ -3,6 +3,7 @@
 //! The limits keep all that is computed from a scene, squares of lengths included, inside the range of `f32`.
 
 mod appearance;
+mod camera;
 mod mesh;
 mod mtl;
 mod path;
@@ -18,10 +19,10 @@ use self::mtl::Looks;
 use super::error::{At, Problem, cut};
 use super::parse::list;
 use super::{
-    Adaptive, AdaptiveDescription, Assets, Camera, CameraDescription, Color, Description, EllipsoidDescription,
-    Environment, Geometry, InstanceDescription, Integrator, Light, LightDescription, Material, Parallelogram, Pattern,
-    PixelFilter, PixelFilterDescription, Projection, Render, RenderDescription, Samples, SamplesDescription, Scene,
-    Shadows, Shape, ShapeDescription, Texture,
+    Adaptive, AdaptiveDescription, Assets, Color, Description, EllipsoidDescription, Environment, Geometry,
+    ImageDescription, InstanceDescription, Integrator, Light, LightDescription, Material, Parallelogram, Pattern,
+    PixelFilter, PixelFilterDescription, Render, RenderDescription, Samples, SamplesDescription, Scene, Shadows, Shape,
+    ShapeDescription, Texture, ViewSettings,
 };
 
 pub(super) use self::path::LIGHT_SAMPLES;
@@ -111,10 +112,13 @@ impl Description {
                 .as_ref()
                 .map_or(DVec3::ZERO, |environment| environment.color);
         }
+        let (camera, camera_path) = camera::with_path(&self.camera).at("camera")?;
         Ok(Scene {
             width: side(self.image.width).at("width").at("image")?,
             height: side(self.image.height).at("height").at("image")?,
-            camera: camera(&self.camera).at("camera")?,
+            view: view(&self.image).at("image")?,
+            camera,
+            camera_path,
             render,
             environment,
             lights: each(&self.lights, light).at("lights")?,
@@ -129,15 +133,12 @@ impl Description {
     }
 }
 
-impl CameraDescription {
-    /// Checks a camera by itself.
-    ///
-    /// # Errors
-    ///
-    /// The first value that breaks a rule.
-    pub fn validate(&self) -> Result<Camera, Problem> {
-        camera(self)
-    }
+fn view(image: &ImageDescription) -> Checked<ViewSettings> {
+    let rule = |rule: String| Problem::of("exposure", format!("{} {rule}", image.exposure));
+    Ok(ViewSettings {
+        transform: image.view_transform,
+        exposure: ViewSettings::check_exposure(image.exposure).map_err(rule)?,
+    })
 }
 
 fn each<D, T>(descriptions: &[D], mut check: impl FnMut(&D) -> Checked<T>) -> Checked<Vec<T>> {
@@ -278,54 +279,6 @@ fn of_path<T>(integrator: Integrator, value: Option<T>, check: fn(T) -> Checked<
     let Some(value) = value else { return Ok(None) };
     path::needs_path(integrator)?;
     check(value).map(Some)
-}
-
-fn camera(description: &CameraDescription) -> Checked<Camera> {
-    let (position, look_at, up, projection) = match description {
-        CameraDescription::Perspective(camera) => {
-            length(camera.focal_length).at("focal_length")?;
-            let fov = between(camera.fov, 0.001, 179.999).at("fov")?.to_radians();
-            (
-                camera.position,
-                camera.look_at,
-                camera.up,
-                Projection::Perspective { fov },
-            )
-        }
-        CameraDescription::Orthographic(camera) => {
-            let height = length(camera.height).at("height")?;
-            (
-                camera.position,
-                camera.look_at,
-                camera.up,
-                Projection::Orthographic { height },
-            )
-        }
-    };
-    point(position).at("position")?;
-    point(look_at).at("look_at")?;
-    let up = unit(up).at("up")?;
-    let forward = look_at - position;
-    check(forward.length() >= LENGTHS.0, || {
-        format!("{} must not be the camera's position", show(look_at))
-    })
-    .at("look_at")?;
-    let forward = forward.normalize();
-    let right = forward.cross(up);
-    check(right.length() > FLATTEST, || {
-        let (look_at, up) = (show(look_at), show(up));
-        format!("{look_at} must not lie on the line through the position along up, {up}")
-    })
-    .at("look_at")?;
-    let right = right.normalize();
-    Ok(Camera {
-        position,
-        look_at,
-        right,
-        up: right.cross(forward),
-        forward,
-        projection,
-    })
 }
 
 pub(super) fn light(description: &LightDescription) -> Checked<Light> {

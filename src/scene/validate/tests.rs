@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::super::{Material, Reflection, SceneError};
+use super::super::{Camera, Material, Projection, Reflection, SceneError};
 use super::*;
 
 /// One of everything; every line is there once, so that a test can put another in its place.

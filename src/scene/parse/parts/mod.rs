@@ -26,7 +26,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    const ALL: [Kind; 6] = [
+    pub const ALL: [Kind; 6] = [
         Kind::Textures,
         Kind::Materials,
         Kind::Lights,

@@ -1,0 +1,64 @@
+//! One layer of two pictures by all metrics that are wanted.
+
+use wgray::compare::{self, COLOR, Flip, Layer, Picture};
+
+use super::metric::Metric;
+use super::report::{LayerReport, Number};
+
+/// What there is to tell, and the map of errors if `step` asks for one and FLIP is wanted.
+pub fn measure(
+    layer: &Layer,
+    a: &Picture,
+    b: &Picture,
+    metrics: &[Metric],
+    threshold: f64,
+    ppd: f64,
+    step: Option<usize>,
+) -> (LayerReport, Option<Flip>) {
+    let found = layer.difference(b.width, b.height, threshold);
+    let has_colors = layer.name == COLOR && a.colors().is_some() && b.colors().is_some();
+    let is_wanted = |metric: Metric| metrics.contains(&metric) && has_colors;
+    // what is the same to the bit needs no looking at
+    let is_same = found.different == 0;
+    let ssim = match (is_wanted(Metric::Ssim), is_same) {
+        (true, true) => Some(1.0),
+        (true, false) => compare::ssim(a, b),
+        (false, _) => None,
+    };
+    let (flip, map) = match (is_wanted(Metric::Flip), is_same, step) {
+        (true, true, None) => (Some(0.0), None),
+        (true, ..) => {
+            let flip = compare::flip(a, b, ppd, step);
+            (flip.as_ref().map(|flip| flip.mean), flip)
+        }
+        (false, ..) => (None, None),
+    };
+    let pixels = b.pixels();
+    let plain = |metric: Metric, value: f64| metrics.contains(&metric).then_some(Number(value));
+    let report = LayerReport {
+        name: layer.name.clone(),
+        channels: layer.channels.iter().map(|(name, ..)| (*name).to_owned()).collect(),
+        pixels: pixels as u64,
+        different: found.different,
+        first: found.first.map(Into::into),
+        largest: plain(
+            Metric::Largest,
+            found.largest.as_ref().map_or(0.0, |largest| largest.difference),
+        ),
+        largest_at: match metrics.contains(&Metric::Largest) {
+            true => found.largest.map(Into::into),
+            false => None,
+        },
+        share: plain(Metric::Share, found.beyond as f64 / pixels as f64),
+        rmse: plain(Metric::Rmse, found.rmse),
+        rel_mse: plain(Metric::RelMse, found.rel_mse),
+        psnr: plain(Metric::Psnr, found.psnr),
+        ssim: ssim.map(Number),
+        flip: flip.map(Number),
+        not_finite: match found.odd {
+            Some(first) => Some((found.a, found.b, first).into()),
+            None => None,
+        },
+    };
+    (report, map)
+}

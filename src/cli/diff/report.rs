@@ -1,0 +1,359 @@
+//! What `wgray diff` tells, as text and as JSON, with the same names.
+
+use std::fmt;
+
+use serde::{Serialize, Serializer};
+use wgray::compare::{Largest, Picture, Place, Values};
+
+use super::metric::{Limit, METRICS, Metric};
+
+/// All that is told.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// The picture's name.
+    pub a: String,
+    /// The reference's.
+    pub b: String,
+    size_a: [u32; 2],
+    size_b: [u32; 2],
+    /// Where the first pixel is.
+    #[serde(skip)]
+    positions: [(i32, i32); 2],
+    /// Whether the exit code is 0.
+    pub passes: bool,
+    /// Why not.
+    fails: Vec<String>,
+    /// What was done to compare the pictures.
+    pub notes: Vec<String>,
+    /// Channels that only one of the pictures has.
+    only_a: Vec<String>,
+    only_b: Vec<String>,
+    pub layers: Vec<LayerReport>,
+    #[serde(skip)]
+    pub metrics: Vec<Metric>,
+}
+
+/// What is told of a layer; what was not asked for is absent.
+#[derive(Debug, Serialize)]
+pub struct LayerReport {
+    pub name: String,
+    pub channels: Vec<String>,
+    pub pixels: u64,
+    pub different: u64,
+    /// The first pixel that differs.
+    pub first: Option<PixelReport>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub largest: Option<Number>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub largest_at: Option<LargestReport>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub share: Option<Number>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rmse: Option<Number>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rel_mse: Option<Number>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub psnr: Option<Number>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ssim: Option<Number>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flip: Option<Number>,
+    pub not_finite: Option<NotFinite>,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct PixelReport {
+    x: u32,
+    y: u32,
+}
+
+impl From<Place> for PixelReport {
+    fn from(place: Place) -> Self {
+        PixelReport { x: place.x, y: place.y }
+    }
+}
+
+impl fmt::Display for PixelReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "({}, {})", self.x, self.y)
+    }
+}
+
+/// Where the largest difference is, and of what.
+#[derive(Debug, Serialize)]
+pub struct LargestReport {
+    x: u32,
+    y: u32,
+    channel: String,
+    a: f64,
+    b: f64,
+}
+
+impl From<Largest> for LargestReport {
+    fn from(largest: Largest) -> Self {
+        LargestReport {
+            x: largest.place.x,
+            y: largest.place.y,
+            channel: largest.channel,
+            a: largest.a,
+            b: largest.b,
+        }
+    }
+}
+
+/// Values that are no finite numbers.
+#[derive(Debug, Serialize)]
+pub struct NotFinite {
+    nan_a: u64,
+    nan_b: u64,
+    infinite_a: u64,
+    infinite_b: u64,
+    first: PixelReport,
+}
+
+impl From<(Values, Values, Place)> for NotFinite {
+    fn from((a, b, first): (Values, Values, Place)) -> Self {
+        NotFinite {
+            nan_a: a.nan,
+            nan_b: b.nan,
+            infinite_a: a.infinite,
+            infinite_b: b.infinite,
+            first: first.into(),
+        }
+    }
+}
+
+impl fmt::Display for NotFinite {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (a, b) = ((self.nan_a, self.infinite_a), (self.nan_b, self.infinite_b));
+        write!(
+            f,
+            "{} NaN and {} infinite values in A, {} and {} in B, the first at {}",
+            a.0, a.1, b.0, b.1, self.first
+        )
+    }
+}
+
+/// A number; JSON has no infinite ones, which are texts there.
+#[derive(Clone, Copy, Debug)]
+pub struct Number(pub f64);
+
+impl Serialize for Number {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0.is_finite() {
+            true => serializer.serialize_f64(self.0),
+            false => serializer.serialize_str(&self.0.to_string()),
+        }
+    }
+}
+
+impl fmt::Display for Number {
+    /// Six digits; whole numbers with all of theirs.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = self.0.abs();
+        if size == 0.0 || !size.is_finite() {
+            return write!(f, "{}", self.0);
+        }
+        // Numbers of shapes go up to 2^32 - 1, which is where nothing is.
+        let is_whole = size.fract() == 0.0 && size < 1e15;
+        let text = if (1e-4..1e9).contains(&size) || is_whole {
+            let decimals = (5 - size.log10().floor() as i32).max(0) as usize;
+            short(&format!("{:.decimals$}", self.0)).to_owned()
+        } else {
+            let text = format!("{:.5e}", self.0);
+            let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+            format!("{}e{exponent}", short(digits))
+        };
+        // what is nearly 1 is not 1
+        match size < 1e6 && self.0.fract() != 0.0 && text.parse::<i64>().is_ok() {
+            true => write!(f, "{}", self.0),
+            false => f.write_str(&text),
+        }
+    }
+}
+
+/// Without zeros at the end of a fraction.
+fn short(digits: &str) -> &str {
+    match digits.contains('.') {
+        true => digits.trim_end_matches('0').trim_end_matches('.'),
+        false => digits,
+    }
+}
+
+impl LayerReport {
+    pub fn is_different(&self) -> bool {
+        self.different > 0
+    }
+
+    fn value(&self, metric: Metric) -> Option<f64> {
+        let number = match metric {
+            Metric::Different => return Some(self.different as f64),
+            Metric::Largest => self.largest,
+            Metric::Share => self.share,
+            Metric::Rmse => self.rmse,
+            Metric::RelMse => self.rel_mse,
+            Metric::Psnr => self.psnr,
+            Metric::Ssim => self.ssim,
+            Metric::Flip => self.flip,
+        };
+        number.map(|number| number.0)
+    }
+
+    /// What is told of a metric.
+    fn line(&self, metric: Metric) -> Option<String> {
+        let value = Number(self.value(metric)?);
+        let at = match &self.largest_at {
+            Some(LargestReport { x, y, channel, a, b }) => {
+                format!(" in {channel} at ({x}, {y}): {}, not {}", Number(*a), Number(*b))
+            }
+            None => String::new(),
+        };
+        Some(match (metric, &self.first) {
+            (Metric::Different, Some(first)) => {
+                format!("{} of {} pixels, the first at {first}", self.different, self.pixels)
+            }
+            (Metric::Different, None) => format!("0 of {} pixels", self.pixels),
+            (Metric::Largest, _) => format!("{value}{at}"),
+            (Metric::Psnr, _) => format!("{value} dB"),
+            _ => value.to_string(),
+        })
+    }
+}
+
+impl Report {
+    pub fn new([a, b]: [String; 2], picture_a: &Picture, picture_b: &Picture) -> Report {
+        Report {
+            a,
+            b,
+            size_a: [picture_a.width, picture_a.height],
+            size_b: [picture_b.width, picture_b.height],
+            positions: [picture_a.position, picture_b.position],
+            passes: false,
+            fails: Vec::new(),
+            notes: Vec::new(),
+            only_a: Vec::new(),
+            only_b: Vec::new(),
+            layers: Vec::new(),
+            metrics: Vec::new(),
+        }
+    }
+
+    pub fn set_only(&mut self, a: &[&str], b: &[&str]) {
+        let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        (self.only_a, self.only_b) = (owned(a), owned(b));
+    }
+
+    /// Whether a layer that was measured differs.
+    pub fn is_different(&self) -> bool {
+        self.layers.iter().any(LayerReport::is_different)
+    }
+
+    /// Says what fails: sizes, places, channels and values that are no numbers always; else what is worse than a limit, or without
+    /// limits any bit.
+    pub fn judge(&mut self, limits: &[Limit], threshold: f64) {
+        let mut fails = Vec::new();
+        let (a, b) = (self.size_a, self.size_b);
+        if a != b {
+            fails.push(format!("A has {} x {} pixels, B {} x {}", a[0], a[1], b[0], b[1]));
+        } else if self.positions[0] != self.positions[1] {
+            let [a, b] = self.positions;
+            fails.push(format!(
+                "A begins at ({}, {}) of the whole picture, B at ({}, {})",
+                a.0, a.1, b.0, b.1
+            ));
+        }
+        for (names, has, lacks) in [(&self.only_a, "A", "B"), (&self.only_b, "B", "A")] {
+            if !names.is_empty() {
+                fails.push(format!("{lacks} lacks {}, which {has} has", names.join(" ")));
+            }
+        }
+        for layer in &self.layers {
+            if let Some(found) = &layer.not_finite {
+                fails.push(format!("{}: {found}", layer.name));
+            }
+            if limits.is_empty() && layer.is_different() {
+                let (name, different) = (&layer.name, layer.different);
+                let pixels = if different == 1 { "pixel has" } else { "pixels have" };
+                fails.push(format!("{name}: {different} {pixels} other bits"));
+            }
+            for limit in limits {
+                let value = layer.value(limit.metric);
+                if let Some((value, word)) = value.and_then(|value| Some((value, limit.exceeded(value)?))) {
+                    let (name, metric) = (&layer.name, limit.metric);
+                    let over = match metric {
+                        Metric::Share if threshold > 0.0 => format!(" over {}", Number(threshold)),
+                        _ => String::new(),
+                    };
+                    fails.push(format!(
+                        "{name}: {metric}{over} {} is {word} {}",
+                        Number(value),
+                        Number(limit.worst)
+                    ));
+                }
+            }
+        }
+        self.passes = fails.is_empty();
+        self.fails = fails;
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [width, height] = self.size_b;
+        writeln!(f, "{} against {}: {width} x {height} pixels", self.a, self.b)?;
+        for note in &self.notes {
+            writeln!(f, "note: {note}")?;
+        }
+        for layer in &self.layers {
+            let channels = layer.channels.join(" ");
+            let channels = if channels == layer.name {
+                String::new()
+            } else {
+                format!(" {channels}")
+            };
+            if !layer.is_different() {
+                writeln!(f, "{}{channels}: the same bits", layer.name)?;
+                continue;
+            }
+            writeln!(f, "{}{channels}", layer.name)?;
+            for metric in METRICS.into_iter().filter(|metric| self.metrics.contains(metric)) {
+                if let Some(line) = layer.line(metric) {
+                    writeln!(f, "  {:<9}  {line}", metric.name())?;
+                }
+            }
+        }
+        for fail in &self.fails {
+            writeln!(f, "fails: {fail}")?;
+        }
+        match (self.passes, self.is_different()) {
+            (true, true) => writeln!(f, "passes"),
+            (true, false) => writeln!(f, "the same"),
+            (false, _) => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_six_digits_and_do_not_hide_what_is_nearly_whole() {
+        let text = |value: f64| Number(value).to_string();
+        assert_eq!(text(0.0), "0");
+        assert_eq!(text(1.0), "1");
+        assert_eq!(text(0.048_767_311), "0.0487673");
+        assert_eq!(text(26.237_423), "26.2374");
+        assert_eq!(text(123_456_789.0), "123456789");
+        assert_eq!(text(4_294_967_295.0), "4294967295");
+        assert_eq!(text(4_294_967_294.5), "4.29497e9");
+        assert_eq!(text(2.384_19e-7), "2.38419e-7");
+        assert_eq!(text(1e-5), "1e-5");
+        assert_eq!(text(0.999_999_998_7), "0.9999999987");
+        assert_eq!(text(f64::INFINITY), "inf");
+        assert_eq!(
+            serde_json::to_string(&[Number(f64::INFINITY), Number(0.5)]).unwrap(),
+            r#"["inf",0.5]"#
+        );
+    }
+}

@@ -1,0 +1,158 @@
+//! What the options of `wgray render` come to, checked against the scene.
+
+use std::io;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use wgray::device::{Device, OnFault, Remedy, Renderer};
+use wgray::error::RenderError;
+use wgray::film::Region;
+use wgray::job::checkpoint::{Checkpoint, CheckpointError, Opening};
+use wgray::job::{Identity, Tile};
+use wgray::pack::Packed;
+use wgray::render::Options;
+use wgray::scene::{Scene, ViewSettings};
+
+use super::args::Args;
+use super::frames::Frame;
+use super::said::Said;
+use crate::cli::metadata::Told;
+use crate::cli::picture_options::PictureOptions;
+use crate::cli::progress::{self, Mode};
+use crate::cli::signal::Stop;
+use crate::cli::{Interrupted, Usage, option, plain};
+
+/// All that is known of a render before it begins, but where it writes to.
+pub struct Plan<'a> {
+    pub scene: Packed,
+    /// The pixels of the picture.
+    pub picture: Region,
+    /// The part of them that is rendered, and its rows.
+    pub tile: Option<(Tile, Region)>,
+    pub options: Options,
+    /// When to stop rendering.
+    pub deadline: Option<Instant>,
+    pub checkpoint: Option<PathBuf>,
+    checkpoint_interval: Duration,
+    resume: bool,
+    pub pictures: PictureOptions,
+    pub view: ViewSettings,
+    pub told: Told,
+    pub progress: Mode,
+    pub said: &'a Said,
+    pub frame: Frame,
+}
+
+impl<'a> Plan<'a> {
+    /// What the options come to for one picture of the scene, begun at `start`.
+    pub fn resolve(args: &Args, scene: &Scene, said: &'a Said, frame: Frame, start: Instant) -> anyhow::Result<Self> {
+        if args.time_limit.is_some() {
+            can_end_early(scene)?;
+        }
+        let options = Options {
+            device: Device::from(args.device.as_str()),
+            crop: args.crop,
+            aovs: args.aovs(),
+            exact_rounding: args.exact_rounding,
+        };
+        let picture = options.region(scene).map_err(|problem| option(&problem))?;
+        let tile = match args.tile {
+            None => None,
+            Some(tile) => Some((tile, rows(tile, picture)?)),
+        };
+        let progress = args.shown_progress();
+        let packed = progress::named(progress, "building trees", || options.pack(scene));
+        Ok(Plan {
+            picture,
+            tile,
+            options,
+            deadline: args.time_limit.and_then(|limit| start.checked_add(limit)),
+            checkpoint: args.checkpoint(frame)?,
+            checkpoint_interval: args.checkpoint_interval,
+            resume: args.resume,
+            view: args.pictures.view(scene.view),
+            pictures: args.pictures.clone(),
+            told: Told::of(scene, &packed, args.time_limit),
+            scene: packed,
+            progress,
+            said,
+            frame,
+        })
+    }
+
+    /// The pixels that are rendered.
+    pub fn region(&self) -> Region {
+        self.tile.map_or(self.picture, |(_, rows)| rows)
+    }
+
+    /// What the job is.
+    pub fn identity(&self) -> Identity {
+        Identity::of(&self.scene, self.picture, self.options.exact_rounding)
+    }
+
+    /// Opens the checkpoint, if there is one; while another process writes it this one waits. That of a part is one of a
+    /// picture with its rows.
+    pub fn open_checkpoint<'b>(&'b self, stop: Option<&'b Stop>) -> anyhow::Result<Option<Checkpoint<'b>>> {
+        let Some(path) = &self.checkpoint else {
+            return Ok(None);
+        };
+        // Before signals are heeded they end the program at once.
+        let asked = move || stop.and_then(Stop::signal);
+        let opening = Opening {
+            path: path.clone(),
+            resume: self.resume,
+            interval: self.checkpoint_interval,
+            wait: Box::new(move || asked().is_none() && self.deadline.is_none_or(|end| Instant::now() < end)),
+            tell: Box::new(|what| self.said.again(&format!("warning: {what}"))),
+        };
+        let identity = Identity::of(&self.scene, self.region(), self.options.exact_rounding);
+        match Checkpoint::open(opening, identity, self.scene.form()) {
+            Ok(checkpoint) => Ok(Some(checkpoint)),
+            Err(error @ CheckpointError::Busy(_)) => Err(match asked() {
+                Some(signal) => Interrupted(signal).into(),
+                None => anyhow::anyhow!("--checkpoint: {error}, and the time is up"),
+            }),
+            Err(CheckpointError::Io { path, error }) => {
+                let message = format!("--checkpoint: {}: {error}", path.display());
+                Err(RenderError::Output(io::Error::new(error.kind(), message)).into())
+            }
+            Err(error) => Err(Usage(format!("--checkpoint: {error}")).into()),
+        }
+    }
+
+    /// Makes the device ready for the scene.
+    pub fn renderer<'b>(&'b self, stop: &'b Stop) -> anyhow::Result<Renderer<'b>> {
+        let on_fault = OnFault {
+            tell: Box::new(|why, remedy| match remedy {
+                Remedy::Anew => self.said.again(&format!("warning: {why}; it is opened anew")),
+                Remedy::Cpu => self.said.once(&format!("warning: rendering on the CPU: {why}")),
+            }),
+            stopped: Box::new(|| stop.signal().is_some()),
+        };
+        let renderer = Renderer::new(&self.scene, &self.options, on_fault).map_err(plain)?;
+        if let Some(why) = renderer.why() {
+            self.said.once(&format!("note: {why}"));
+        }
+        Ok(renderer)
+    }
+}
+
+fn rows(tile: Tile, picture: Region) -> Result<Region, Usage> {
+    let rule = format!(
+        "--tile: {tile}: parts are whole rows, and the picture has {} of them",
+        picture.height()
+    );
+    tile.rows(picture).ok_or(Usage(rule))
+}
+
+/// Whether some samples of every pixel are a picture of the scene.
+fn can_end_early(scene: &Scene) -> Result<(), Usage> {
+    let pattern = scene.render.pixel_samples.pattern;
+    match pattern.needs_square() {
+        false => Ok(()),
+        true => Err(Usage(format!(
+            "--time-limit: needs samples of which a part is a picture too, which {} is not; --pixel-pattern sobol is",
+            pattern.name()
+        ))),
+    }
+}

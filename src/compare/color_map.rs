@@ -1,0 +1,40 @@
+//! From black over violet, red and orange to a pale yellow: brighter all the way, also in gray and to who sees few colours.
+
+/// Colours of a screen, evenly spaced.
+const KNOTS: [[u8; 3]; 9] = [
+    [0, 0, 4],
+    [30, 16, 70],
+    [80, 18, 123],
+    [130, 37, 129],
+    [182, 54, 121],
+    [230, 80, 98],
+    [251, 136, 97],
+    [254, 194, 140],
+    [252, 253, 191],
+];
+
+/// The colour of a value, in 255 steps.
+pub fn color(value: u8) -> [u8; 3] {
+    let place = f64::from(value) / 255.0 * (KNOTS.len() - 1) as f64;
+    let knot = (place as usize).min(KNOTS.len() - 2);
+    let part = place - knot as f64;
+    std::array::from_fn(|i| {
+        let (low, high) = (f64::from(KNOTS[knot][i]), f64::from(KNOTS[knot + 1][i]));
+        (low + (high - low) * part + 0.5) as u8
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_grow_brighter_from_black_to_pale_yellow() {
+        assert_eq!((color(0), color(255)), (KNOTS[0], KNOTS[8]));
+        let light = |value| {
+            let [r, g, b] = color(value).map(f64::from);
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        assert!((1..=255).all(|value| light(value) > light(value - 1)));
+    }
+}

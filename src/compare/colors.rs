@@ -1,0 +1,104 @@
+//! The colours of two pictures, as measures of what is seen take them.
+
+use std::ops::Range;
+
+use super::picture::{Kind, Picture, Plane};
+
+/// The exponent of the curve that linear values are shown by.
+pub const DISPLAY: f64 = 1.0 / 2.2;
+
+/// Red, green and blue of some pixels.
+pub type Rgb = [Vec<f64>; 3];
+
+/// The colours of two pictures of one size and kind.
+#[derive(Clone, Debug)]
+pub struct Colors<'a> {
+    pub width: usize,
+    pub height: usize,
+    pub kind: Kind,
+    a: Planes<'a>,
+    b: Planes<'a>,
+}
+
+#[derive(Clone, Debug)]
+struct Planes<'a> {
+    colors: [&'a Plane; 3],
+    /// What colours are not yet weighted by.
+    alpha: Option<&'a Plane>,
+}
+
+impl<'a> Planes<'a> {
+    fn of(picture: &'a Picture) -> Option<Planes<'a>> {
+        let colors = picture.colors()?.map(|plane| &**plane);
+        let alpha = match picture.kind {
+            Kind::Display { .. } => picture.channel("A").map(|plane| &**plane),
+            Kind::Linear => None,
+        };
+        Some(Planes { colors, alpha })
+    }
+
+    fn values(&self, pixels: Range<usize>) -> Rgb {
+        let mut shares = vec![1.0; pixels.len()];
+        if let Some(alpha) = self.alpha {
+            alpha.values(pixels.clone(), &mut shares);
+        }
+        self.colors.map(|plane| {
+            let mut values = vec![0.0; pixels.len()];
+            plane.values(pixels.clone(), &mut values);
+            for (value, share) in values.iter_mut().zip(&shares) {
+                *value *= share;
+            }
+            values
+        })
+    }
+}
+
+impl<'a> Colors<'a> {
+    /// None if either has no colours.
+    pub fn of(a: &'a Picture, b: &'a Picture) -> Option<Colors<'a>> {
+        Some(Colors {
+            width: b.width as usize,
+            height: b.height as usize,
+            kind: b.kind,
+            a: Planes::of(a)?,
+            b: Planes::of(b)?,
+        })
+    }
+
+    /// The values of a part of a row in both pictures, over black. What is no finite number in either is 0 in both.
+    pub fn values(&self, y: usize, x: Range<usize>) -> (Rgb, Rgb) {
+        let pixels = y * self.width + x.start..y * self.width + x.end;
+        let (mut a, mut b) = (self.a.values(pixels.clone()), self.b.values(pixels));
+        if self.kind == Kind::Linear {
+            for (a, b) in a.iter_mut().flatten().zip(b.iter_mut().flatten()) {
+                if !(a.is_finite() && b.is_finite()) {
+                    (*a, *b) = (0.0, 0.0);
+                }
+            }
+        }
+        (a, b)
+    }
+
+    /// The same as a screen shows them, from 0 to 1.
+    pub fn shown(&self, y: usize, x: Range<usize>) -> (Rgb, Rgb) {
+        let (mut a, mut b) = self.values(y, x);
+        if self.kind == Kind::Linear {
+            for value in a.iter_mut().chain(&mut b).flatten() {
+                *value = value.clamp(0.0, 1.0).powf(DISPLAY);
+            }
+        }
+        (a, b)
+    }
+
+    /// Whether a part of a row is plainly the same in both.
+    pub fn is_plainly_same(&self, y: usize, x: Range<usize>) -> bool {
+        let pixels = y * self.width + x.start..y * self.width + x.end;
+        let mut planes = self.a.colors.iter().zip(&self.b.colors);
+        let alphas = match (self.a.alpha, self.b.alpha) {
+            (None, None) => true,
+            (Some(a), Some(b)) => a.is_plainly(b, pixels.clone()),
+            _ => false,
+        };
+        alphas && planes.all(|(a, b)| a.is_plainly(b, pixels.clone()))
+    }
+}

@@ -1,0 +1,510 @@
+//! ꟻLIP, how different two pictures look when one flips from one to the other: Andersson, Nilsson, Akenine-Möller, Oskarsson,
+//! Åström and Fairchild, "ꟻLIP: a difference evaluator for alternating images", Proc. ACM Comput. Graph. Interact. Tech. 3 (2),
+//! 2020; of linear values Andersson, Nilsson, Shirley and Akenine-Möller, "Visualizing errors in rendered high dynamic range
+//! images", Eurographics 2021 Short Papers. Filters are separated as in the authors' note "Separated convolutions", 2022.
+
+use std::f64::consts::PI;
+
+use rayon::prelude::*;
+
+use super::colors::Colors;
+use super::picture::{Kind, Picture};
+
+/// Pixels for each degree of what is seen, where nothing else is said: a screen 0.7 m wide with 3840 columns, 0.7 m away.
+pub const PIXELS_PER_DEGREE: f64 = 3840.0 * PI / 180.0;
+
+/// Pixels along a tile's side.
+const TILE: usize = 256;
+/// Tiles whose errors are in memory at the same time.
+const TILES: usize = 64;
+
+/// The result.
+#[derive(Clone, Debug)]
+pub struct Flip {
+    /// The mean error, from 0 to 1.
+    pub mean: f64,
+    /// The errors, if they were asked for.
+    pub map: Option<Map>,
+}
+
+/// Numbers from 0 to 1 in 255 steps, each the largest of a square of pixels.
+#[derive(Clone, Debug)]
+pub struct Map {
+    /// Pixels along a square's side.
+    pub step: usize,
+    /// Squares in a row.
+    pub width: usize,
+    /// Their values, row by row.
+    pub values: Vec<u8>,
+}
+
+impl Map {
+    /// A map of zeros for a picture.
+    pub fn new(picture: &Picture, step: usize) -> Map {
+        let squares = |side: u32| (side as usize).div_ceil(step);
+        let width = squares(picture.width);
+        Map {
+            step,
+            width,
+            values: vec![0; width * squares(picture.height)],
+        }
+    }
+
+    /// Raises the value at a pixel. Above 0 it is 1 step at least.
+    pub fn raise(&mut self, x: usize, y: usize, value: f64) {
+        let steps = (value * 255.0 + 0.5) as u8;
+        let steps = if value > 0.0 { steps.max(1) } else { 0 };
+        if let Some(own) = self.values.get_mut(y / self.step * self.width + x / self.step) {
+            *own = steps.max(*own);
+        }
+    }
+}
+
+/// Compares the colours of two pictures, the second being the reference. `step` asks for a map. None if either has no colours.
+pub fn flip(a: &Picture, b: &Picture, pixels_per_degree: f64, step: Option<usize>) -> Option<Flip> {
+    let colors = Colors::of(a, b)?;
+    let filters = Filters::new(pixels_per_degree);
+    let exposures = match colors.kind {
+        Kind::Display { .. } => None,
+        Kind::Linear => Some(exposures(&colors)),
+    };
+    let mut map = step.map(|step| Map::new(b, step));
+    let mut tiles = Vec::new();
+    for y in (0..colors.height).step_by(TILE) {
+        tiles.extend((0..colors.width).step_by(TILE).map(|x| (x, y)));
+    }
+    let mut sum = 0.0;
+    for tiles in tiles.chunks(TILES) {
+        let errors = tiles.par_iter().map(|(x, y)| {
+            let tile = Tile {
+                x: *x,
+                y: *y,
+                width: TILE.min(colors.width - x),
+                height: TILE.min(colors.height - y),
+            };
+            let errors = tile.errors(&colors, &filters, exposures.as_deref());
+            let sum: f64 = errors.iter().map(|error| f64::from(*error)).sum();
+            (tile, sum, if step.is_some() { errors } else { Vec::new() })
+        });
+        for (tile, part, errors) in errors.collect::<Vec<_>>() {
+            sum += part;
+            if let Some(map) = &mut map {
+                for (i, error) in errors.iter().enumerate() {
+                    map.raise(tile.x + i % tile.width, tile.y + i / tile.width, f64::from(*error));
+                }
+            }
+        }
+    }
+    Some(Flip {
+        mean: sum / (colors.width * colors.height) as f64,
+        map,
+    })
+}
+
+// Constants of the paper: section 4.1.1, table 1, and sections 4.1.2, 4.2 and 4.3.
+/// The exponent of the colour difference.
+const QC: f64 = 0.7;
+/// The part of the largest difference that is ...
+const PC: f64 = 0.4;
+/// ... this part of the error.
+const PT: f64 = 0.95;
+/// The width of edges, in degrees.
+const W: f64 = 0.082;
+/// The exponent of the feature difference.
+const QF: f64 = 0.5;
+
+/// Contrast sensitivity as sums of Gaussians with amplitude and width: of light, of red and green, of blue and yellow.
+const LIGHT: (f64, f64) = (1.0, 0.0047);
+const RED_GREEN: (f64, f64) = (1.0, 0.0053);
+const BLUE_YELLOW: [(f64, f64); 2] = [(34.1, 0.04), (13.5, 0.025)];
+
+/// Weights of pixels from `-radius` to `radius`.
+struct Filters {
+    radius: usize,
+    light: Vec<f32>,
+    red_green: Vec<f32>,
+    /// Two filters, the sum of whose results across and down is the result.
+    blue_yellow: [Vec<f32>; 2],
+    /// A Gaussian, its first derivative and its second.
+    gauss: Vec<f32>,
+    edge: Vec<f32>,
+    point: Vec<f32>,
+    /// The linear values of what a screen shows, at its 256 steps.
+    curve: [f64; 256],
+}
+
+impl Filters {
+    fn new(pixels_per_degree: f64) -> Filters {
+        let spatial = (3.0 * (BLUE_YELLOW[0].1 / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as usize;
+        let deviation = 0.5 * W * pixels_per_degree;
+        let feature = (3.0 * deviation).ceil() as usize;
+        let radius = spatial.max(feature);
+        let taps = |reach: usize, weight: &dyn Fn(f64) -> f64| -> Vec<f64> {
+            let tap = |i: usize| i as f64 - radius as f64;
+            let weight = |x: f64| if x.abs() <= reach as f64 { weight(x) } else { 0.0 };
+            (0..2 * radius + 1).map(|i| weight(tap(i))).collect()
+        };
+        let seen = |x: f64, (a, b): (f64, f64)| {
+            let x = x / pixels_per_degree;
+            a * (PI / b).sqrt() * (-PI * PI * x * x / b).exp()
+        };
+        // one Gaussian of two dimensions is the product of two of one, which have the root of its amplitude
+        let root = |x: f64, (a, b): (f64, f64)| seen(x, ((a / (PI / b).sqrt()).sqrt(), b));
+        let light = taps(spatial, &|x| seen(x, LIGHT));
+        let red_green = taps(spatial, &|x| seen(x, RED_GREEN));
+        let blue_yellow = BLUE_YELLOW.map(|gauss| taps(spatial, &|x| root(x, gauss)));
+        let sum = |weights: &[f64]| weights.iter().sum::<f64>();
+        let blue_yellow_sum = blue_yellow
+            .iter()
+            .map(|weights| sum(weights).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        let bell = |x: f64| (-x * x / (2.0 * deviation * deviation)).exp();
+        let gauss = taps(feature, &bell);
+        let edge = taps(feature, &|x| -x * bell(x));
+        let point = taps(feature, &|x| (x * x / (deviation * deviation) - 1.0) * bell(x));
+        let over = |weights: &[f64], sum: f64| weights.iter().map(|weight| (weight / sum) as f32).collect::<Vec<f32>>();
+        // what is above 0 sums up to 1, what is below to -1
+        let balanced = |weights: &[f64]| {
+            let above: f64 = weights.iter().filter(|weight| **weight > 0.0).sum();
+            let below: f64 = weights.iter().filter(|weight| **weight < 0.0).sum();
+            let part = |weight: &f64| (if *weight > 0.0 { weight / above } else { -weight / below }) as f32;
+            weights.iter().map(part).collect::<Vec<f32>>()
+        };
+        Filters {
+            radius,
+            light: over(&light, sum(&light)),
+            red_green: over(&red_green, sum(&red_green)),
+            blue_yellow: blue_yellow.map(|weights| over(&weights, blue_yellow_sum)),
+            gauss: over(&gauss, sum(&gauss)),
+            edge: balanced(&edge),
+            point: balanced(&point),
+            curve: std::array::from_fn(|i| srgb_to_linear(i as f64 / 255.0)),
+        }
+    }
+}
+
+/// The tone curve (a x² + b x + c) / (d x² + e x + f) of HDR-ꟻLIP: Narkowicz, "ACES filmic tone mapping curve", 2015, without its
+/// exposure of 0.6.
+const ACES: [f64; 6] = [0.6 * 0.6 * 2.51, 0.6 * 0.03, 0.0, 0.6 * 0.6 * 2.43, 0.6 * 0.59, 0.14];
+
+fn tone(x: f64) -> f64 {
+    let [a, b, c, d, e, f] = ACES;
+    if x > 1e9 {
+        return a / d; // whose squares may be infinite
+    }
+    (a * x * x + b * x + c) / (d * x * x + e * x + f)
+}
+
+/// The exposures, in steps of two, at which a picture of linear values is looked at: from where its brightest pixel comes to 0.85
+/// of the screen to where its median does, some one apart. Pixels without light have no part in a median that is 0, and a black
+/// picture is seen as it is.
+fn exposures(colors: &Colors) -> Vec<f64> {
+    let rows = (0..colors.height).into_par_iter();
+    let luminances = rows.flat_map_iter(|y| {
+        let [r, g, b] = colors.values(y, 0..colors.width).1;
+        let colors = r.into_iter().zip(g).zip(b);
+        let luminance =
+            |((r, g), b): ((f64, f64), f64)| (0.2126 * r.max(0.0) + 0.7152 * g.max(0.0) + 0.0722 * b.max(0.0)) as f32;
+        colors.map(luminance).collect::<Vec<f32>>()
+    });
+    let mut luminances: Vec<f32> = luminances.collect();
+    let brightest = luminances.iter().copied().fold(0.0, f32::max);
+    if !(brightest > 0.0) {
+        return vec![0.0];
+    }
+    let mut middle = median(&mut luminances);
+    if !(middle > 0.0) {
+        luminances.retain(|luminance| *luminance > 0.0);
+        middle = median(&mut luminances);
+    }
+    let [a, b, c, d, e, f] = ACES;
+    let (a, b, c) = (a - 0.85 * d, b - 0.85 * e, c - 0.85 * f);
+    let half = -0.5 * b / a;
+    let bright = half + (half * half - c / a).sqrt();
+    let start = (bright / f64::from(brightest)).log2();
+    let stop = (bright / f64::from(middle)).log2();
+    let count = (stop - start).ceil().max(2.0);
+    let step = (stop - start) / (count - 1.0);
+    (0..count as usize).map(|i| start + i as f64 * step).collect()
+}
+
+fn median(values: &mut [f32]) -> f32 {
+    let middle = values.len() / 2;
+    match values.is_empty() {
+        true => 0.0,
+        false => *values.select_nth_unstable_by(middle, f32::total_cmp).1,
+    }
+}
+
+/// A part of the picture.
+#[derive(Clone, Copy, Debug)]
+struct Tile {
+    x: usize,
+    y: usize,
+    width: usize,
+    height: usize,
+}
+
+/// Three numbers for each pixel of a tile and of what is around it, each kind by itself. Beyond its edges the picture goes on as
+/// it is there.
+struct Around {
+    width: usize,
+    values: [Vec<f32>; 3],
+}
+
+impl Tile {
+    /// The error of each pixel.
+    fn errors(&self, colors: &Colors, filters: &Filters, exposures: Option<&[f64]>) -> Vec<f32> {
+        let radius = filters.radius;
+        let columns = self.x.saturating_sub(radius)..colors.width.min(self.x + self.width + radius);
+        let rows = self.y.saturating_sub(radius)..colors.height.min(self.y + self.height + radius);
+        let mut errors = vec![0.0; self.width * self.height];
+        if rows.clone().all(|y| colors.is_plainly_same(y, columns.clone())) {
+            return errors;
+        }
+        let width = self.width + 2 * radius;
+        let empty = || Around {
+            width,
+            values: [const { Vec::new() }; 3],
+        };
+        let (mut a, mut b) = (empty(), empty());
+        for i in 0..self.height + 2 * radius {
+            let y = (self.y + i).saturating_sub(radius).min(colors.height - 1);
+            let (row_a, row_b) = colors.values(y, columns.clone());
+            for (around, row) in [(&mut a, row_a), (&mut b, row_b)] {
+                for (to, from) in around.values.iter_mut().zip(row) {
+                    to.extend((0..width).map(|j| {
+                        let x = (self.x + j).saturating_sub(radius).min(colors.width - 1);
+                        from[x - columns.start].max(0.0) as f32
+                    }));
+                }
+            }
+        }
+        if a.values == b.values {
+            return errors;
+        }
+        match exposures {
+            None => {
+                let seen = |value: f64| screen_to_linear(&filters.curve, value);
+                self.add(&opponents(&a, seen), &opponents(&b, seen), filters, &mut errors);
+            }
+            Some(exposures) => {
+                for exposure in exposures {
+                    let factor = exposure.exp2();
+                    let seen = |value: f64| tone(value * factor).clamp(0.0, 1.0);
+                    self.add(&opponents(&a, seen), &opponents(&b, seen), filters, &mut errors);
+                }
+            }
+        }
+        errors
+    }
+
+    /// Raises the errors to those of two pictures in opponent colours.
+    fn add(&self, a: &Around, b: &Around, filters: &Filters, errors: &mut [f32]) {
+        let (lines_a, lines_b) = (
+            Lines::across(a, self.width, filters),
+            Lines::across(b, self.width, filters),
+        );
+        let greatest = greatest();
+        let (mut seen_a, mut seen_b) = (Seen::new(self.width), Seen::new(self.width));
+        for (y, errors) in errors.chunks_mut(self.width).enumerate() {
+            seen_a.down(&lines_a, y, filters);
+            seen_b.down(&lines_b, y, filters);
+            for (x, error) in errors.iter_mut().enumerate() {
+                let color = color_difference(seen_a.color(x), seen_b.color(x), greatest);
+                let ((edge_a, point_a), (edge_b, point_b)) = (seen_a.features(x), seen_b.features(x));
+                let feature = (edge_a - edge_b).abs().max((point_a - point_b).abs());
+                let feature = (f64::from(feature) * std::f64::consts::FRAC_1_SQRT_2).powf(QF);
+                let found = if color > 0.0 { color.powf(1.0 - feature) } else { 0.0 };
+                *error = error.max(found as f32);
+            }
+        }
+    }
+}
+
+/// The colours of a tile in the opponent space Y Cx Cz.
+fn opponents(around: &Around, seen: impl Fn(f64) -> f64) -> Around {
+    let count = around.values[0].len();
+    let mut values = [const { Vec::new() }; 3].map(|mut list: Vec<f32>| {
+        list.reserve_exact(count);
+        list
+    });
+    let [r, g, b] = &around.values;
+    for ((r, g), b) in r.iter().zip(g).zip(b) {
+        let [x, y, z] = white_xyz([*r, *g, *b].map(|value| seen(f64::from(value))));
+        let opponent = [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)];
+        for (to, value) in values.iter_mut().zip(opponent) {
+            to.push(value as f32);
+        }
+    }
+    Around {
+        width: around.width,
+        values,
+    }
+}
+
+/// X, Y and Z of a linear colour in relation to those of white: IEC 61966-2-1, as ꟻLIP has its matrix.
+fn white_xyz([r, g, b]: [f64; 3]) -> [f64; 3] {
+    let x = (10_135_552.0 * r + 8_788_810.0 * g + 4_435_075.0 * b) / 24_577_794.0;
+    let y = (2_613_072.0 * r + 8_788_810.0 * g + 887_015.0 * b) / 12_288_897.0;
+    let z = (1_425_312.0 * r + 8_788_810.0 * g + 70_074_185.0 * b) / 73_733_382.0;
+    [x * WHITE[0], y, z * WHITE[1]]
+}
+
+/// 1 / X and 1 / Z of white.
+const WHITE: [f64; 2] = [1.052_156_925, 0.918_357_670];
+
+/// The linear colour, within the screen's range, of an opponent one.
+fn linear([y, cx, cz]: [f64; 3]) -> [f64; 3] {
+    let y = (y + 16.0) / 116.0;
+    let (x, z) = ((y + cx / 500.0) / WHITE[0], (y - cz / 200.0) / WHITE[1]);
+    let rows = [
+        [3.241_003_275, -1.537_398_934, -0.498_615_861],
+        [-0.969_224_334, 1.875_930_071, 0.041_554_224],
+        [0.055_639_423, -0.204_011_202, 1.057_148_933],
+    ];
+    rows.map(|[a, b, c]: [f64; 3]| (a * x + b * y + c * z).clamp(0.0, 1.0))
+}
+
+/// L*, a* and b* of a linear colour, the last two weighted by lightness as Hunt saw it.
+fn hunt_lab(color: [f64; 3]) -> [f64; 3] {
+    const DELTA: f64 = 6.0 / 29.0;
+    let [x, y, z] = white_xyz(color).map(|value| {
+        if value > DELTA * DELTA * DELTA {
+            value.cbrt()
+        } else {
+            value / (3.0 * DELTA * DELTA) + 4.0 / 29.0
+        }
+    });
+    let light = 116.0 * y - 16.0;
+    [light, 0.01 * light * 500.0 * (x - y), 0.01 * light * 200.0 * (y - z)]
+}
+
+/// The distance HyAB of two colours, to the power of the paper.
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    ((a[0] - b[0]).abs() + (a[1] - b[1]).hypot(a[2] - b[2])).powf(QC)
+}
+
+/// The largest distance, that of green and blue.
+fn greatest() -> f64 {
+    distance(hunt_lab([0.0, 1.0, 0.0]), hunt_lab([0.0, 0.0, 1.0]))
+}
+
+/// From 0 to 1, of two filtered opponent colours.
+fn color_difference(a: [f32; 3], b: [f32; 3], greatest: f64) -> f64 {
+    if a == b {
+        return 0.0;
+    }
+    let lab = |color: [f32; 3]| hunt_lab(linear(color.map(f64::from)));
+    let (found, knee) = (distance(lab(a), lab(b)), PC * greatest);
+    if found < knee {
+        found * PT / knee
+    } else {
+        PT + (found - knee) / (greatest - knee) * (1.0 - PT)
+    }
+}
+
+/// A tile filtered across: light, red and green, blue and yellow twice; then of light a Gaussian and its two derivatives.
+struct Lines {
+    width: usize,
+    values: [Vec<f32>; 7],
+}
+
+impl Lines {
+    fn across(around: &Around, width: usize, filters: &Filters) -> Lines {
+        let [light, red_green, blue_yellow] = &around.values;
+        let one = |from: &[f32], weights: &[f32]| {
+            let mut lines = vec![0.0; from.len() / around.width * width];
+            for (to, from) in lines.chunks_mut(width).zip(from.chunks(around.width)) {
+                for (i, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
+                    add(to, &from[i..i + width], *weight);
+                }
+            }
+            lines
+        };
+        Lines {
+            width,
+            values: [
+                one(light, &filters.light),
+                one(red_green, &filters.red_green),
+                one(blue_yellow, &filters.blue_yellow[0]),
+                one(blue_yellow, &filters.blue_yellow[1]),
+                one(light, &filters.gauss),
+                one(light, &filters.edge),
+                one(light, &filters.point),
+            ],
+        }
+    }
+}
+
+/// A row filtered down too: the four of colour; the first and second derivative across, then down.
+struct Seen {
+    values: [Vec<f32>; 8],
+}
+
+impl Seen {
+    fn new(width: usize) -> Seen {
+        Seen {
+            values: std::array::from_fn(|_| vec![0.0; width]),
+        }
+    }
+
+    fn down(&mut self, lines: &Lines, y: usize, filters: &Filters) {
+        let from = [0, 1, 2, 3, 5, 6, 4, 4];
+        let weights = [
+            &filters.light,
+            &filters.red_green,
+            &filters.blue_yellow[0],
+            &filters.blue_yellow[1],
+            &filters.gauss,
+            &filters.gauss,
+            &filters.edge,
+            &filters.point,
+        ];
+        for ((to, from), weights) in self.values.iter_mut().zip(from).zip(weights) {
+            to.fill(0.0);
+            let rows = lines.values[from].chunks(lines.width).skip(y);
+            for (row, weight) in rows.zip(weights).filter(|(_, weight)| **weight != 0.0) {
+                add(to, row, *weight);
+            }
+        }
+    }
+
+    fn color(&self, x: usize) -> [f32; 3] {
+        let [light, red_green, first, second, ..] = &self.values;
+        [light[x], red_green[x], first[x] + second[x]]
+    }
+
+    /// How much of an edge and of a point there is. Light is from 0 to 1 here; derivatives see no constant.
+    fn features(&self, x: usize) -> (f32, f32) {
+        let [.., edge_x, point_x, edge_y, point_y] = &self.values;
+        (edge_x[x].hypot(edge_y[x]) / 116.0, point_x[x].hypot(point_y[x]) / 116.0)
+    }
+}
+
+/// Adds a weighted row.
+fn add(to: &mut [f32], from: &[f32], weight: f32) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to += weight * from;
+    }
+}
+
+/// The linear value of what a screen shows, most often at one of its steps. What is between them is a 32-bit float.
+fn screen_to_linear(curve: &[f64; 256], value: f64) -> f64 {
+    let step = (value * 255.0 + 0.5) as u8;
+    if value as f32 == (f64::from(step) / 255.0) as f32 {
+        curve[usize::from(step)]
+    } else {
+        srgb_to_linear(value)
+    }
+}
+
+/// The linear value of what a screen shows: IEC 61966-2-1.
+fn srgb_to_linear(value: f64) -> f64 {
+    if value <= 0.04045 {
+        value / 12.92
+    } else {
+        ((value + 0.055) / 1.055).powf(2.4)
+    }
+}

@@ -1,0 +1,156 @@
+//! OpenEXR files: all channels of all parts, each in its own type, at the largest level.
+
+use std::collections::BTreeSet;
+use std::io;
+use std::sync::Arc;
+
+use exr::block::reader::ChunksReader as _;
+use exr::error::Error;
+use exr::meta::attribute::SampleType;
+use exr::meta::header::Header;
+
+use super::read::{Source, Unreadable, room};
+use super::{Channel, Kind, Picture, Plane};
+
+impl From<Error> for Unreadable {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Io(error) if error.kind() != io::ErrorKind::UnexpectedEof => Unreadable::Io(error),
+            Error::NotSupported(what) => Unreadable::Kind(what.into_owned()),
+            Error::Io(error) => Unreadable::Damaged(error.to_string()),
+            other => Unreadable::Damaged(other.to_string()),
+        }
+    }
+}
+
+/// Block by block, so that nothing but the picture's own values is in memory.
+pub(super) fn read(source: &mut dyn Source) -> Result<Picture, Unreadable> {
+    let reader = exr::block::read(source, false)?;
+    let headers = reader.headers().to_vec();
+    let first = headers
+        .first()
+        .ok_or_else(|| Unreadable::Damaged("it has no parts".to_owned()))?;
+    let (width, height) = (first.layer_size.width(), first.layer_size.height());
+    let position = first.own_attributes.layer_position;
+    for header in &headers {
+        if header.deep {
+            return Err(Unreadable::Kind("deep data".to_owned()));
+        }
+        if header.layer_size != first.layer_size || header.own_attributes.layer_position != position {
+            return Err(Unreadable::Kind("parts of different sizes or places".to_owned()));
+        }
+    }
+    let side = |length: usize| u32::try_from(length).ok().filter(|length| *length > 0);
+    let (Some(columns), Some(rows)) = (side(width), side(height)) else {
+        return Err(Unreadable::Damaged("it has no pixels".to_owned()));
+    };
+    let names = names(&headers)?;
+    let mut planes = Vec::new();
+    for header in &headers {
+        let mut part = Vec::new();
+        for channel in &header.channels.list {
+            part.push(empty(columns, rows, channel.sample_type)?);
+        }
+        planes.push(part);
+    }
+    let chunks = reader.filter_chunks(false, |_, _, block| (block.level.x(), block.level.y()) == (0, 0))?;
+    // a file may name one block twice and another one never
+    let (mut seen, mut area) = (BTreeSet::new(), 0);
+    chunks.decompress_parallel(false, |_, block| {
+        let damaged = || Error::Invalid("block".into());
+        let part = planes.get_mut(block.index.layer).ok_or_else(damaged)?;
+        let (at, size) = (block.index.pixel_position, block.index.pixel_size);
+        if at.x().checked_add(size.x()).is_none_or(|end| end > width) {
+            return Err(damaged());
+        }
+        if at.y().checked_add(size.y()).is_none_or(|end| end > height) {
+            return Err(damaged());
+        }
+        if seen.insert((block.index.layer, at.x(), at.y())) {
+            area += size.area() as u64;
+        }
+        let mut bytes = block.data.as_slice();
+        for y in at.y()..at.y() + size.y() {
+            for plane in part.iter_mut() {
+                let line = bytes.split_off(..size.x() * bytes_of(plane)).ok_or_else(damaged)?;
+                store(plane, y * width + at.x(), line);
+            }
+        }
+        Ok(())
+    })?;
+    if area != u64::from(columns) * u64::from(rows) * headers.len() as u64 {
+        return Err(Unreadable::Damaged("blocks are missing".to_owned()));
+    }
+    let channels = names.into_iter().zip(planes.into_iter().flatten());
+    Ok(Picture {
+        width: columns,
+        height: rows,
+        position: (position.x(), position.y()),
+        kind: Kind::Linear,
+        channels: channels
+            .map(|(name, plane)| Channel {
+                name,
+                plane: Arc::new(plane),
+            })
+            .collect(),
+    })
+}
+
+/// The channels' names; of several parts with the part's name before it, if it is not there already.
+fn names(headers: &[Header]) -> Result<Vec<String>, Unreadable> {
+    let mut names = Vec::new();
+    let mut known = BTreeSet::new();
+    for header in headers {
+        let part = header.own_attributes.layer_name.as_ref().map(ToString::to_string);
+        let part = part.filter(|part| headers.len() > 1 && !part.is_empty());
+        for channel in &header.channels.list {
+            let channel = channel.name.to_string();
+            let name = match &part {
+                Some(part) if !channel.starts_with(&format!("{part}.")) => format!("{part}.{channel}"),
+                _ => channel,
+            };
+            if !known.insert(name.clone()) {
+                return Err(Unreadable::Kind(format!("two channels are called {name}")));
+            }
+            names.push(name);
+        }
+    }
+    if names.is_empty() {
+        return Err(Unreadable::Damaged("it has no channels".to_owned()));
+    }
+    Ok(names)
+}
+
+fn empty(columns: u32, rows: u32, samples: SampleType) -> Result<Plane, Unreadable> {
+    /// Which the system gives as they are touched: a header may lie.
+    fn zeros<T: Clone + Default>(width: u64, height: u64) -> Result<Vec<T>, Unreadable> {
+        let count = width * height;
+        drop(room::<T>(width, height, count)?);
+        Ok(vec![T::default(); count as usize])
+    }
+    let (width, height) = (u64::from(columns), u64::from(rows));
+    Ok(match samples {
+        SampleType::U32 => Plane::Whole(zeros(width, height)?),
+        SampleType::F16 => Plane::Halves(zeros(width, height)?),
+        SampleType::F32 => Plane::Floats(zeros(width, height)?),
+    })
+}
+
+fn bytes_of(plane: &Plane) -> usize {
+    if matches!(plane, Plane::Halves(_)) { 2 } else { 4 }
+}
+
+/// Writes a line of a block, which lies inside of the picture.
+fn store(plane: &mut Plane, start: usize, line: &[u8]) {
+    fn put<T, const N: usize>(to: &mut [T], line: &[u8], value: impl Fn([u8; N]) -> T) {
+        for (to, bytes) in to.iter_mut().zip(line.as_chunks::<N>().0) {
+            *to = value(*bytes);
+        }
+    }
+    match plane {
+        Plane::Whole(values) => put(&mut values[start..], line, u32::from_ne_bytes),
+        Plane::Halves(values) => put(&mut values[start..], line, u16::from_ne_bytes),
+        Plane::Floats(values) => put(&mut values[start..], line, f32::from_ne_bytes),
+        Plane::Bytes(_) | Plane::Words(_) | Plane::One => {} // not in such files
+    }
+}

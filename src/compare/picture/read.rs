@@ -1,0 +1,280 @@
+//! Reading picture files: which kind of file it is is told by its first bytes, not by its name.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Cursor, Read as _, Seek, SeekFrom};
+use std::path::Path;
+use std::sync::Arc;
+
+use image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader, Limits};
+
+use super::{Channel, Kind, Picture, Plane};
+
+/// What a decoder may take beside the picture, in bytes.
+const BESIDE: usize = 64 << 20;
+
+/// The most pixels that a byte of a JPEG can stand for: each block of 8 x 8 takes a bit, and covers up to 32 x 32 pixels.
+const PIXELS_OF_JPEG: u64 = 8 * 32 * 32;
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+pub enum Unreadable {
+    /// The file cannot be opened or read.
+    #[error("cannot be read: {0}")]
+    Io(#[from] io::Error),
+    /// It is a folder.
+    #[error("is a folder; a picture is a file")]
+    Folder,
+    /// There are no bytes.
+    #[error("is empty")]
+    Empty,
+    /// Its first bytes are those of no such file.
+    #[error("is no picture: it must be a PNG, EXR, JPEG, WebP or Radiance HDR file")]
+    Format,
+    /// It is a picture, but not a sound one.
+    #[error("is damaged or cut short: {0}")]
+    Damaged(String),
+    /// It is a picture of a kind that is not read.
+    #[error("is of a kind that is not read: {0}")]
+    Kind(String),
+    /// It does not fit memory.
+    #[error("does not fit memory: {width} x {height} pixels take {bytes} bytes")]
+    Memory {
+        /// Columns.
+        width: u64,
+        /// Rows.
+        height: u64,
+        /// What its values take.
+        bytes: u64,
+    },
+}
+
+/// What pictures are read from.
+pub(super) trait Source: BufRead + Seek {}
+impl<T: BufRead + Seek> Source for T {}
+
+impl Picture {
+    /// Reads a picture; `-` is standard input.
+    ///
+    /// # Errors
+    ///
+    /// What is no picture, and why.
+    pub fn read(path: &Path) -> Result<Picture, Unreadable> {
+        if path.as_os_str() == "-" {
+            let mut bytes = Vec::new();
+            io::stdin().lock().read_to_end(&mut bytes)?;
+            return Picture::decode(bytes);
+        }
+        let mut file = File::open(path)?;
+        let data = file.metadata()?;
+        if data.is_dir() {
+            return Err(Unreadable::Folder);
+        }
+        if !data.is_file() {
+            // a pipe: what decodes pictures goes back and forth
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes)?;
+            return Picture::decode(bytes);
+        }
+        decode(&mut BufReader::with_capacity(1 << 16, file))
+    }
+
+    /// Reads a picture from its bytes.
+    ///
+    /// # Errors
+    ///
+    /// What is no picture, and why.
+    pub fn decode(bytes: Vec<u8>) -> Result<Picture, Unreadable> {
+        decode(&mut Cursor::new(bytes))
+    }
+}
+
+fn decode(source: &mut dyn Source) -> Result<Picture, Unreadable> {
+    let mut start = Vec::new();
+    source.take(64).read_to_end(&mut start)?;
+    source.seek(SeekFrom::Start(0))?;
+    if start.is_empty() {
+        return Err(Unreadable::Empty);
+    }
+    match image::guess_format(&start) {
+        Ok(ImageFormat::Png) => png(source),
+        Ok(ImageFormat::OpenExr) => super::exr::read(source),
+        Ok(format @ (ImageFormat::Jpeg | ImageFormat::WebP | ImageFormat::Hdr)) => other(source, format),
+        _ => Err(Unreadable::Format),
+    }
+}
+
+/// Room for values, if there is as much memory.
+pub(super) fn room<T>(width: u64, height: u64, count: u64) -> Result<Vec<T>, Unreadable> {
+    let refused = Unreadable::Memory {
+        width,
+        height,
+        bytes: count.saturating_mul(size_of::<T>() as u64),
+    };
+    let mut values = Vec::new();
+    match usize::try_from(count) {
+        Ok(count) if values.try_reserve_exact(count).is_ok() => Ok(values),
+        _ => Err(refused),
+    }
+}
+
+impl From<png::DecodingError> for Unreadable {
+    fn from(error: png::DecodingError) -> Self {
+        match error {
+            png::DecodingError::IoError(error) if error.kind() != io::ErrorKind::UnexpectedEof => Unreadable::Io(error),
+            other => Unreadable::Damaged(other.to_string()),
+        }
+    }
+}
+
+/// Row by row, so that nothing but the picture's own values is in memory.
+fn png(source: &mut dyn Source) -> Result<Picture, Unreadable> {
+    let mut options = png::DecodeOptions::default();
+    options.set_ignore_text_chunk(true);
+    options.set_ignore_iccp_chunk(true);
+    let mut decoder = png::Decoder::new_with_options(source, options);
+    decoder.set_limits(png::Limits { bytes: BESIDE });
+    decoder.set_transformations(png::Transformations::EXPAND); // palettes to colours, fewer bits to 8
+    let mut reader = decoder.read_info()?;
+    let (width, height) = (reader.info().width, reader.info().height);
+    let is_interlaced = reader.info().interlaced;
+    let (color, depth) = reader.output_color_type();
+    let samples = color.samples();
+    let is_deep = depth == png::BitDepth::Sixteen;
+    let (columns, rows) = (u64::from(width), u64::from(height));
+    let mut planes = Planes::new(columns, rows, samples, is_deep)?;
+    if is_interlaced {
+        let size = reader.output_buffer_size().unwrap_or(usize::MAX) as u64;
+        let mut bytes = room(columns, rows, size)?;
+        bytes.resize(size as usize, 0);
+        reader.next_frame(&mut bytes)?;
+        planes.take(&bytes);
+    } else {
+        while let Some(row) = reader.next_row()? {
+            planes.take(row.data());
+        }
+    }
+    reader.finish()?;
+    Ok(planes.picture(width, height))
+}
+
+/// What a screen shows, one plane for each sample of a pixel.
+struct Planes {
+    samples: usize,
+    bytes: Vec<Vec<u8>>,
+    words: Vec<Vec<u16>>,
+}
+
+impl Planes {
+    fn new(width: u64, height: u64, samples: usize, is_deep: bool) -> Result<Planes, Unreadable> {
+        let count = width * height;
+        let mut planes = Planes {
+            samples,
+            bytes: Vec::new(),
+            words: Vec::new(),
+        };
+        for _ in 0..samples {
+            match is_deep {
+                true => planes.words.push(room(width, height, count)?),
+                false => planes.bytes.push(room(width, height, count)?),
+            }
+        }
+        Ok(planes)
+    }
+
+    /// Adds whole pixels; words have their high byte first.
+    fn take(&mut self, pixels: &[u8]) {
+        let samples = self.samples;
+        for (i, plane) in self.bytes.iter_mut().enumerate() {
+            plane.extend(pixels.iter().skip(i).step_by(samples));
+        }
+        for (i, plane) in self.words.iter_mut().enumerate() {
+            let pairs = pixels.as_chunks().0.iter().skip(i).step_by(samples);
+            plane.extend(pairs.map(|pair| u16::from_be_bytes(*pair)));
+        }
+    }
+
+    fn picture(self, width: u32, height: u32) -> Picture {
+        let bits = if self.bytes.is_empty() { 16 } else { 8 };
+        let bytes = self.bytes.into_iter().map(Plane::Bytes);
+        let planes: Vec<_> = bytes
+            .chain(self.words.into_iter().map(Plane::Words))
+            .map(Arc::new)
+            .collect();
+        // gray is a colour of three same parts
+        let names: &[(&str, usize)] = match planes.len() {
+            1 => &[("R", 0), ("G", 0), ("B", 0)],
+            2 => &[("R", 0), ("G", 0), ("B", 0), ("A", 1)],
+            3 => &[("R", 0), ("G", 1), ("B", 2)],
+            _ => &[("R", 0), ("G", 1), ("B", 2), ("A", 3)],
+        };
+        let channels = names.iter().filter_map(|(name, i)| {
+            Some(Channel {
+                name: (*name).to_owned(),
+                plane: Arc::clone(planes.get(*i)?),
+            })
+        });
+        Picture {
+            width,
+            height,
+            position: (0, 0),
+            kind: Kind::Display { bits },
+            channels: channels.collect(),
+        }
+    }
+}
+
+/// Files that the image library reads whole.
+fn other(source: &mut dyn Source, format: ImageFormat) -> Result<Picture, Unreadable> {
+    let length = source.seek(SeekFrom::End(0))?;
+    source.seek(SeekFrom::Start(0))?;
+    let mut reader = ImageReader::with_format(source, format);
+    reader.limits(Limits::no_limits());
+    let decoder = reader.into_decoder().map_err(refused)?;
+    let (width, height) = decoder.dimensions();
+    if width == 0 || height == 0 {
+        return Err(Unreadable::Damaged("it has no pixels".to_owned()));
+    }
+    if format == ImageFormat::Jpeg && length.saturating_mul(PIXELS_OF_JPEG) < u64::from(width) * u64::from(height) {
+        return Err(Unreadable::Damaged(format!(
+            "its header says {width} x {height} pixels, and {length} bytes cannot hold them"
+        )));
+    }
+    let color = decoder.color_type();
+    // asked for before the library does, which would end the program
+    drop(room::<u8>(width.into(), height.into(), decoder.total_bytes())?);
+    let image = DynamicImage::from_decoder(decoder).map_err(refused)?;
+    let (columns, rows) = (u64::from(width), u64::from(height));
+    if format == ImageFormat::Hdr {
+        let values = image.into_rgb32f().into_raw();
+        let channels = ["R", "G", "B"].into_iter().enumerate().map(|(i, name)| {
+            let mut plane = room(columns, rows, columns * rows)?;
+            plane.extend(values.iter().skip(i).step_by(3));
+            Ok(Channel {
+                name: name.to_owned(),
+                plane: Arc::new(Plane::Floats(plane)),
+            })
+        });
+        return Ok(Picture {
+            width,
+            height,
+            position: (0, 0),
+            kind: Kind::Linear,
+            channels: channels.collect::<Result<_, Unreadable>>()?,
+        });
+    }
+    let image = match color {
+        image::ColorType::L8 | image::ColorType::La8 | image::ColorType::Rgb8 | image::ColorType::Rgba8 => image,
+        other => return Err(Unreadable::Kind(format!("its values are {other:?}, not of 8 bits"))),
+    };
+    let mut planes = Planes::new(columns, rows, usize::from(color.channel_count()), false)?;
+    planes.take(image.as_bytes());
+    Ok(planes.picture(width, height))
+}
+
+fn refused(error: image::ImageError) -> Unreadable {
+    match error {
+        image::ImageError::IoError(error) if error.kind() != io::ErrorKind::UnexpectedEof => Unreadable::Io(error),
+        image::ImageError::Unsupported(error) => Unreadable::Kind(error.to_string()),
+        other => Unreadable::Damaged(other.to_string()),
+    }
+}

@@ -1,0 +1,304 @@
+//! The measures that look at each value by itself: how many pixels differ, by how much, and where.
+
+use rayon::prelude::*;
+
+use super::flip::Map;
+use super::picture::{Kind, Picture, Plane};
+
+/// What a relative error's denominator has beside the square of the reference: that of Rousselle, Knaus and Zwicker, "Adaptive
+/// sampling and reconstruction using greedy error minimization", ACM Trans. Graph. 30 (6), 2011, section 5.
+const EPSILON: f64 = 0.01;
+/// Pixels that are looked at together. Sums are made in this order, so that they do not depend on threads.
+const CHUNK: usize = 1 << 16;
+
+/// Channels that belong together, which both pictures have.
+#[derive(Clone, Debug)]
+pub struct Layer<'a> {
+    /// `color` of `R`, `G`, `B`, `A` and `Y`; `normal` of `normal.X`; the channel's own name of others.
+    pub name: String,
+    /// The channels' names, and their values in both pictures.
+    pub channels: Vec<(&'a str, &'a Plane, &'a Plane)>,
+    kind: Kind,
+}
+
+/// A pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The column, from the left, 0 the first.
+    pub x: u32,
+    /// The row, from the top, 0 the first.
+    pub y: u32,
+}
+
+/// How many values are no finite numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Values {
+    /// Values that are no number.
+    pub nan: u64,
+    /// Infinite ones, of either sign.
+    pub infinite: u64,
+}
+
+impl Values {
+    fn count(&mut self, value: f64) {
+        self.nan += u64::from(value.is_nan());
+        self.infinite += u64::from(value.is_infinite());
+    }
+
+    /// Both.
+    pub fn all(self) -> u64 {
+        self.nan + self.infinite
+    }
+}
+
+/// The largest difference.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Largest {
+    /// How large it is.
+    pub difference: f64,
+    /// The pixel, the first in reading order if there are several.
+    pub place: Place,
+    /// The channel.
+    pub channel: String,
+    /// The first picture's value.
+    pub a: f64,
+    /// The second picture's.
+    pub b: f64,
+}
+
+/// How far a layer is apart in two pictures. Values that are no finite number in either picture count as 0 in both, but for
+/// `different` and `beyond`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// Pixels of which a value has not the same bits, signed zeros told apart.
+    pub different: u64,
+    /// The first of them.
+    pub first: Option<Place>,
+    /// Pixels of which a value differs by more than the threshold, or by no number.
+    pub beyond: u64,
+    /// The largest difference, if it is above 0.
+    pub largest: Option<Largest>,
+    /// The root of the mean of the squares of all differences.
+    pub rmse: f64,
+    /// The mean of d² / (b² + 0.01), where b is the second picture's value.
+    pub rel_mse: f64,
+    /// 20 log10(peak / rmse) in decibels; infinite where nothing differs. The peak is 1 for what a screen shows, else the largest
+    /// magnitude in the second picture, or 1 if that is 0.
+    pub psnr: f64,
+    /// Values of the first picture that are no finite numbers.
+    pub a: Values,
+    /// Those of the second.
+    pub b: Values,
+    /// The first pixel with such a value in either picture.
+    pub odd: Option<Place>,
+}
+
+/// The layers that both pictures have, colours first, and the channels that only the first or only the second has.
+pub fn layers<'a>(a: &'a Picture, b: &'a Picture) -> (Vec<Layer<'a>>, Vec<&'a str>, Vec<&'a str>) {
+    let mut layers: Vec<Layer> = Vec::new();
+    let mut only_a = Vec::new();
+    for channel in &a.channels {
+        let Some(other) = b.channel(&channel.name) else {
+            only_a.push(channel.name.as_str());
+            continue;
+        };
+        let name = layer_of(&channel.name);
+        let entry = (channel.name.as_str(), &*channel.plane, &**other);
+        match layers.iter_mut().find(|layer| layer.name == name) {
+            Some(layer) => layer.channels.push(entry),
+            None => layers.push(Layer {
+                name: name.to_owned(),
+                channels: vec![entry],
+                kind: b.kind,
+            }),
+        }
+    }
+    for layer in &mut layers {
+        // files have B, G, R
+        layer
+            .channels
+            .sort_by_key(|(name, ..)| ["R", "G", "B", "A"].iter().position(|known| known == name));
+    }
+    layers.sort_by_key(|layer| layer.name != COLOR);
+    let only_b = b.channels.iter().map(|channel| channel.name.as_str());
+    let only_b = only_b.filter(|name| a.channel(name).is_none()).collect();
+    (layers, only_a, only_b)
+}
+
+/// The name of the layer of colours.
+pub const COLOR: &str = "color";
+
+/// The layer that a channel belongs to.
+pub fn layer_of(channel: &str) -> &str {
+    match channel.rsplit_once('.') {
+        Some((layer, _)) => layer,
+        None if ["R", "G", "B", "A", "Y"].contains(&channel) => COLOR,
+        None => channel,
+    }
+}
+
+/// What is found in a chunk.
+#[derive(Clone, Debug, Default)]
+struct Found {
+    different: u64,
+    first: Option<usize>,
+    beyond: u64,
+    /// The difference, the pixel and the channel.
+    largest: Option<(f64, usize, usize)>,
+    squares: f64,
+    relative: f64,
+    peak: f64,
+    a: Values,
+    b: Values,
+    odd: Option<usize>,
+}
+
+impl Found {
+    /// Adds what is found in the next chunk.
+    fn join(&mut self, next: &Found) {
+        self.different += next.different;
+        self.first = self.first.or(next.first);
+        self.beyond += next.beyond;
+        if next.largest.map(|found| found.0) > self.largest.map(|found| found.0) {
+            self.largest = next.largest;
+        }
+        self.squares += next.squares;
+        self.relative += next.relative;
+        self.peak = self.peak.max(next.peak);
+        for (own, next) in [(&mut self.a, next.a), (&mut self.b, next.b)] {
+            own.nan += next.nan;
+            own.infinite += next.infinite;
+        }
+        self.odd = self.odd.or(next.odd);
+    }
+}
+
+impl<'a> Layer<'a> {
+    /// Compares the layer. Pixels count as beyond that differ by more than the threshold.
+    pub fn difference(&self, width: u32, height: u32, threshold: f64) -> Difference {
+        let pixels = width as usize * height as usize;
+        let chunks = (0..pixels.div_ceil(CHUNK)).into_par_iter();
+        let found = chunks.map(|i| self.chunk(i * CHUNK, pixels.min((i + 1) * CHUNK), threshold));
+        let mut all = Found::default();
+        for found in found.collect::<Vec<_>>() {
+            all.join(&found);
+        }
+        let place = |pixel: usize| Place {
+            x: (pixel % width as usize) as u32,
+            y: (pixel / width as usize) as u32,
+        };
+        let values = pixels as f64 * self.channels.len() as f64;
+        let rmse = (all.squares / values).sqrt();
+        let peak = match self.kind {
+            Kind::Linear if all.peak > 0.0 => all.peak,
+            _ => 1.0,
+        };
+        Difference {
+            different: all.different,
+            first: all.first.map(place),
+            beyond: all.beyond,
+            largest: all.largest.and_then(|(difference, pixel, channel)| {
+                let (name, a, b) = self.channels.get(channel)?;
+                Some(Largest {
+                    difference,
+                    place: place(pixel),
+                    channel: (*name).to_owned(),
+                    a: a.value(pixel),
+                    b: b.value(pixel),
+                })
+            }),
+            rmse,
+            rel_mse: all.relative / values,
+            psnr: 20.0 * (peak / rmse).log10(),
+            a: all.a,
+            b: all.b,
+            odd: all.odd.map(place),
+        }
+    }
+
+    /// Where pixels differ, and by which part of the largest difference.
+    pub(super) fn maps(&self, picture: &Picture, step: usize) -> (Map, Map) {
+        let (mut differing, mut apart) = (Map::new(picture, step), Map::new(picture, step));
+        let largest = self.difference(picture.width, picture.height, 0.0).largest;
+        let scale = largest.map_or(1.0, |largest| largest.difference);
+        let width = picture.width as usize;
+        let (mut a, mut b) = (vec![0.0; width], vec![0.0; width]);
+        for (_, plane_a, plane_b) in &self.channels {
+            for y in 0..picture.height as usize {
+                let pixels = y * width..(y + 1) * width;
+                if plane_a.is_plainly(plane_b, pixels.clone()) {
+                    continue;
+                }
+                plane_a.values(pixels.clone(), &mut a);
+                plane_b.values(pixels, &mut b);
+                for (x, (a, b)) in a.iter().zip(&b).enumerate() {
+                    if a.to_bits() != b.to_bits() || !a.is_finite() {
+                        let part = (a - b).abs() / scale;
+                        differing.raise(x, y, 1.0);
+                        apart.raise(x, y, if part.is_finite() { part } else { 1.0 });
+                    }
+                }
+            }
+        }
+        (differing, apart)
+    }
+
+    /// The first three channels without alpha in both pictures, with the least and the largest value of the second.
+    pub(super) fn ranges(&self, picture: &Picture) -> Vec<([&'a Plane; 2], f64, f64)> {
+        let channels = self.channels.iter().filter(|(name, ..)| *name != "A").take(3);
+        let range = |(_, a, b): &(&str, &'a Plane, &'a Plane)| {
+            let width = picture.width as usize;
+            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+            let mut values = vec![0.0; width];
+            for y in 0..picture.height as usize {
+                b.values(y * width..(y + 1) * width, &mut values);
+                for value in values.iter().filter(|value| value.is_finite()) {
+                    (low, high) = (low.min(*value), high.max(*value));
+                }
+            }
+            ([*a, *b], low, high)
+        };
+        channels.map(range).collect()
+    }
+
+    fn chunk(&self, start: usize, end: usize, threshold: f64) -> Found {
+        let count = end - start;
+        let (mut a, mut b) = (vec![0.0; count], vec![0.0; count]);
+        let (mut unlike, mut beyond) = (vec![false; count], vec![false; count]);
+        let mut found = Found::default();
+        for (channel, (_, plane_a, plane_b)) in self.channels.iter().enumerate() {
+            if plane_a.is_plainly(plane_b, start..end) {
+                continue;
+            }
+            plane_a.values(start..end, &mut a);
+            plane_b.values(start..end, &mut b);
+            for (i, (a, b)) in a.iter().zip(&b).enumerate() {
+                let (mut apart, mut reference) = ((a - b).abs(), *b);
+                if !(a.is_finite() && b.is_finite()) {
+                    found.a.count(*a);
+                    found.b.count(*b);
+                    found.odd = Some(found.odd.map_or(start + i, |odd| odd.min(start + i)));
+                    beyond[i] |= a.to_bits() != b.to_bits();
+                    (apart, reference) = (0.0, 0.0);
+                }
+                unlike[i] |= a.to_bits() != b.to_bits();
+                beyond[i] |= apart > threshold;
+                found.squares += apart * apart;
+                found.relative += apart * apart / (reference * reference + EPSILON);
+                found.peak = found.peak.max(reference.abs());
+                let farther = match found.largest {
+                    None => apart > 0.0,
+                    Some((largest, pixel, _)) => apart > largest || (apart == largest && start + i < pixel),
+                };
+                if farther {
+                    found.largest = Some((apart, start + i, channel));
+                }
+            }
+        }
+        let count = |flags: &[bool]| flags.iter().filter(|flag| **flag).count() as u64;
+        found.different = count(&unlike);
+        found.first = unlike.iter().position(|flag| *flag).map(|i| start + i);
+        found.beyond = count(&beyond);
+        found
+    }
+}

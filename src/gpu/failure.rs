@@ -1,0 +1,182 @@
+//! What goes wrong on a device: an error, want of memory, or its loss. wgpu tells of these in many ways: scopes, callbacks,
+//! panics; and of a loss nothing at all but by one callback.
+
+use std::error::Error;
+use std::fmt::Display;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::memory::NO_MORE;
+use crate::error::RenderError;
+
+/// What a device is known to suffer from; a clone is another handle to it.
+#[derive(Clone, Default)]
+pub struct Failure(Arc<Mutex<Known>>);
+
+#[derive(Default)]
+struct Known {
+    /// Why the device is gone, for good.
+    lost: Option<Fault>,
+    /// What went wrong while nobody could be told, until somebody is.
+    untold: Option<Fault>,
+}
+
+/// What went wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Fault {
+    Lost(String),
+    Memory,
+    Other(String),
+}
+
+/// What wgpu says where a driver has lost the device, and where memory ran out in a call that may not fail.
+const LOST: &str = "Device is lost";
+const NO_MEMORY: &str = "Out of memory";
+
+/// What it says where a device cannot be opened: because its driver is being reset, or for want of memory.
+const LOST_AT_OPENING: &str = "Parent device is lost";
+const NO_MEMORY_AT_OPENING: &str = "Not enough memory left.";
+
+impl Fault {
+    fn of(error: &wgpu::Error) -> Fault {
+        match error {
+            wgpu::Error::OutOfMemory { .. } => Fault::Memory,
+            other => Fault::Other(other.to_string()),
+        }
+    }
+
+    fn of_loss(reason: wgpu::DeviceLostReason, message: &str) -> Fault {
+        match (reason, message) {
+            (wgpu::DeviceLostReason::Destroyed, _) => Fault::Lost("it was given up".to_string()),
+            (_, NO_MEMORY) => Fault::Memory,
+            (_, LOST) => Fault::Lost("its driver ended it, as after a reset or a call that took too long".to_string()),
+            (_, other) => Fault::Lost(other.to_string()),
+        }
+    }
+
+    fn into_error(self, device: &str) -> RenderError {
+        let device = device.to_string();
+        match self {
+            Fault::Lost(message) => RenderError::Lost { device, message },
+            Fault::Memory => RenderError::OutOfMemory {
+                device,
+                message: NO_MORE.to_string(),
+            },
+            Fault::Other(message) => RenderError::Device { device, message },
+        }
+    }
+}
+
+impl Failure {
+    /// Hears what a device tells outside of error scopes; wgpu would panic.
+    pub fn listen(&self, device: &wgpu::Device) {
+        let (errors, losses) = (self.clone(), self.clone());
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| errors.keep(Fault::of(&error))));
+        device.set_device_lost_callback(move |reason, message| losses.lose(Fault::of_loss(reason, &message)));
+    }
+
+    fn known<T>(&self, look: impl FnOnce(&mut Known) -> T) -> T {
+        look(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn keep(&self, fault: Fault) {
+        self.known(|known| {
+            known.untold.get_or_insert(fault);
+        });
+    }
+
+    fn lose(&self, fault: Fault) {
+        self.known(|known| {
+            known.lost.get_or_insert(fault);
+        });
+    }
+
+    /// What came of calls: their value or their panic, and the first error that they raised. A loss goes before what follows
+    /// from it.
+    pub fn judge<T>(
+        &self,
+        device: &str,
+        value: Result<T, String>,
+        raised: Option<&wgpu::Error>,
+    ) -> Result<T, RenderError> {
+        let (lost, untold) = self.known(|known| (known.lost.clone(), known.untold.take()));
+        let fault = lost.or(raised.map(Fault::of)).or(untold);
+        match (fault, value) {
+            (Some(fault), _) => Err(fault.into_error(device)),
+            (None, Err(message)) => Err(Fault::Other(message).into_error(device)),
+            (None, Ok(value)) => Ok(value),
+        }
+    }
+
+    /// An error with this message; or the loss that it follows from.
+    pub fn error(&self, device: &str, message: &dyn Display) -> RenderError {
+        let lost = self.known(|known| known.lost.clone());
+        lost.unwrap_or_else(|| Fault::Other(message.to_string()))
+            .into_error(device)
+    }
+}
+
+/// Why a device could not be opened.
+pub fn error_of_opening(device: &str, error: &dyn Error) -> RenderError {
+    let says = |text: &str| {
+        let mut causes = std::iter::successors(Some(error), |error| (*error).source());
+        causes.any(|cause| cause.to_string().contains(text))
+    };
+    if says(NO_MEMORY_AT_OPENING) {
+        RenderError::OutOfMemory {
+            device: device.to_string(),
+            message: "its driver has none to open it with; the CPU has the machine's own memory".to_string(),
+        }
+    } else if says(LOST_AT_OPENING) {
+        Fault::Lost("its driver does not open it".to_string()).into_error(device)
+    } else {
+        Fault::Other(error.to_string()).into_error(device)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(result: Result<u8, RenderError>) -> String {
+        result.map_or_else(|error| error.to_string(), |value| value.to_string())
+    }
+
+    #[test]
+    fn a_loss_is_told_by_every_call_and_all_else_once() {
+        let failure = Failure::default();
+        let judge = |value: Result<u8, &str>| told(failure.judge("gpu", value.map_err(str::to_string), None));
+        assert_eq!(judge(Ok(7)), "7");
+        assert_eq!(judge(Err("a panic")), "gpu: a panic");
+        failure.keep(Fault::Other("first".to_string()));
+        failure.keep(Fault::Other("second".to_string()));
+        assert_eq!(failure.error("gpu", &"another").to_string(), "gpu: another");
+        assert_eq!(judge(Ok(7)), "gpu: first");
+        assert_eq!(judge(Ok(7)), "7");
+        failure.lose(Fault::of_loss(wgpu::DeviceLostReason::Unknown, "reset"));
+        failure.lose(Fault::of_loss(wgpu::DeviceLostReason::Destroyed, ""));
+        for value in [Ok(7), Err("a panic"), Ok(7)] {
+            assert_eq!(judge(value), "gpu: the device was lost: reset");
+        }
+        assert_eq!(
+            failure.error("gpu", &"another").to_string(),
+            "gpu: the device was lost: reset"
+        );
+    }
+
+    #[test]
+    fn want_of_memory_is_told_from_a_loss() {
+        let of = |message| Fault::of_loss(wgpu::DeviceLostReason::Unknown, message);
+        assert_eq!(of("Out of memory"), Fault::Memory);
+        assert!(matches!(of("Device is lost"), Fault::Lost(_)));
+        assert_eq!(of("anything"), Fault::Lost("anything".to_string()));
+        let error = std::io::Error::other("Not enough memory left.");
+        assert!(matches!(
+            error_of_opening("gpu", &error),
+            RenderError::OutOfMemory { .. }
+        ));
+        let error = std::io::Error::other("Parent device is lost");
+        assert!(matches!(error_of_opening("gpu", &error), RenderError::Lost { .. }));
+        let error = std::io::Error::other("a feature is missing");
+        assert!(matches!(error_of_opening("gpu", &error), RenderError::Device { .. }));
+    }
+}

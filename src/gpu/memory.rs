@@ -1,0 +1,97 @@
+//! What takes memory on a device: told where there is not enough.
+
+use crate::error::RenderError;
+
+/// What a driver that has no more memory is taken to say, until it is known what for.
+pub const NO_MORE: &str = "its driver has no more";
+
+/// What there is on a device, in bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Held {
+    /// The scene's buffers.
+    pub scene: u64,
+    /// The film.
+    pub film: u64,
+    /// Copies of parts of the film.
+    pub copies: u64,
+}
+
+/// What was asked for, and how many bytes it has.
+pub type Asked = (String, u64);
+
+impl Held {
+    /// Says in an error for want of memory what was asked for, where that is known, and what is there. Any other error, and
+    /// one that says so already, stays as it is.
+    pub fn explain(&self, error: RenderError, asked: Option<&Asked>) -> RenderError {
+        match error {
+            RenderError::OutOfMemory { device, message } if message == NO_MORE => RenderError::OutOfMemory {
+                device,
+                message: self.message(asked),
+            },
+            other => other,
+        }
+    }
+
+    fn message(&self, asked: Option<&Asked>) -> String {
+        let asked = match asked {
+            Some((what, bytes)) => format!("its driver has no {} MiB for {what}", mebibytes(*bytes)),
+            None => NO_MORE.to_string(),
+        };
+        let there = [
+            (self.scene, "for the scene"),
+            (self.film, "for the film"),
+            (self.copies, "for copies of parts of it"),
+        ];
+        let there: Vec<String> = there
+            .iter()
+            .filter(|(bytes, _)| *bytes > 0)
+            .map(|(bytes, what)| format!("{} {what}", mebibytes(*bytes)))
+            .collect();
+        let beside = match there.is_empty() {
+            true => String::new(),
+            false => format!(" beside {}", there.join(", ")),
+        };
+        format!(
+            "{asked}{beside}; a crop or a smaller picture takes less there, and the CPU has the machine's own memory"
+        )
+    }
+}
+
+/// With a digit behind the point, so that little is not nothing.
+fn mebibytes(bytes: u64) -> String {
+    format!("{:.1}", bytes as f64 / f64::from(1 << 20))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(message: &str) -> RenderError {
+        RenderError::OutOfMemory {
+            device: "gpu".to_string(),
+            message: message.to_string(),
+        }
+    }
+
+    #[test]
+    fn sizes_are_told_once() {
+        let held = Held {
+            scene: 3 << 19,
+            film: 64 << 20,
+            copies: 0,
+        };
+        let asked = ("a copy of it".to_string(), 64 << 20);
+        let told = held.explain(error(NO_MORE), Some(&asked));
+        let rest = "a crop or a smaller picture takes less there, and the CPU has the machine's own memory";
+        let line = format!(
+            "gpu: out of memory: its driver has no 64.0 MiB for a copy of it beside 1.5 for the scene, 64.0 for the \
+             film; {rest}"
+        );
+        assert_eq!(told.to_string(), line);
+        assert_eq!(held.explain(told, None).to_string(), line);
+        let unknown = Held::default().explain(error(NO_MORE), None).to_string();
+        assert_eq!(unknown, format!("gpu: out of memory: its driver has no more; {rest}"));
+        let other = RenderError::Cancelled;
+        assert!(matches!(held.explain(other, Some(&asked)), RenderError::Cancelled));
+    }
+}

@@ -1,0 +1,107 @@
+//! A camera that moves: what it is like at any frame.
+
+use glam::DVec3;
+
+use super::error::{At, Problem, SceneError};
+use super::spline::{Key, value};
+use super::{Camera, CameraDescription, CameraKeyDescription, Interpolation, Scene};
+
+/// How a scene's camera moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraPath {
+    /// What has no keys is as here.
+    still: CameraDescription,
+    interpolation: Interpolation,
+    position: Vec<Key<DVec3>>,
+    look_at: Vec<Key<DVec3>>,
+    up: Vec<Key<DVec3>>,
+    /// Field of view in degrees, or the height that is seen.
+    extent: Vec<Key<f64>>,
+    frames: (f64, f64),
+    /// The file and the line that it is in, if it is in one.
+    place: Option<(String, usize)>,
+}
+
+impl CameraPath {
+    /// The path of a camera whose keys have been checked; `None` if there is none, or it has no keys.
+    pub(super) fn of(camera: &CameraDescription) -> Option<CameraPath> {
+        let path = camera.path()?;
+        let (first, last) = (path.keys.first()?, path.keys.last()?);
+        let extent = |key: &CameraKeyDescription| match camera {
+            CameraDescription::Perspective(_) => key.fov,
+            CameraDescription::Orthographic(_) => key.height,
+        };
+        Some(CameraPath {
+            still: camera.clone().with_path(None),
+            interpolation: path.interpolation,
+            position: keys(&path.keys, |key| key.position),
+            look_at: keys(&path.keys, |key| key.look_at),
+            up: keys(&path.keys, |key| key.up),
+            extent: keys(&path.keys, extent),
+            frames: (first.frame, last.frame),
+            place: None,
+        })
+    }
+
+    /// The frames of the first and of the last key. Before and after these the camera stands.
+    pub fn frames(&self) -> (f64, f64) {
+        self.frames
+    }
+
+    /// Says where it is in a file, for messages.
+    pub(super) fn set_place(&mut self, origin: &str, line: usize) {
+        self.place = Some((origin.to_owned(), line));
+    }
+
+    /// The camera at a frame, not checked.
+    fn description(&self, frame: f64) -> CameraDescription {
+        let mut camera = self.still.clone();
+        let (position, look_at, up, extent) = match &mut camera {
+            CameraDescription::Perspective(c) => (&mut c.position, &mut c.look_at, &mut c.up, &mut c.fov),
+            CameraDescription::Orthographic(c) => (&mut c.position, &mut c.look_at, &mut c.up, &mut c.height),
+        };
+        for (target, keys) in [(position, &self.position), (look_at, &self.look_at), (up, &self.up)] {
+            *target = value(keys, frame, self.interpolation).unwrap_or(*target);
+        }
+        *extent = value(&self.extent, frame, self.interpolation).unwrap_or(*extent);
+        camera
+    }
+
+    /// The camera at a frame. The key of a problem is below `camera`.
+    pub(super) fn at(&self, frame: f64) -> Result<Camera, Problem> {
+        let camera = self.description(frame).validate();
+        camera.map_err(|problem| Problem::new(format!("at frame {frame}, {problem}")).at("path"))
+    }
+}
+
+fn keys<T>(keys: &[CameraKeyDescription], value: impl Fn(&CameraKeyDescription) -> Option<T>) -> Vec<Key<T>> {
+    let of = |key: &CameraKeyDescription| Some((key.frame, value(key)?));
+    keys.iter().filter_map(of).collect()
+}
+
+impl Scene {
+    /// The camera at a frame: [`Scene::camera`] if it does not move. Frames may be fractions, and lie outside of the path.
+    ///
+    /// # Errors
+    ///
+    /// A camera that has no view there, such as one whose way leads through what it looks at, and a frame that is not finite.
+    pub fn camera_at(&self, frame: f64) -> Result<Camera, SceneError> {
+        let Some(path) = &self.camera_path else {
+            return Ok(self.camera);
+        };
+        if !frame.is_finite() {
+            return Err(SceneError::Override(Problem::of(
+                "frame",
+                format!("{frame} must be finite"),
+            )));
+        }
+        path.at(frame).map_err(|problem| match &path.place {
+            Some((origin, line)) => SceneError::Invalid {
+                origin: origin.clone(),
+                line: *line,
+                problem: problem.at("camera"),
+            },
+            None => SceneError::Override(problem.at("camera").at("frame")),
+        })
+    }
+}

@@ -1,0 +1,203 @@
+//! Values between keys: straight from one to the next, or on a curve with a continuous first derivative.
+//!
+//! All is sums, products and quotients of 64-bit floats, so that every machine gets the same bits.
+
+use std::ops::{Add, Mul, Sub};
+
+use super::Interpolation;
+
+/// What keys have: a number or a point.
+pub trait Point:
+    Copy + PartialEq + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self>
+{
+}
+
+impl<T: Copy + PartialEq + Default + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>> Point for T {}
+
+/// A key: when, and what.
+pub type Key<T> = (f64, T);
+
+/// The value at a time, of keys whose times ascend; `None` without keys. At a key it is the key's own, and outside of all
+/// that of the nearest.
+pub fn value<T: Point>(keys: &[Key<T>], at: f64, interpolation: Interpolation) -> Option<T> {
+    let next = keys.partition_point(|(time, _)| *time <= at);
+    let (Some(&a), Some(&b)) = (
+        keys.get(next.saturating_sub(1)),
+        keys.get(next.min(keys.len().saturating_sub(1))),
+    ) else {
+        return None;
+    };
+    let (span, step) = (b.0 - a.0, b.1 - a.1);
+    if !(span > 0.0) || at <= a.0 {
+        return Some(a.1); // before the first key, after the last, or at one
+    }
+    let s = (at - a.0) / span;
+    let (start, end) = match interpolation {
+        Interpolation::Linear => return Some(a.1 + step * s),
+        Interpolation::Smooth => (slope(keys, next - 1), slope(keys, next)),
+    };
+    // The cubic with these values and slopes at its ends (Hermite), as the straight way and what is beside it.
+    let rest = 1.0 - s;
+    Some(a.1 + step * (s * s * (3.0 - 2.0 * s)) + (start * rest - end * s) * (span * s * rest))
+}
+
+/// The derivative of the smooth curve at a key: that of the straight way from the key before to the key after (E. Catmull and R.
+/// Rom, "A Class of Local Interpolating Splines", 1974, for any distances of keys in time). At the ends it is what makes the
+/// first and the last piece parabolas. Where two keys in a row have the same value nothing moves between them: the slope is 0.
+fn slope<T: Point>(keys: &[Key<T>], i: usize) -> T {
+    let before = i.checked_sub(1).and_then(|i| keys.get(i));
+    let after = keys.get(i + 1);
+    let Some(key) = keys.get(i) else {
+        return T::default();
+    };
+    if [before, after].into_iter().flatten().any(|other| other.1 == key.1) {
+        return T::default();
+    }
+    match (before, after) {
+        (Some(before), Some(after)) => secant(before, after),
+        // A parabola's mean slope between two points is the mean of those at them.
+        (None, Some(after)) if keys.len() > 2 => secant(key, after) * 2.0 - slope(keys, i + 1),
+        (Some(before), None) if keys.len() > 2 => secant(before, key) * 2.0 - slope(keys, i - 1),
+        (None, Some(after)) => secant(key, after),
+        (Some(before), None) => secant(before, key),
+        (None, None) => T::default(),
+    }
+}
+
+fn secant<T: Point>(a: &Key<T>, b: &Key<T>) -> T {
+    (b.1 - a.1) * (1.0 / (b.0 - a.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    const WAYS: [Interpolation; 2] = [Interpolation::Linear, Interpolation::Smooth];
+    /// Times and values without any order, but that the times ascend.
+    const KEYS: [Key<f64>; 6] = [
+        (-2.0, 3.0),
+        (0.5, -1.0),
+        (1.0, 2.5),
+        (4.0, 2.0),
+        (10.0, -7.0),
+        (10.25, -6.5),
+    ];
+
+    fn near(a: f64, b: f64) -> bool {
+        (a - b).abs() <= 1e-12 * (1.0 + b.abs())
+    }
+
+    #[test]
+    fn keys_are_met_and_held() {
+        for way in WAYS {
+            for (time, wanted) in KEYS {
+                assert_eq!(value(&KEYS, time, way), Some(wanted));
+            }
+            for (time, wanted) in [(-2.5, 3.0), (-1e300, 3.0), (10.26, -6.5), (1e300, -6.5)] {
+                assert_eq!(value(&KEYS, time, way), Some(wanted));
+            }
+            assert_eq!(value(&KEYS[2..3], 7.0, way), Some(2.5));
+            assert_eq!(value::<f64>(&[], 7.0, way), None);
+        }
+    }
+
+    #[test]
+    fn a_linear_way_is_straight() {
+        for (time, wanted) in [(-0.75, 1.0), (0.75, 0.75), (2.5, 2.25), (5.5, -0.25)] {
+            assert_eq!(value(&KEYS, time, Interpolation::Linear), Some(wanted));
+            assert_ne!(value(&KEYS, time, Interpolation::Smooth), Some(wanted));
+        }
+        let points = [(0.0, DVec3::new(0.0, 2.0, -4.0)), (8.0, DVec3::new(4.0, 2.0, 4.0))];
+        for way in WAYS {
+            assert_eq!(value(&points, 2.0, way), Some(DVec3::new(1.0, 2.0, -2.0)));
+        }
+    }
+
+    /// What moves evenly, at keys at any times; what falls, at keys at equal times.
+    #[test]
+    fn constant_speeds_and_accelerations_stay() {
+        let line = |t: f64| DVec3::new(3.0 - 2.0 * t, t, 0.5);
+        let uneven = [0.0, 1.0, 1.5, 4.0, 9.0].map(|t| (t, line(t)));
+        let fall = |t: f64| DVec3::new(t, 0.0, 7.0 - 4.9 * t * t);
+        let even = [0.0, 2.0, 4.0, 6.0].map(|t| (t, fall(t)));
+        let mut straightened = 0.0_f64;
+        for i in 0..=90 {
+            let t = f64::from(i) / 10.0;
+            for way in WAYS {
+                let found = value(&uneven, t, way).unwrap();
+                assert!(found.abs_diff_eq(line(t), 1e-12), "{t}: {found}");
+            }
+            if t <= 6.0 {
+                let found = value(&even, t, Interpolation::Smooth).unwrap();
+                assert!(found.abs_diff_eq(fall(t), 1e-12), "{t}: {found}");
+                let found = value(&even, t, Interpolation::Linear).unwrap();
+                straightened = straightened.max(found.distance(fall(t)));
+            }
+        }
+        assert!(straightened > 1.0, "no linear way falls so");
+    }
+
+    /// By SciPy 1.17: `CubicHermiteSpline(t, v, m)` with `m[1:-1] = (v[2:] - v[:-2]) / (t[2:] - t[:-2])`, and at the ends twice
+    /// the difference quotient less the neighbour's `m`.
+    #[test]
+    fn a_smooth_way_is_that_of_another_implementation() {
+        for (time, wanted) in [
+            (-1.75, 2.2775),
+            (-0.5, -0.26000000000000045),
+            (0.625, -0.4849330357142856),
+            (0.9, 2.0784761904761915),
+            (2.0, 2.9858906525573197),
+            (3.5, 2.4630731922398583),
+            (7.25, -2.684526427469136),
+            (10.125, -6.96),
+        ] {
+            let found = value(&KEYS, time, Interpolation::Smooth).unwrap();
+            assert!(near(found, wanted), "{time}: {found} {wanted}");
+        }
+    }
+
+    /// The speeds just before and just after each key.
+    fn speeds(way: Interpolation) -> Vec<(f64, f64)> {
+        let at = |time| value(&KEYS, time, way).unwrap();
+        let step = 1e-6;
+        let inner = &KEYS[1..5];
+        let pairs = inner
+            .iter()
+            .map(|(t, v)| ((v - at(t - step)) / step, (at(t + step) - v) / step));
+        pairs.collect()
+    }
+
+    #[test]
+    fn the_speed_of_a_smooth_way_does_not_jump() {
+        let jumps = |way| speeds(way).into_iter().map(|(a, b)| (a - b).abs());
+        assert!(jumps(Interpolation::Smooth).all(|jump| jump < 1e-3));
+        assert!(jumps(Interpolation::Linear).all(|jump| jump > 1.0));
+    }
+
+    #[test]
+    fn between_keys_of_one_value_nothing_moves() {
+        let keys = [(0.0, 1.0), (4.0, 3.0), (6.0, 3.0), (9.0, -2.0)];
+        for i in 0..=20 {
+            assert_eq!(
+                value(&keys, 4.0 + f64::from(i) / 10.0, Interpolation::Smooth),
+                Some(3.0)
+            );
+        }
+        // Nor does it swing beyond on the way there.
+        for i in 0..=40 {
+            assert!(value(&keys, f64::from(i) / 10.0, Interpolation::Smooth).unwrap() <= 3.0);
+        }
+    }
+
+    #[test]
+    fn extreme_keys_give_finite_values() {
+        let keys = [(-1e9, -1e9), (-1e9 + 1e-6, 1e9), (0.0, -1e9), (1e-6, 1e9), (1e9, -1e9)];
+        for way in WAYS {
+            for time in [-1e9 + 5e-7, -0.5e9, 5e-7, 1.0, 1e8, 0.999e9] {
+                assert!(value(&keys, time, way).unwrap().is_finite(), "{time}");
+            }
+        }
+    }
+}

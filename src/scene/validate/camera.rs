@@ -1,0 +1,339 @@
+//! The rules of a camera, and of its path.
+
+use super::{Checked, FLATTEST, LENGTHS, between, check, length, number, point, show, unit};
+use crate::scene::camera_path::CameraPath;
+use crate::scene::error::{At, Problem};
+use crate::scene::{Camera, CameraDescription, CameraKeyDescription, Projection};
+
+/// The first and the last frame that a key may be at.
+const FRAMES: (f64, f64) = (-1e9, 1e9);
+/// How far apart keys must be at least, in frames: slopes between them stay finite.
+const CLOSEST: f64 = 1e-6;
+/// Vertical fields of view, in degrees.
+const FOVS: (f64, f64) = (0.001, 179.999);
+
+impl CameraDescription {
+    /// Checks a camera by itself, as it stands; its path is checked with the scene.
+    ///
+    /// # Errors
+    ///
+    /// The first value that breaks a rule.
+    pub fn validate(&self) -> Result<Camera, Problem> {
+        camera(self)
+    }
+}
+
+fn camera(description: &CameraDescription) -> Checked<Camera> {
+    let (position, look_at, up, projection) = match description {
+        CameraDescription::Perspective(camera) => {
+            length(camera.focal_length).at("focal_length")?;
+            let fov = between(camera.fov, FOVS.0, FOVS.1).at("fov")?.to_radians();
+            (
+                camera.position,
+                camera.look_at,
+                camera.up,
+                Projection::Perspective { fov },
+            )
+        }
+        CameraDescription::Orthographic(camera) => {
+            let height = length(camera.height).at("height")?;
+            (
+                camera.position,
+                camera.look_at,
+                camera.up,
+                Projection::Orthographic { height },
+            )
+        }
+    };
+    point(position).at("position")?;
+    point(look_at).at("look_at")?;
+    let up = unit(up).at("up")?;
+    let forward = look_at - position;
+    check(forward.length() >= LENGTHS.0, || {
+        format!("{} must not be the camera's position", show(look_at))
+    })
+    .at("look_at")?;
+    let forward = forward.normalize();
+    let right = forward.cross(up);
+    check(right.length() > FLATTEST, || {
+        let (look_at, up) = (show(look_at), show(up));
+        format!("{look_at} must not lie on the line through the position along up, {up}")
+    })
+    .at("look_at")?;
+    let right = right.normalize();
+    Ok(Camera {
+        position,
+        look_at,
+        right,
+        up: right.cross(forward),
+        forward,
+        projection,
+    })
+}
+
+/// Checks a camera and its path, if it has one: each key by itself, the camera as it stands, and the camera at all keys.
+pub(super) fn with_path(camera: &CameraDescription) -> Checked<(Camera, Option<CameraPath>)> {
+    let Some(path) = camera.path() else {
+        return Ok((camera.validate()?, None));
+    };
+    let checked = || -> Checked<()> {
+        check(!path.keys.is_empty(), || "[] must have at least one key".to_owned())?;
+        let mut before = None;
+        for (i, description) in path.keys.iter().enumerate() {
+            key(description, camera, before).at(i)?;
+            before = Some(description.frame);
+        }
+        Ok(())
+    };
+    // First, as the camera may have its values from them.
+    checked().at("keys").at("path")?;
+    let still = camera.validate()?;
+    let moving = CameraPath::of(camera);
+    if let Some(moving) = &moving {
+        for key in &path.keys {
+            moving.at(key.frame)?;
+        }
+    }
+    Ok((still, moving))
+}
+
+/// Checks a key by itself, and that it is behind the one before.
+fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f64>) -> Checked<()> {
+    let CameraKeyDescription {
+        frame,
+        position,
+        look_at,
+        up,
+        fov,
+        height,
+    } = *key;
+    between(frame, FRAMES.0, FRAMES.1).at("frame")?;
+    if let Some(before) = before {
+        check(frame - before >= CLOSEST, || {
+            let (frame, before, least) = (number(frame), number(before), number(CLOSEST));
+            format!("{frame} must be greater than that of the key before, {before}, by {least} at least")
+        })
+        .at("frame")?;
+    }
+    let (extent, other, other_is_there) = match camera {
+        CameraDescription::Perspective(_) => ("fov", "height", height.is_some()),
+        CameraDescription::Orthographic(_) => ("height", "fov", fov.is_some()),
+    };
+    check(!other_is_there, || {
+        format!("must not be here: a camera of this type has {extent:?}")
+    })
+    .at(other)?;
+    position.map(point).transpose().at("position")?;
+    look_at.map(point).transpose().at("look_at")?;
+    up.map(unit).transpose().at("up")?;
+    let fov = fov.map(|fov| between(fov, FOVS.0, FOVS.1)).transpose().at("fov")?;
+    let height = height.map(length).transpose().at("height")?;
+    let points = [position, look_at, up];
+    check(points.iter().any(Option::is_some) || fov.or(height).is_some(), || {
+        format!("must have \"position\", \"look_at\", \"up\" or {extent:?}")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use crate::scene::{
+        CameraKeyDescription, CameraPathDescription, Description, Interpolation, Overrides, PerspectiveDescription,
+        Projection, Scene, SceneError,
+    };
+
+    /// A scene whose camera has these lines; the first of them is line 2.
+    fn scene(camera: &str) -> Result<Scene, SceneError> {
+        let text = format!("image = {{ width = 4, height = 4 }}\n{camera}");
+        Scene::parse(&text, "s.toml")
+    }
+
+    const STILL: &str = "[camera]\nposition = [0, -4, 0]\nlook_at = [0, 0, 0]\nfov = 40\n";
+
+    #[test]
+    fn each_value_goes_through_the_keys_that_have_it() {
+        let scene = scene(&format!(
+            "{STILL}[camera.path]\nkeys = [{{ frame = 1, position = [2, -4, 0] }}, {{ frame = 2, fov = 20 }}, \
+             {{ frame = 5, position = [4, -8, 4], fov = 50 }}, {{ frame = 6, up = [1, 0, 0] }}]"
+        ))
+        .unwrap();
+        assert_eq!(
+            scene.camera.position,
+            DVec3::new(0.0, -4.0, 0.0),
+            "what it says itself stays"
+        );
+        assert_eq!(scene.camera_path.as_ref().unwrap().frames(), (1.0, 6.0));
+        for (frame, position, fov) in [
+            (-7.0, [2.0, -4.0, 0.0], 20.0),
+            (1.0, [2.0, -4.0, 0.0], 20.0),
+            (3.0, [3.0, -6.0, 2.0], 30.0),
+            (4.5, [3.75, -7.5, 3.5], 45.0_f64),
+            (5.0, [4.0, -8.0, 4.0], 50.0),
+            (9.0, [4.0, -8.0, 4.0], 50.0),
+        ] {
+            let camera = scene.camera_at(frame).unwrap();
+            assert_eq!(camera.position, DVec3::from(position), "{frame}");
+            assert_eq!(camera.look_at, DVec3::ZERO);
+            let Projection::Perspective { fov: found } = camera.projection else {
+                panic!("another projection");
+            };
+            assert!((found - fov.to_radians()).abs() < 1e-14, "{frame}: {found}");
+            // One key has it: it is so everywhere.
+            assert!(camera.up.x > 0.5, "{frame}: {}", camera.up);
+        }
+    }
+
+    #[test]
+    fn without_a_frame_the_camera_is_that_of_the_first_keys() {
+        let path = "[camera.path]\ninterpolation = 'smooth'\nkeys = [{ frame = 3, look_at = [1, 0, 0] }, \
+                    { frame = 4, position = [0, -4, 2], fov = 30, look_at = [2, 0, 0] }]\n";
+        let by_itself = scene(path).unwrap();
+        assert_eq!(by_itself.camera, by_itself.camera_at(3.0).unwrap());
+        assert_eq!(by_itself.camera.look_at, DVec3::X);
+        let partly = scene(&format!("[camera]\nfov = 60\n{path}")).unwrap();
+        assert_eq!(
+            partly.camera.projection,
+            Projection::Perspective {
+                fov: 60_f64.to_radians()
+            }
+        );
+        assert_eq!(partly.camera_at(0.0).unwrap(), by_itself.camera);
+        let parallel = "[camera]\ntype = 'orthographic'\n[[camera.path.keys]]\nframe = 0\nposition = [0, -1, 0]\n\
+                        look_at = [0, 0, 0]\nheight = 2\n[[camera.path.keys]]\nframe = 1\nheight = 4\n";
+        let parallel = scene(parallel).unwrap();
+        assert_eq!(parallel.camera.projection, Projection::Orthographic { height: 2.0 });
+        let half = parallel.camera_at(0.5).unwrap();
+        assert_eq!(half.projection, Projection::Orthographic { height: 3.0 });
+    }
+
+    #[test]
+    fn an_override_chooses_the_frame() {
+        let text = format!(
+            "image = {{ width = 4, height = 4 }}\n{STILL}path.keys = [{{ frame = 1, position = [0, -4, 0] }}, {{ frame = 3, \
+             position = [0, 4, 0] }}]"
+        );
+        let at = |frame| {
+            let overrides = Overrides {
+                frame,
+                ..Overrides::default()
+            };
+            Scene::parse_with(&text, "s.toml", &overrides)
+        };
+        assert_eq!(at(Some(1.5)).unwrap().camera.position, DVec3::new(0.0, -2.0, 0.0));
+        assert_eq!(at(None).unwrap().camera.position, DVec3::new(0.0, -4.0, 0.0));
+        let told = "s.toml:6: camera.path: at frame 2, look_at: [0, 0, 0] must not be the camera's position";
+        assert_eq!(at(Some(2.0)).unwrap_err().to_string(), told);
+        for frame in [f64::NAN, f64::INFINITY] {
+            let told = at(Some(frame)).unwrap_err().to_string();
+            assert_eq!(told, format!("frame: {frame} must be finite"));
+        }
+        // One that is built in code has no line.
+        let keys = [[0.0, -4.0, 0.0], [0.0, 4.0, 0.0]].map(|position| CameraKeyDescription {
+            position: Some(position.into()),
+            ..CameraKeyDescription::new(position[1])
+        });
+        let mut camera = PerspectiveDescription::new([1.0, 0.0, 0.0], [0.0, 0.0, 0.0], 40.0);
+        camera.path = Some(CameraPathDescription::new(Interpolation::Linear, keys));
+        let built = Description::new(4, 4, camera).validate().unwrap();
+        assert_eq!(built.camera.position, DVec3::X);
+        assert_eq!(built.camera_at(-1.0).unwrap().position, DVec3::NEG_Y);
+        let told = built.camera_at(0.0).unwrap_err().to_string();
+        assert!(told.starts_with("frame.camera.path: at frame 0, look_at: "), "{told}");
+    }
+
+    #[test]
+    fn bad_keys_are_told_with_place_and_rule() {
+        let start = "[camera.path]\nkeys = [\n{ frame = 1, position = [0, -4, 0] },\n";
+        for (path, told) in [
+            (
+                "[camera.path]\nkeys = []".to_owned(),
+                "7: camera.path.keys: [] must have at least one key",
+            ),
+            ("[camera.path]".to_owned(), "6: camera.path.keys: is missing"),
+            ("path = 3".to_owned(), "6: camera.path: 3 must be a table"),
+            (
+                "path = { keys = [3] }".to_owned(),
+                "6: camera.path.keys[0]: 3 must be a table",
+            ),
+            (
+                "path = { interpolation = 'spline', keys = [] }".to_owned(),
+                "6: camera.path.interpolation: \"spline\" must be \"linear\" or \"smooth\"",
+            ),
+            (
+                format!("{start}{{ fov = 4 }}]"),
+                "9: camera.path.keys[1].frame: is missing",
+            ),
+            (
+                format!("{start}{{ frame = 2 }}]"),
+                "9: camera.path.keys[1]: must have \"position\", \"look_at\", \"up\" or \"fov\"",
+            ),
+            (
+                format!("{start}{{ frame = 1, fov = 4 }}]"),
+                "9: camera.path.keys[1].frame: 1 must be greater than that of the key before, 1, by 1e-6 at least",
+            ),
+            (
+                format!("{start}{{ frame = 0.5, fov = 4 }}]"),
+                "9: camera.path.keys[1].frame: 0.5 must be greater than that of the key before, 1, by 1e-6",
+            ),
+            (
+                format!("{start}{{ frame = 2e9, fov = 4 }}]"),
+                "9: camera.path.keys[1].frame: 2e9 must be from -1e9 to 1e9",
+            ),
+            (
+                format!("{start}{{ frame = nan, fov = 4 }}]"),
+                "9: camera.path.keys[1].frame: nan must be from -1e9 to 1e9",
+            ),
+            (
+                format!("{start}{{ frame = 2, fov = 180 }}]"),
+                "9: camera.path.keys[1].fov: 180 must be from 0.001 to 179.999",
+            ),
+            (
+                format!("{start}{{ frame = 2, height = 1 }}]"),
+                "9: camera.path.keys[1].height: must not be here: a camera of this type has \"fov\"",
+            ),
+            (
+                format!("{start}{{ frame = 2, position = [0, 2e9, 0] }}]"),
+                "9: camera.path.keys[1].position: 2e9 must be finite",
+            ),
+            (
+                format!("{start}{{ frame = 2, up = [0, 0, 0] }}]"),
+                "9: camera.path.keys[1].up: [0, 0, 0] must not be zero",
+            ),
+            (
+                format!("{start}{{ frame = 2, look_at = [0, 0] }}]"),
+                "9: camera.path.keys[1].look_at: [0, 0] must be a list of 3 numbers",
+            ),
+            (
+                format!("{start}{{ frame = 2, speed = 1 }}]"),
+                "9: camera.path.keys[1].speed: unknown key; the keys here are \"frame\", \"position\", \"look_at\", \"up\"",
+            ),
+            (
+                format!("{start}{{ frame = 2, position = [0, 0, 4] }}]"),
+                "6: camera.path: at frame 2, look_at: [0, 0, 0] must not lie on the line through the position along up",
+            ),
+        ] {
+            let message = scene(&format!("{STILL}{path}")).unwrap_err().to_string();
+            assert!(message.starts_with(&format!("s.toml:{told}")), "{message}\n{told}");
+        }
+        let parallel = "[camera]\ntype = 'orthographic'\nposition = [0, -4, 0]\nlook_at = [0, 0, 0]\nheight = 1\n\
+                        path.keys = [{ frame = 1, fov = 40 }]";
+        let told = "s.toml:7: camera.path.keys[0].fov: must not be here: a camera of this type has \"height\"";
+        assert_eq!(scene(parallel).unwrap_err().to_string(), told);
+        let closest = format!("{start}{{ frame = 1.000002, fov = 4 }}]");
+        scene(&format!("{STILL}{closest}")).unwrap();
+    }
+
+    #[test]
+    fn a_description_with_a_path_reads_back() {
+        let path = "[[camera.path.keys]]\nframe = 1.5\nup = [0, 1, 1]\n[[camera.path.keys]]\nframe = 3\nfov = 7.5\n";
+        let text = format!("image = {{ width = 4, height = 4 }}\n{STILL}path.interpolation = 'smooth'\n{path}");
+        let description = Description::parse(&text, "s.toml").unwrap();
+        let written = toml::to_string(&description).unwrap();
+        assert_eq!(
+            Description::parse(&written, "s.toml").unwrap(),
+            description,
+            "{written}"
+        );
+    }
+}

@@ -1,0 +1,715 @@
+//! `wgray diff`: every exit code, every option, and the ends.
+
+use std::fs;
+
+use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Layer, LayerAttributes, SmallVec, WritableImage as _, f16};
+use exr::prelude::{Encoding, Image};
+
+use super::{Place, Ran};
+
+/// Writes a PNG of 8 bits; the number of values tells its colours.
+fn png(place: &Place, name: &str, (width, height): (u32, u32), values: &[u8]) {
+    let color = match values.len() / (width * height) as usize {
+        1 => png::ColorType::Grayscale,
+        2 => png::ColorType::GrayscaleAlpha,
+        3 => png::ColorType::Rgb,
+        _ => png::ColorType::Rgba,
+    };
+    write_png(place, name, (width, height), color, png::BitDepth::Eight, values);
+}
+
+fn write_png(place: &Place, name: &str, size: (u32, u32), color: png::ColorType, depth: png::BitDepth, values: &[u8]) {
+    let file = fs::File::create(place.path(name)).unwrap();
+    let mut encoder = png::Encoder::new(file, size.0, size.1);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    if color == png::ColorType::Indexed {
+        encoder.set_palette(vec![10, 20, 30, 200, 100, 0]);
+    }
+    encoder.write_header().unwrap().write_image_data(values).unwrap();
+}
+
+/// Writes an EXR of these channels.
+fn exr(place: &Place, name: &str, size: (usize, usize), channels: Vec<(&str, FlatSamples)>) {
+    exr_parts(place, name, size, vec![("part", channels)], Encoding::FAST_LOSSLESS);
+}
+
+fn exr_parts(
+    place: &Place,
+    name: &str,
+    size: (usize, usize),
+    parts: Vec<(&str, Vec<(&str, FlatSamples)>)>,
+    encoding: Encoding,
+) {
+    let layer = |(part, channels): (&str, Vec<(&str, FlatSamples)>)| {
+        let list: SmallVec<[AnyChannel<FlatSamples>; 4]> = channels
+            .into_iter()
+            .map(|(name, samples)| AnyChannel::new(name, samples))
+            .collect();
+        Layer::new(size, LayerAttributes::named(part), encoding, AnyChannels::sort(list))
+    };
+    let layers: Vec<_> = parts.into_iter().map(layer).collect();
+    let attributes = exr::prelude::ImageAttributes::new(exr::prelude::IntegerBounds::from_dimensions(size));
+    let image = Image {
+        attributes,
+        layer_data: layers.into_iter().collect::<exr::prelude::Layers<_>>(),
+    };
+    image.write().to_file(place.path(name)).unwrap();
+}
+
+fn floats(values: &[f32]) -> FlatSamples {
+    FlatSamples::F32(values.to_vec())
+}
+
+/// Red, green and blue of the same values.
+fn gray(values: &[f32]) -> Vec<(&'static str, FlatSamples)> {
+    ["R", "G", "B"].into_iter().map(|name| (name, floats(values))).collect()
+}
+
+/// Two pictures of 4 x 2 pixels, of which one value is 10 steps apart.
+fn two(place: &Place) -> (Vec<u8>, Vec<u8>) {
+    let a: Vec<u8> = (0..24).map(|i| i * 9).collect();
+    let mut b = a.clone();
+    b[16] += 10; // the pixel (1, 1), green
+    png(place, "a.png", (4, 2), &a);
+    png(place, "b.png", (4, 2), &b);
+    (a, b)
+}
+
+#[track_caller]
+fn says(ran: &Ran, code: i32, text: &str) {
+    assert_eq!(ran.code, code, "{}{}", ran.stdout, ran.stderr);
+    let said = if [0, 5].contains(&code) {
+        &ran.stdout
+    } else {
+        &ran.stderr
+    };
+    assert!(said.contains(text), "'{text}' is not in: {said}");
+}
+
+fn json(ran: &Ran) -> serde_json::Value {
+    assert_eq!(ran.stderr, "");
+    serde_json::from_str(&ran.stdout).unwrap_or_else(|error| panic!("{error}: {}", ran.stdout))
+}
+
+#[test]
+fn the_same_bits_pass_and_any_other_bit_fails() {
+    let place = Place::new();
+    let (a, _) = two(&place);
+    png(&place, "copy.png", (4, 2), &a);
+    for other in ["a.png", "copy.png"] {
+        let ran = place.run(&["diff", "a.png", other]);
+        says(&ran, 0, "color R G B: the same bits\nthe same\n");
+    }
+    let ran = place.run(&["diff", "a.png", "b.png"]);
+    says(&ran, 5, "fails: color: 1 pixel has other bits\n");
+    says(&ran, 5, "  different  1 of 8 pixels, the first at (1, 1)\n");
+    says(
+        &ran,
+        5,
+        "  largest    0.0392157 in G at (1, 1): 0.564706, not 0.603922\n",
+    );
+    // (10 / 255)² / 24 values
+    says(&ran, 5, "  rmse       0.00800487\n");
+    assert_eq!((ran.stderr.as_str(), place.files().len()), ("", 3));
+}
+
+#[test]
+fn json_has_the_same_names() {
+    let place = Place::new();
+    two(&place);
+    let ran = place.run(&["diff", "a.png", "b.png", "--json"]);
+    assert_eq!(ran.code, 5);
+    let found = json(&ran);
+    assert_eq!(found["passes"], false);
+    assert_eq!(found["size_a"], serde_json::json!([4, 2]));
+    let layer = &found["layers"][0];
+    assert_eq!((&layer["name"], &layer["different"]), (&"color".into(), &1.into()));
+    assert_eq!(layer["channels"], serde_json::json!(["R", "G", "B"]));
+    assert_eq!(layer["first"], serde_json::json!({"x": 1, "y": 1}));
+    assert_eq!(layer["largest_at"]["channel"], "G");
+    let text = place.run(&["diff", "a.png", "b.png"]).stdout;
+    for metric in [
+        "different",
+        "largest",
+        "share",
+        "rmse",
+        "rel_mse",
+        "psnr",
+        "ssim",
+        "flip",
+    ] {
+        assert!(layer[metric].is_number(), "{metric}");
+        assert!(text.contains(&format!("\n  {metric:<9}  ")), "{metric}");
+    }
+    // what JSON has no number for
+    let same = json(&place.run(&["diff", "a.png", "a.png", "--json"]));
+    assert_eq!(
+        (&same["passes"], &same["layers"][0]["psnr"]),
+        (&true.into(), &"inf".into())
+    );
+    assert_eq!(
+        (&same["layers"][0]["flip"], &same["layers"][0]["ssim"]),
+        (&0.0.into(), &1.0.into())
+    );
+}
+
+#[test]
+fn limits_say_what_is_too_much() {
+    let place = Place::new();
+    two(&place);
+    let passes = |limits: &[&str]| {
+        let options: Vec<&str> = limits.iter().flat_map(|limit| ["--fail", limit]).collect();
+        let ran = place.run(&[&["diff", "a.png", "b.png"], &options[..]].concat());
+        assert!([0, 5].contains(&ran.code), "{}", ran.stderr);
+        (ran.code == 0, ran.stdout)
+    };
+    for (good, bad) in [
+        ("different=1", "different=0"),
+        ("largest=0.0393", "largest=0.0392"),
+        ("share=0.125", "share=0.12"),
+        ("rmse=0.00801", "rmse=0.008"),
+        ("rel_mse=1", "rel_mse=0"),
+        ("psnr=41.9", "psnr=42"),
+        ("ssim=0.9", "ssim=1"),
+        ("flip=0.2", "flip=0"),
+    ] {
+        assert!(passes(&[good]).0, "{good}");
+        let (passed, text) = passes(&[bad]);
+        let (metric, limit) = bad.split_once('=').unwrap();
+        let word = if ["psnr", "ssim"].contains(&metric) {
+            "below"
+        } else {
+            "above"
+        };
+        assert!(!passed && text.contains(&format!("fails: color: {metric} ")), "{text}");
+        assert!(text.contains(&format!(" is {word} {limit}\n")), "{text}");
+        // one limit that is kept does not make up for one that is not
+        assert!(!passes(&[good, bad]).0 && !passes(&[bad, good]).0, "{bad}");
+    }
+    assert!(passes(&["rmse=0.1", "psnr=20", "flip=0.5"]).0);
+}
+
+#[test]
+fn wrong_command_lines_exit_with_2() {
+    let place = Place::new();
+    two(&place);
+    exr(&place, "depth.exr", (2, 1), vec![("depth.Z", floats(&[1.0, 2.0]))]);
+    let metrics = "different, largest, share, rmse, rel_mse, psnr, ssim, flip";
+    let cases: [(&[&str], &str); 17] = [
+        (&["a.png"], "<B>"),
+        (&["a.png", "b.png", "a.png"], "unexpected argument"),
+        (&["-", "-"], "only one of the pictures may be standard input"),
+        (&["a.png", "b.png", "--fail", "mse=1"], metrics),
+        (&["a.png", "b.png", "--fail", "rmse"], "must be METRIC=X"),
+        (
+            &["a.png", "b.png", "--fail", "rmse=-1"],
+            "rmse must be a number of 0 or more",
+        ),
+        (
+            &["a.png", "b.png", "--fail", "ssim=NaN"],
+            "ssim must be a number from -1 to 1",
+        ),
+        (&["a.png", "b.png", "--metrics", "rmse,mse"], metrics),
+        (
+            &["a.png", "b.png", "--threshold", "-1"],
+            "must be a number of 0 or more",
+        ),
+        (&["a.png", "b.png", "--ppd", "0"], "must be a number from 1 to 1000"),
+        (
+            &["a.png", "b.png", "--layers", "normal"],
+            "--layers: normal: must be a layer of the pictures: color",
+        ),
+        (
+            &["a.png", "b.png", "--out", "a.png"],
+            "--out: a.png: is the picture a.png, which must stay",
+        ),
+        (
+            &["a.png", "b.png", "--out", "./b.png"],
+            "is the picture b.png, which must stay",
+        ),
+        (&["a.png", "b.png", "--out", "c.jpg"], "--out: c.jpg: must end in .png"),
+        (&["a.png", "b.png", "--out", "-"], "standard output gets the figures"),
+        (&["depth.exr", "depth.exr", "--fail", "flip=0"], "flip: needs colours"),
+        (&["depth.exr", "depth.exr", "--metrics", "ssim"], "ssim: needs colours"),
+    ];
+    for (arguments, message) in cases {
+        let ran = place.run(&[&["diff"], arguments].concat());
+        says(&ran, 2, message);
+        assert_eq!(ran.stdout, "", "{arguments:?}");
+    }
+    assert_eq!(place.files(), ["a.png", "b.png", "depth.exr"]);
+}
+
+#[test]
+fn what_is_no_picture_exits_with_1() {
+    let place = Place::new();
+    let (a, _) = two(&place);
+    let whole = place.read("a.png");
+    for (name, bytes) in [
+        ("empty.png", &[][..]),
+        ("text.png", b"no picture"),
+        ("short.png", &whole[..whole.len() / 2]),
+        ("endless.png", &whole[..whole.len() - 12]),
+    ] {
+        fs::write(place.path(name), bytes).unwrap();
+    }
+    let mut flipped = whole.clone();
+    flipped[50] ^= 1;
+    fs::write(place.path("flipped.png"), flipped).unwrap();
+    exr(&place, "whole.exr", (4, 2), gray(&[0.5; 8]));
+    let whole = place.read("whole.exr");
+    fs::write(place.path("short.exr"), &whole[..whole.len() - 40]).unwrap();
+    exr(&place, "depth.exr", (4, 2), vec![("depth.Z", floats(&[1.0; 8]))]);
+    fs::create_dir(place.path("folder")).unwrap();
+    for (name, message) in [
+        ("absent.png", "cannot be read: "),
+        ("folder", "is a folder"),
+        ("empty.png", "is empty"),
+        ("text.png", "is no picture: it must be a PNG, EXR"),
+        ("small.toml", "is no picture"),
+        ("short.png", "is damaged or cut short"),
+        ("endless.png", "is damaged or cut short"),
+        ("flipped.png", "is damaged or cut short"),
+        ("short.exr", "is damaged or cut short"),
+        ("depth.exr", "has no colours"),
+    ] {
+        for arguments in [["diff", name, "a.png"], ["diff", "a.png", name]] {
+            let ran = place.run(&arguments);
+            says(&ran, 1, &format!("error: {name}: {message}"));
+            assert_eq!(ran.stdout, "", "{name}");
+        }
+    }
+    // the name's end says nothing
+    png(&place, "a.exr", (4, 2), &a);
+    says(&place.run(&["diff", "a.exr", "a.png"]), 0, "the same\n");
+}
+
+#[test]
+fn different_sizes_and_places_differ() {
+    let place = Place::new();
+    two(&place);
+    png(&place, "wide.png", (8, 1), &[0; 24]);
+    let ran = place.run(&["diff", "a.png", "wide.png", "--fail", "rmse=1", "--out", "out.png"]);
+    says(&ran, 5, "fails: A has 4 x 2 pixels, B 8 x 1\n");
+    says(&ran, 5, "note: out.png: is not written");
+    assert!(!place.path("out.png").exists());
+    // crops of a picture, of one size
+    for (name, crop) in [("left.exr", "0,0,2,2"), ("right.exr", "2,0,4,2")] {
+        place.quietly(&["render", "small.toml", "--device", "cpu", "-o", name, "--crop", crop]);
+    }
+    says(
+        &place.run(&["diff", "left.exr", "right.exr"]),
+        5,
+        "fails: A begins at (0, 0) of the whole picture, B at (2, 0)\n",
+    );
+    says(&place.run(&["diff", "left.exr", "left.exr"]), 0, "the same\n");
+}
+
+#[test]
+fn channels_that_one_lacks_differ_unless_left_out() {
+    let place = Place::new();
+    let colors = || gray(&[0.25, 0.5]);
+    let depth = |z: f32| vec![("depth.Z", floats(&[1.0, z]))];
+    exr(&place, "both.exr", (2, 1), [colors(), depth(2.0)].concat());
+    exr(&place, "deeper.exr", (2, 1), [colors(), depth(2.5)].concat());
+    exr(&place, "colors.exr", (2, 1), colors());
+    let missing = place.run(&["diff", "both.exr", "colors.exr", "--fail", "rmse=9"]);
+    says(&missing, 5, "fails: B lacks depth.Z, which A has\n");
+    says(
+        &place.run(&["diff", "colors.exr", "both.exr"]),
+        5,
+        "fails: A lacks depth.Z, which B has\n",
+    );
+    says(
+        &place.run(&["diff", "colors.exr", "both.exr", "--layers", "color"]),
+        0,
+        "the same\n",
+    );
+    // a layer that differs is told, and those that do not are told to be the same
+    let ran = place.run(&["diff", "both.exr", "deeper.exr"]);
+    says(&ran, 5, "color R G B: the same bits\ndepth depth.Z\n");
+    says(&ran, 5, "  largest    0.5 in depth.Z at (1, 0): 2, not 2.5\n");
+    says(&ran, 5, "fails: depth: 1 pixel has other bits\n");
+    says(
+        &place.run(&["diff", "both.exr", "deeper.exr", "--layers", "color"]),
+        0,
+        "the same\n",
+    );
+    says(
+        &place.run(&["diff", "both.exr", "deeper.exr", "--fail", "rmse=0.3"]),
+        5,
+        "fails: depth: rmse 0.353553 is above 0.3\n",
+    );
+    // the picture shows the layer
+    let ran = place.run(&["diff", "both.exr", "deeper.exr", "--out", "out.png"]);
+    says(&ran, 5, "note: out.png: shows the layer depth\n");
+    assert!(place.path("out.png").exists());
+}
+
+#[test]
+fn what_is_no_finite_number_is_counted_and_fails() {
+    let place = Place::new();
+    let (nan, inf) = (f32::NAN, f32::INFINITY);
+    let red = |values: &[f32]| {
+        let mut channels = gray(&[0.5; 4]);
+        channels[0].1 = floats(values);
+        channels
+    };
+    exr(&place, "odd.exr", (4, 1), red(&[0.5, nan, inf, -inf]));
+    exr(&place, "even.exr", (4, 1), red(&[0.5; 4]));
+    let text = "color: 1 NaN and 2 infinite values in A, 1 and 2 in B, the first at (1, 0)";
+    // also where both have the same, and whatever is allowed
+    let same = ["diff", "odd.exr", "odd.exr"];
+    says(&place.run(&same), 5, text);
+    says(&place.run(&[&same[..], &["--fail", "rmse=9"]].concat()), 5, text);
+    let ran = place.run(&["diff", "odd.exr", "even.exr", "--json", "--fail", "share=1"]);
+    assert_eq!(ran.code, 5);
+    let layer = &json(&ran)["layers"][0];
+    assert_eq!(
+        layer["not_finite"],
+        serde_json::json!({"nan_a": 1, "nan_b": 0, "infinite_a": 2, "infinite_b": 0, "first": {"x": 1, "y": 0}})
+    );
+    // they count as different, and as 0 in both elsewhere
+    assert_eq!((&layer["different"], &layer["share"]), (&3.into(), &0.75.into()));
+    for metric in ["largest", "rmse", "rel_mse", "flip"] {
+        assert_eq!(layer[metric], 0.0, "{metric}");
+    }
+}
+
+#[test]
+fn signed_zeros_are_other_bits_that_weigh_nothing() {
+    let place = Place::new();
+    exr(&place, "plus.exr", (1, 1), gray(&[0.0]));
+    exr(&place, "minus.exr", (1, 1), gray(&[-0.0]));
+    let ran = place.run(&["diff", "plus.exr", "minus.exr"]);
+    says(&ran, 5, "fails: color: 1 pixel has other bits\n");
+    says(&ran, 5, "  largest    0\n");
+    says(
+        &place.run(&["diff", "plus.exr", "minus.exr", "--fail", "largest=0"]),
+        0,
+        "passes\n",
+    );
+}
+
+#[test]
+fn the_threshold_is_what_the_share_is_above() {
+    let place = Place::new();
+    let (a, mut b) = two(&place);
+    b[0] += 1;
+    png(&place, "b.png", (4, 2), &b);
+    png(&place, "a.png", (4, 2), &a);
+    let share = |threshold: &str| {
+        let ran = place.run(&["diff", "a.png", "b.png", "--json", "--threshold", threshold]);
+        json(&ran)["layers"][0]["share"].as_f64().unwrap()
+    };
+    // 1 / 255 is 0.0039, 10 / 255 is 0.0392
+    assert_eq!((share("0"), share("0.01"), share("0.04")), (0.25, 0.125, 0.0));
+    let ran = place.run(&["diff", "a.png", "b.png", "--threshold", "0.01", "--fail", "share=0.1"]);
+    says(&ran, 5, "fails: color: share over 0.01 0.125 is above 0.1\n");
+}
+
+#[test]
+fn only_what_is_asked_for_is_computed() {
+    let place = Place::new();
+    two(&place);
+    let ran = place.run(&[
+        "diff",
+        "a.png",
+        "b.png",
+        "--json",
+        "--metrics",
+        "rmse,psnr",
+        "--fail",
+        "share=1",
+    ]);
+    assert_eq!(ran.code, 0);
+    let layer = &json(&ran)["layers"][0];
+    for (metric, is_there) in [
+        ("rmse", true),
+        ("psnr", true),
+        ("share", true),
+        ("ssim", false),
+        ("flip", false),
+    ] {
+        assert_eq!(layer.get(metric).is_some(), is_there, "{metric}");
+    }
+    let flip = |ppd: &str| {
+        let ran = place.run(&["diff", "a.png", "b.png", "--json", "--ppd", ppd]);
+        json(&ran)["layers"][0]["flip"].as_f64().unwrap()
+    };
+    assert!(flip("20") > flip("200"));
+}
+
+#[test]
+fn how_a_file_stores_values_does_not_matter() {
+    use png::{BitDepth, ColorType};
+    let place = Place::new();
+    let colors = [
+        10, 20, 30, 200, 100, 0, 10, 20, 30, 10, 20, 30, 200, 100, 0, 200, 100, 0, 10, 20, 30, 10, 20, 30,
+    ];
+    png(&place, "rgb.png", (4, 2), &colors);
+    // 0 1 0 0 / 1 1 0 0 of a palette
+    write_png(
+        &place,
+        "palette.png",
+        (4, 2),
+        ColorType::Indexed,
+        BitDepth::One,
+        &[0x40, 0xc0],
+    );
+    let deep: Vec<u8> = colors.iter().flat_map(|value| [*value, *value]).collect();
+    write_png(&place, "deep.png", (4, 2), ColorType::Rgb, BitDepth::Sixteen, &deep);
+    let opaque: Vec<u8> = colors.chunks(3).flat_map(|pixel| [pixel, &[255]].concat()).collect();
+    png(&place, "opaque.png", (4, 2), &opaque);
+    for name in ["palette.png", "deep.png", "opaque.png"] {
+        says(&place.run(&["diff", name, "rgb.png"]), 0, "the same\n");
+        says(&place.run(&["diff", "rgb.png", name]), 0, "the same\n");
+    }
+    let mut deeper = deep;
+    deeper[1] += 1;
+    write_png(&place, "deep.png", (4, 2), ColorType::Rgb, BitDepth::Sixteen, &deeper);
+    says(
+        &place.run(&["diff", "deep.png", "rgb.png"]),
+        5,
+        "1 of 8 pixels, the first at (0, 0)\n",
+    );
+    let mut glass = opaque;
+    glass[7] = 254;
+    png(&place, "glass.png", (4, 2), &glass);
+    says(
+        &place.run(&["diff", "glass.png", "rgb.png"]),
+        5,
+        " in A at (1, 0): 0.996078, not 1\n",
+    );
+    // gray is a colour
+    png(&place, "gray.png", (2, 1), &[7, 9]);
+    png(&place, "grays.png", (2, 1), &[7, 7, 7, 9, 9, 9]);
+    says(&place.run(&["diff", "gray.png", "grays.png"]), 0, "the same\n");
+    // EXR: half and float, tiles and lines, packed and not, whole numbers
+    let values = [0.5_f32, 1.0, 1.5, 65504.0];
+    let halves = FlatSamples::F16(values.map(f16::from_f32).to_vec());
+    let half = ["R", "G", "B"].map(|name| (name, halves.clone())).to_vec();
+    exr(&place, "float.exr", (4, 1), gray(&values));
+    let encodings = [
+        Encoding::UNCOMPRESSED,
+        Encoding::SMALL_LOSSLESS,
+        Encoding::SMALL_FAST_LOSSLESS,
+    ];
+    for encoding in encodings {
+        exr_parts(&place, "half.exr", (4, 1), vec![("", half.clone())], encoding);
+        says(&place.run(&["diff", "half.exr", "float.exr"]), 0, "the same\n");
+    }
+    let mut other = values;
+    other[2] = 1.5_f32.next_up();
+    exr(&place, "other.exr", (4, 1), gray(&other));
+    says(
+        &place.run(&["diff", "half.exr", "other.exr"]),
+        5,
+        "1 of 4 pixels, the first at (2, 0)\n",
+    );
+    let numbers = |last: u32| vec![("primitive.ID", FlatSamples::U32(vec![0, last]))];
+    exr(&place, "id.exr", (2, 1), numbers(u32::MAX));
+    exr(&place, "next.exr", (2, 1), numbers(u32::MAX - 1));
+    says(&place.run(&["diff", "id.exr", "id.exr"]), 0, "the same\n");
+    // in floats of 32 bits these would be one
+    says(
+        &place.run(&["diff", "id.exr", "next.exr"]),
+        5,
+        "1 of 2 pixels, the first at (1, 0)\n",
+    );
+}
+
+#[test]
+fn jpegs_and_interlaced_pngs_are_read() {
+    let place = Place::new();
+    let jpeg = |name: &str, value: u8| {
+        let pixels = vec![value; 16 * 8 * 3];
+        image::save_buffer(place.path(name), &pixels, 16, 8, image::ColorType::Rgb8).unwrap();
+    };
+    jpeg("a.jpg", 90);
+    jpeg("b.jpg", 99);
+    png(
+        &place,
+        "decoded.png",
+        (16, 8),
+        image::open(place.path("a.jpg")).unwrap().as_bytes(),
+    );
+    says(&place.run(&["diff", "a.jpg", "decoded.png"]), 0, "the same\n");
+    says(&place.run(&["diff", "a.jpg", "b.jpg"]), 5, "128 of 128 pixels");
+    // two pixels in a row: the first is in the first pass of seven, the second in the sixth, each pass with its filter, 0
+    let chunk = |kind: &[u8; 4], data: &[u8]| {
+        let body = [kind.as_slice(), data].concat();
+        let length = (data.len() as u32).to_be_bytes();
+        [length.as_slice(), &body, &crc32fast::hash(&body).to_be_bytes()].concat()
+    };
+    let data = [0, 10, 20, 30, 0, 40, 50, 60_u8];
+    let sums = data.iter().fold((1_u32, 0_u32), |(a, b), byte| {
+        (a + u32::from(*byte), b + a + u32::from(*byte))
+    });
+    let adler = (sums.1 << 16 | sums.0).to_be_bytes();
+    let packed = [&[0x78, 1, 1, 8, 0, 0xf7, 0xff], data.as_slice(), &adler].concat();
+    let file = [
+        b"\x89PNG\r\n\x1a\n".to_vec(),
+        chunk(b"IHDR", &[0, 0, 0, 2, 0, 0, 0, 1, 8, 2, 0, 0, 1]),
+        chunk(b"IDAT", &packed),
+        chunk(b"IEND", &[]),
+    ];
+    fs::write(place.path("interlaced.png"), file.concat()).unwrap();
+    png(&place, "plain.png", (2, 1), &[10, 20, 30, 40, 50, 60]);
+    says(&place.run(&["diff", "interlaced.png", "plain.png"]), 0, "the same\n");
+}
+
+#[test]
+fn parts_of_an_exr_are_layers() {
+    let place = Place::new();
+    let parts = |x: f32| vec![("beauty", gray(&[0.5])), ("normal", vec![("X", floats(&[x]))])];
+    exr_parts(&place, "a.exr", (1, 1), parts(0.0), Encoding::FAST_LOSSLESS);
+    exr_parts(&place, "b.exr", (1, 1), parts(1.0), Encoding::FAST_LOSSLESS);
+    let ran = place.run(&["diff", "a.exr", "b.exr"]);
+    says(&ran, 5, "beauty.R");
+    says(&ran, 5, "fails: normal: 1 pixel has other bits\n");
+    says(&place.run(&["diff", "a.exr", "a.exr"]), 0, "the same\n");
+}
+
+#[test]
+fn an_exr_is_compared_with_a_png_as_it_would_be_written() {
+    let place = Place::new();
+    for name in ["out.png", "out.exr"] {
+        place.quietly(&["render", "small.toml", "--device", "cpu", "-o", name]);
+    }
+    for arguments in [["diff", "out.png", "out.exr"], ["diff", "out.exr", "out.png"]] {
+        let ran = place.run(&arguments);
+        says(
+            &ran,
+            0,
+            "note: out.exr: is linear, and compared as wgray render writes it to a PNG of 8 bits by gamma22\n",
+        );
+        says(&ran, 0, "the same\n");
+    }
+    place.quietly(&[
+        "render",
+        "small.toml",
+        "--device",
+        "cpu",
+        "-o",
+        "other.png",
+        "--seed",
+        "1",
+    ]);
+    says(&place.run(&["diff", "other.png", "out.exr"]), 5, "fails: color");
+}
+
+#[test]
+fn standard_input_and_pipes_are_read() {
+    let place = Place::new();
+    two(&place);
+    let lines: [(&str, i32); 3] = [
+        ("cat a.png | \"$0\" diff - a.png", 0),
+        ("cat b.png | \"$0\" diff a.png -", 5),
+        ("\"$0\" diff /dev/stdin a.png < a.png", 0),
+    ];
+    for (line, code) in lines {
+        let ran = place.shell("sh", line);
+        assert_eq!(ran.code, code, "{line}: {}{}", ran.stdout, ran.stderr);
+    }
+    says(
+        &place.shell("sh", "printf x | \"$0\" diff - a.png"),
+        1,
+        "error: standard input: is no picture",
+    );
+    // a full standard output is a failure, a reader that leaves is not
+    says(
+        &place.shell("sh", "\"$0\" diff a.png a.png > /dev/full"),
+        8,
+        "standard output: cannot be written",
+    );
+}
+
+#[test]
+fn a_picture_of_the_difference_shows_where_it_is() {
+    let place = Place::new();
+    // one bit of one pixel of half a million
+    let (width, height) = (1000, 500);
+    let mut values = vec![60; width * height * 3];
+    png(&place, "a.png", (width as u32, height as u32), &values);
+    values[3 * (123 * width + 456)] ^= 1;
+    png(&place, "b.png", (width as u32, height as u32), &values);
+    let ran = place.run(&["diff", "a.png", "b.png", "--out", "out.png"]);
+    says(&ran, 5, "the first at (456, 123)\n");
+    let (across, _, bytes) = super::read_png(&place.path("out.png"));
+    let line: Vec<(usize, usize)> = (bytes.chunks(3).enumerate())
+        .filter(|(_, pixel)| pixel == &[0, 220, 220])
+        .map(|(i, _)| (i % across as usize, i / across as usize))
+        .collect();
+    let ends = |of: fn(&(usize, usize)) -> usize| {
+        let (low, high) = (line.iter().map(of).min().unwrap(), line.iter().map(of).max().unwrap());
+        assert!(high - low < 40, "{low} {high}");
+        (low + high) / 2
+    };
+    // the map is to the right of both pictures, below a label of 20 rows and a gap of 8
+    let middle = (ends(|place| place.0), ends(|place| place.1));
+    let expected = (8 + 2 * (width + 8) + 456, 8 + 20 + 123);
+    assert!(
+        middle.0.abs_diff(expected.0) < 20 && middle.1.abs_diff(expected.1) < 20,
+        "{middle:?} {expected:?}"
+    );
+    // the same picture has no line
+    says(
+        &place.run(&["diff", "a.png", "a.png", "--out", "out.png"]),
+        0,
+        "the same\n",
+    );
+    let (_, _, bytes) = super::read_png(&place.path("out.png"));
+    assert!(!bytes.chunks(3).any(|pixel| pixel == [0, 220, 220]));
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_exits_with_8() {
+    let place = Place::new();
+    two(&place);
+    let before = place.read("a.png");
+    fs::create_dir(place.path("folder.png")).unwrap();
+    fs::write(place.path("fixed.png"), "old").unwrap();
+    let mut mode = fs::metadata(place.path("fixed.png")).unwrap().permissions();
+    mode.set_readonly(true);
+    fs::set_permissions(place.path("fixed.png"), mode).unwrap();
+    for out in ["absent/out.png", "folder.png", "fixed.png", "/dev/full"] {
+        let ran = place.run(&["diff", "a.png", "b.png", "--out", out]);
+        says(&ran, 8, &format!("error: {out}: cannot be written"));
+    }
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("a.png", place.path("link.png")).unwrap();
+        says(
+            &place.run(&["diff", "a.png", "b.png", "--out", "link.png"]),
+            2,
+            "which must stay",
+        );
+    }
+    assert_eq!(
+        (place.read("a.png"), place.read("fixed.png")),
+        (before, b"old".to_vec())
+    );
+}
+
+#[test]
+fn the_smallest_and_the_longest_pictures_have_all_figures() {
+    let place = Place::new();
+    for (width, height) in [(1, 1), (65536, 1), (1, 65536), (10, 11), (11, 10)] {
+        let count = (width * height * 3) as usize;
+        png(&place, "a.png", (width, height), &vec![50; count]);
+        png(&place, "b.png", (width, height), &vec![80; count]);
+        let ran = place.run(&["diff", "a.png", "b.png", "--json", "--out", "out.png"]);
+        assert_eq!(ran.code, 5, "{width} x {height}: {}", ran.stderr);
+        let layer = &json(&ran)["layers"][0];
+        let figure = |name: &str| layer[name].as_f64().unwrap();
+        assert!((figure("rmse") - 30.0 / 255.0).abs() < 1e-12);
+        // two even pictures: (2 a b + C1) / (a² + b² + C1)
+        let (a, b) = (50.0 / 255.0, 80.0 / 255.0);
+        let expected = (2.0 * a * b + 1e-4) / (a * a + b * b + 1e-4);
+        assert!((figure("ssim") - expected).abs() < 1e-9, "{width} x {height}");
+        assert!(figure("flip") > 0.05 && figure("flip") < 0.5, "{}", figure("flip"));
+        image::open(place.path("out.png")).unwrap();
+    }
+}

@@ -1,0 +1,542 @@
+//! `--frames`, `--skip-existing` and `--define`: which pictures are made, of what, under which names.
+
+use std::fs;
+use std::time::{Duration, SystemTime};
+
+use super::{NO_DRIVER, Place, SCENE};
+
+/// The small scene with a camera that goes from the left to the right, in front of it at frame 5.
+fn moving(place: &Place, interpolation: &str) {
+    let keys = "{ frame = 1, position = [-2, -5, 1] }, { frame = 5, position = [0, -5, 1] }, { frame = 9, position = [2, -5, 1] }";
+    let path = format!("fov = 40, path = {{ interpolation = \"{interpolation}\", keys = [{keys}] }} }}");
+    assert!(SCENE.contains("fov = 40 }"));
+    place.write("moving.toml", &SCENE.replace("fov = 40 }", &path));
+}
+
+/// The size and the bits of an EXR's colours. What else is in the file may say where it comes from.
+fn bits(place: &Place, name: &str) -> (u32, Vec<u32>) {
+    let picture = image::open(place.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let picture = picture.into_rgb32f();
+    (
+        picture.width(),
+        picture.into_raw().into_iter().map(f32::to_bits).collect(),
+    )
+}
+
+const CPU: [&str; 2] = ["--device", "cpu"];
+
+fn quietly(place: &Place, arguments: &[&str]) {
+    place.quietly(&[&["render"], arguments, &CPU[..]].concat());
+}
+
+/// A render that must be refused, by this code and message, with nothing written.
+fn refused(place: &Place, arguments: &[&str], code: i32, told: &str) {
+    let before = place.files();
+    let ran = place.run(&[&["render"], arguments, &CPU[..]].concat());
+    assert_eq!(
+        (ran.code, ran.stdout.as_str()),
+        (code, ""),
+        "{arguments:?}: {}",
+        ran.stderr
+    );
+    assert!(ran.stderr.contains(told), "{arguments:?}: {}\n{told}", ran.stderr);
+    assert_eq!(place.files(), before, "{arguments:?}");
+}
+
+#[test]
+fn a_frame_is_what_the_camera_sees_from_there() {
+    for interpolation in ["linear", "smooth"] {
+        let place = Place::new();
+        moving(&place, interpolation);
+        quietly(&place, &["moving.toml", "--frames", "1-9:4", "-o", "out.###.exr"]);
+        assert_eq!(
+            place.files(),
+            ["moving.toml", "out.001.exr", "out.005.exr", "out.009.exr"].map(String::from)
+        );
+        for (frame, x) in [(1, -2), (5, 0), (9, 2)] {
+            // The same camera, written into the scene without a path.
+            place.write("still.toml", &SCENE.replace("[0, -5, 1]", &format!("[{x}, -5, 1]")));
+            quietly(&place, &["still.toml", "-o", "still.exr"]);
+            assert_eq!(
+                bits(&place, "still.exr"),
+                bits(&place, &format!("out.00{frame}.exr")),
+                "{frame}"
+            );
+        }
+        assert_ne!(bits(&place, "out.001.exr"), bits(&place, "out.009.exr"));
+        // Half the way, by itself and with others, in any order.
+        place.write("still.toml", &SCENE.replace("[0, -5, 1]", "[-1, -5, 1]"));
+        quietly(&place, &["still.toml", "-o", "still.exr"]);
+        quietly(&place, &["moving.toml", "--frames", "3", "-o", "alone.exr"]);
+        quietly(&place, &["moving.toml", "--frames", "9,3,1", "-o", "#.exr"]);
+        for name in ["alone.exr", "3.exr"] {
+            assert_eq!(bits(&place, name), bits(&place, "still.exr"), "{name}");
+        }
+        // Without a frame it is as it stands by itself.
+        quietly(&place, &["moving.toml", "-o", "itself.exr"]);
+        assert_eq!(bits(&place, "itself.exr"), bits(&place, "out.005.exr"));
+    }
+}
+
+#[test]
+fn on_any_device_frames_have_the_same_bits() {
+    let place = Place::new();
+    moving(&place, "smooth");
+    place.run(&["render", "moving.toml", "--frames", "2-4", "-o", "any.#.exr"]);
+    quietly(&place, &["moving.toml", "--frames", "2-4", "-o", "cpu.#.exr"]);
+    let read = |name: &str, frame: u32| bits(&place, &format!("{name}.{frame}.exr"));
+    for frame in 2..5 {
+        assert_eq!(read("any", frame), read("cpu", frame));
+    }
+    assert_ne!(read("cpu", 2), read("cpu", 3));
+}
+
+#[test]
+fn names_have_the_numbers_and_folders_keep_their_marks() {
+    let place = Place::new();
+    moving(&place, "linear");
+    fs::create_dir(place.path("a##b")).unwrap();
+    let arguments = [
+        "moving.toml",
+        "--frames",
+        "8-12:2",
+        "-o",
+        "a##b/x#.png",
+        "--aov",
+        "normal",
+        "--stats",
+        "s##.json",
+    ];
+    quietly(&place, &arguments);
+    assert_eq!(
+        place.files(),
+        ["a##b", "moving.toml", "s08.json", "s10.json", "s12.json"].map(String::from)
+    );
+    let inner = fs::read_dir(place.path("a##b")).unwrap();
+    let mut inner: Vec<_> = inner
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    inner.sort();
+    let wanted = [
+        "x10.normal.png",
+        "x10.png",
+        "x12.normal.png",
+        "x12.png",
+        "x8.normal.png",
+        "x8.png",
+    ];
+    assert_eq!(inner, wanted);
+    let stats: serde_json::Value = serde_json::from_slice(&place.read("s10.json")).unwrap();
+    assert_eq!(stats["frame"], 10);
+    // The name that the scene gives.
+    fs::rename(place.path("moving.toml"), place.path("m#.toml")).unwrap();
+    quietly(&place, &["m#.toml", "--frames", "3,12345"]);
+    quietly(&place, &["m#.toml"]);
+    let files = place.files();
+    for name in ["m#.0003.png", "m#.12345.png", "m#.png"] {
+        assert!(files.contains(&name.to_owned()), "{files:?}");
+    }
+    // One frame needs no number, and without frames a mark is a letter.
+    quietly(&place, &["m#.toml", "--frames", "4", "-o", "one.png"]);
+    quietly(&place, &["m#.toml", "-o", "#.##.png"]);
+    assert!(place.files().contains(&"#.##.png".to_owned()));
+}
+
+#[test]
+fn names_that_do_not_tell_frames_apart_are_refused() {
+    let place = Place::new();
+    moving(&place, "linear");
+    fs::create_dir(place.path("a#")).unwrap();
+    let rule = "must have # for the frame's number in its name, as in out.####.png, as --frames are 2";
+    for name in ["out.png", "a#/out.png", "-", "/dev/null"] {
+        let format = ["moving.toml", "--frames", "1-2", "--format", "png", "-o", name];
+        refused(&place, &format, 2, &format!("--output: {name}: {rule}"));
+    }
+    let figures = ["moving.toml", "--frames", "1-2", "-o", "#.png", "--stats", "s.json"];
+    refused(&place, &figures, 2, &format!("--stats: s.json: {rule}"));
+    let twice = ["moving.toml", "--frames", "1-2", "-o", "#.#.png"];
+    refused(&place, &twice, 2, "--output: #.#.png: must have all its # in one place");
+    // Names that the numbers make the same.
+    let same = ["moving.toml", "--frames", "1-12", "-o", "b#.png", "-o", "b1#.png"];
+    refused(&place, &same, 2, "--output: b11.png: frames 1 and 11 have this name");
+    // What is wrong with the last one alone is told before the first is rendered.
+    place.write("2.exr", "");
+    let mut mode = fs::metadata(place.path("2.exr")).unwrap().permissions();
+    mode.set_readonly(true);
+    fs::set_permissions(place.path("2.exr"), mode).unwrap();
+    refused(&place, &["moving.toml", "--frames", "1-2", "-o", "#.exr"], 8, "2.exr: ");
+    image::RgbImage::new(2, 2).save(place.path("t.2.png")).unwrap();
+    let texture = format!("{SCENE}[textures.t]\ntype = 'image'\nfile = 't.2.png'\n");
+    place.write("textured.toml", &texture);
+    let input = ["textured.toml", "--frames", "1-2", "-o", "t.#.png"];
+    refused(
+        &place,
+        &input,
+        2,
+        "--output: t.2.png: is a file that the scene is made of, and must stay",
+    );
+    for (frames, told) in [
+        (
+            "",
+            "must be whole numbers from 0 to 999999999, such as 5, 1-10, 1-10:2 or 1-3,7",
+        ),
+        ("-3", "must be whole numbers"),
+        ("-3--1", "must be whole numbers"),
+        ("2-1", "2-1 must go upwards, from 1 to 2"),
+        ("1-2:0", "1-2:0 must have a step of 1 or more"),
+        ("1-4000000000", "4000000000: must be whole numbers from 0 to 999999999"),
+        ("0-999999999", "must be 100000 frames at most"),
+    ] {
+        refused(&place, &["moving.toml", "--frames", frames, "-o", "#.png"], 2, told);
+    }
+}
+
+#[test]
+fn ten_thousand_frames_are_no_cliff() {
+    let place = Place::new();
+    moving(&place, "smooth");
+    let small = [
+        "moving.toml",
+        "--frames",
+        "1-9999,10000",
+        "--size",
+        "1x1",
+        "--spp",
+        "1",
+        "--light-samples",
+        "1",
+    ];
+    for frame in 1..=10_000 {
+        if frame % 20 != 7 {
+            place.write(&format!("o.{frame:04}.png"), "");
+        }
+    }
+    let start = std::time::Instant::now();
+    let arguments = [&["render"], &small[..], &["-o", "o.####.png", "--skip-existing"], &CPU].concat();
+    let ran = place.run(&arguments);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert_eq!(ran.stderr, "note: 9500 of 10000 left out, as their files are there\n");
+    assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
+    for frame in 1..=10_000 {
+        let is_rendered = !place.read(&format!("o.{frame:04}.png")).is_empty();
+        assert_eq!(is_rendered, frame % 20 == 7, "{frame}");
+    }
+    assert_eq!(place.files().len(), 10_001);
+}
+
+#[test]
+fn frames_that_are_there_stay_if_that_is_asked_for() {
+    let place = Place::new();
+    moving(&place, "linear");
+    let arguments = [
+        "moving.toml",
+        "--frames",
+        "1-3",
+        "-o",
+        "#.png",
+        "--aov",
+        "normal",
+        "--skip-existing",
+    ];
+    quietly(&place, &arguments);
+    let old = SystemTime::now() - Duration::from_secs(3600);
+    let all = [
+        "1.png",
+        "2.png",
+        "3.png",
+        "1.normal.png",
+        "2.normal.png",
+        "3.normal.png",
+    ];
+    let age = |name: &str| {
+        let file = fs::File::options().write(true).open(place.path(name)).unwrap();
+        file.set_modified(old).unwrap();
+    };
+    let is_old = |name: &str| fs::metadata(place.path(name)).unwrap().modified().unwrap() == old;
+    all.iter().copied().for_each(age);
+    let again = |told: &str| {
+        let ran = place.run(&[&["render"], &arguments[..], &CPU].concat());
+        assert_eq!((ran.code, ran.stderr.as_str()), (0, told));
+    };
+    again("note: 3 of 3 left out, as their files are there\n");
+    assert!(all.into_iter().all(is_old));
+    // A frame is there if all of its files are.
+    fs::remove_file(place.path("2.normal.png")).unwrap();
+    again("note: 2 of 3 left out, as their files are there\n");
+    let renewed: Vec<_> = all.into_iter().filter(|name| !is_old(name)).collect();
+    assert_eq!(renewed, ["2.png", "2.normal.png"]);
+    // Figures are files too, and may be streams.
+    let more = [&["render"], &arguments[..], &CPU, &["--stats", "#.json"]].concat();
+    assert_eq!(place.run(&more).stderr, "");
+    assert!(place.run(&more).stderr.starts_with("note: 3 of 3"));
+    let more = [&["render"], &arguments[..], &CPU, &["--stats", "-"]].concat();
+    let ran = place.run(&more);
+    assert!(
+        ran.stdout.is_empty() && ran.stderr.starts_with("note: 3 of 3"),
+        "{}",
+        ran.stderr
+    );
+    // Without being asked for, all are made anew.
+    all.iter().copied().for_each(age);
+    quietly(&place, &arguments[..7]);
+    assert!(!all.into_iter().any(is_old));
+    // One picture by itself.
+    place.write("p.png", "");
+    let one = [
+        &["render", "moving.toml", "-o", "p.png", "--skip-existing", "--quiet"],
+        &CPU[..],
+    ]
+    .concat();
+    place.quietly(&one);
+    assert!(place.read("p.png").is_empty());
+}
+
+#[test]
+fn a_camera_without_a_view_is_refused_before_anything_is_rendered() {
+    let place = Place::new();
+    let path = "fov = 40, path.keys = [{ frame = 1, position = [0, -5, 1] }, { frame = 7, position = [0, 5, 1] }] }";
+    place.write("through.toml", &SCENE.replace("fov = 40 }", path));
+    let told = "through.toml:2: camera.path: at frame 4, look_at: [0, 0, 1] must not be the camera's position";
+    refused(&place, &["through.toml", "--frames", "1-7", "-o", "#.png"], 3, told);
+    quietly(&place, &["through.toml", "--frames", "1-7:2", "-o", "#.png"]);
+    let ran = place.run(&["check", "through.toml"]);
+    assert_eq!(ran.code, 3);
+    assert!(ran.stderr.contains(told), "{}", ran.stderr);
+    moving(&place, "linear");
+    let ran = place.run(&["check", "moving.toml"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(
+        ran.stdout.ends_with("; the camera moves from frame 1 to 9\n"),
+        "{}",
+        ran.stdout
+    );
+}
+
+#[test]
+fn a_frame_that_fails_ends_the_run_and_what_was_done_stays() {
+    let place = Place::new();
+    moving(&place, "linear");
+    // It is no file, and was none when all were looked at: the second frame opens it, and it takes nothing.
+    #[cfg(target_os = "linux")]
+    {
+        std::os::unix::fs::symlink("/dev/full", place.path("s.2.json")).unwrap();
+        let arguments = ["moving.toml", "--frames", "1-3", "-o", "#.png", "--stats", "s.#.json"];
+        let ran = place.run(&[&["render"], &arguments[..], &CPU].concat());
+        assert_eq!(ran.code, 8, "{}", ran.stderr);
+        assert!(ran.stderr.contains("s.2.json"), "{}", ran.stderr);
+        let files = place.files();
+        assert!(
+            files.contains(&"1.png".to_owned()) && !files.contains(&"3.png".to_owned()),
+            "{files:?}"
+        );
+    }
+}
+
+#[test]
+fn progress_and_notes_say_which_frame_and_come_once() {
+    let place = Place::new();
+    moving(&place, "linear");
+    let ran = place.run(
+        &[
+            &["render", "moving.toml", "--frames", "3,5", "--progress", "plain"],
+            &CPU[..],
+        ]
+        .concat(),
+    );
+    assert_eq!(ran.code, 0);
+    for told in ["frame 3 (1 of 2): 100 % done", "frame 5 (2 of 2): 100 % done"] {
+        assert!(ran.stderr.contains(told), "{}", ran.stderr);
+    }
+    let ran = place.run_with(
+        &["render", "small.toml", "--frames", "1-3", "--size", "2x2"],
+        &NO_DRIVER,
+    );
+    let lines: Vec<&str> = ran.stderr.lines().collect();
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert_eq!(lines.len(), 2, "{}", ran.stderr);
+    assert_eq!(
+        lines[0],
+        "warning: small.toml: it has no camera.path: all frames are the same"
+    );
+    assert!(
+        lines[1].starts_with("warning: rendering on the CPU: "),
+        "{}",
+        ran.stderr
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_all_frames() {
+    let place = Place::new();
+    moving(&place, "linear");
+    let mut child = std::process::Command::new(super::program())
+        .current_dir(place.path("."))
+        .args([
+            "render",
+            "moving.toml",
+            "--frames",
+            "1-2000",
+            "--size",
+            "100x100",
+            "-o",
+            "#.png",
+        ])
+        .args(CPU)
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let start = std::time::Instant::now();
+    while !place.path("3.png").exists() {
+        assert!(start.elapsed() < Duration::from_secs(60), "{:?}", place.files());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let id = child.id().to_string();
+    std::process::Command::new("kill")
+        .args(["-TERM", &id])
+        .status()
+        .unwrap();
+    let code = child.wait().unwrap().code();
+    assert_eq!(code, Some(143));
+    let files = place.files();
+    assert!(files.len() > 3 && files.len() < 1000, "{}", files.len());
+    assert!(
+        files.iter().all(|name| !name.starts_with('.')),
+        "something is left behind: {files:?}"
+    );
+}
+
+#[test]
+fn a_defined_render_is_that_of_an_edited_scene() {
+    let place = Place::new();
+    for (name, defines, edits) in [
+        (
+            "seed",
+            &["render.seed=9"][..],
+            &[("[render]", "[render]\nseed = 9")][..],
+        ),
+        ("shape", &["shapes[0].radius=0.5"], &[("radius = 0.8", "radius = 0.5")]),
+        (
+            "both",
+            &["materials.gray.color=[1, 0, 0]", "camera.position.0=-1"],
+            &[("[0.5, 0.4, 0.3]", "[1, 0, 0]"), ("[0, -5, 1]", "[-1, -5, 1]")],
+        ),
+    ] {
+        let mut edited = SCENE.to_owned();
+        for (from, to) in edits {
+            assert!(edited.contains(from));
+            edited = edited.replace(from, to);
+        }
+        place.write("edited.toml", &edited);
+        quietly(&place, &["edited.toml", "-o", "edited.exr"]);
+        let options: Vec<&str> = defines.iter().flat_map(|define| ["--define", define]).collect();
+        quietly(&place, &[&["small.toml", "-o", "defined.exr"], &options[..]].concat());
+        assert_eq!(bits(&place, "defined.exr"), bits(&place, "edited.exr"), "{name}");
+        quietly(&place, &["small.toml", "-o", "plain.exr"]);
+        assert_ne!(bits(&place, "defined.exr"), bits(&place, "plain.exr"), "{name}");
+    }
+    // The option of the same goes before it.
+    quietly(
+        &place,
+        &["small.toml", "-o", "a.exr", "-D", "render.seed=9", "--seed", "4"],
+    );
+    quietly(&place, &["small.toml", "-o", "b.exr", "--seed", "4"]);
+    assert_eq!(bits(&place, "a.exr"), bits(&place, "b.exr"));
+}
+
+#[test]
+fn bad_defines_are_told() {
+    let place = Place::new();
+    for (define, told) in [
+        (
+            "camera.fov=wide",
+            "error: --define camera.fov: \"wide\" must be a number\n",
+        ),
+        (
+            "shapes[0].radius=-1",
+            "error: --define shapes[0].radius: -1 must be finite and greater than 0",
+        ),
+        (
+            "shapes[7].radius=1",
+            "error: --define shapes[7]: is not in the scene; the list has 2, counted from 0\n",
+        ),
+        (
+            "materials.grey.color=[1,1,1]",
+            "error: --define materials.grey: is not in the scene; the names there are \"gray\"\n",
+        ),
+        (
+            "film.iso=100",
+            "error: --define film: unknown key; the keys here are \"image\"",
+        ),
+        (
+            "render",
+            "render must be KEY=VALUE, such as render.seed=3 or shapes[2].radius=0.5",
+        ),
+        ("render.seed=", "render.seed: has no value after its ="),
+    ] {
+        refused(&place, &["small.toml", "-o", "x.png", "--define", define], 2, told);
+        let ran = place.run(&["check", "small.toml", "--define", define]);
+        assert_eq!((ran.code, ran.stdout.as_str()), (2, ""), "{define}: {}", ran.stderr);
+        assert!(ran.stderr.contains(told), "{define}: {}", ran.stderr);
+    }
+    // The file's own mistakes are told with its lines.
+    place.write("bad.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
+    refused(
+        &place,
+        &["bad.toml", "-o", "x.png", "-D", "render.seed=3"],
+        3,
+        "bad.toml:22: shapes[0].radius: -1 must",
+    );
+    quietly(&place, &["bad.toml", "-o", "x.png", "-D", "shapes[0].radius=1"]);
+}
+
+#[test]
+fn scenes_in_json_take_frames_and_defines_of_their_own_keys() {
+    let place = Place::new();
+    place.write("floor.obj", "v -1 0 -1\nv 1 0 -1\nv 0 0 1\nf 1 3 2\n");
+    let scene = r#"{ "spp": 4, "max_depth": 2, "image_resolution": [6, 4],
+        "cam_config": { "position": [0, 2, 4], "look_at": [0, 0, 0], "ref_up": [0, 1, 0], "vertical_fov": 40 },
+        "light_config": { "position": [0, 3, 0], "size": [1, 1], "radiance": [9, 9, 9] },
+        "materials": [{ "name": "white", "type": "diffuse", "color": [0.5, 0.5, 0.5] }],
+        "objects": [{ "obj_file_path": "floor.obj", "material_name": "white" }] }"#;
+    place.write("a.json", scene);
+    place.write(
+        "b.json",
+        &scene
+            .replace("0.5, 0.5, 0.5", "0.5, 0.1, 0.5")
+            .replace("\"spp\": 4", "\"spp\": 9"),
+    );
+    quietly(&place, &["b.json", "-o", "b.exr"]);
+    quietly(
+        &place,
+        &[
+            "a.json",
+            "-o",
+            "a.exr",
+            "-D",
+            "materials[0].color[1]=0.1",
+            "-D",
+            "spp=9",
+        ],
+    );
+    assert_eq!(bits(&place, "a.exr"), bits(&place, "b.exr"));
+    refused(
+        &place,
+        &["a.json", "-D", "spp=0"],
+        2,
+        "--define spp: 0 must be from 1 to 65536",
+    );
+    refused(
+        &place,
+        &["a.json", "-D", "camera.fov=3"],
+        2,
+        "--define camera: unknown key; the keys here are \"spp\"",
+    );
+    let ran = place.run(&[&["render", "a.json", "--frames", "1-2", "-o", "f#.exr"], &CPU[..]].concat());
+    assert_eq!(ran.code, 0);
+    assert_eq!(
+        ran.stderr,
+        "warning: a.json: it has no camera.path: all frames are the same\n"
+    );
+    assert_eq!(bits(&place, "f1.exr"), bits(&place, "f2.exr"));
+}

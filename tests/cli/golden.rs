@@ -1,0 +1,141 @@
+//! The example of `docs/golden-pictures.md`, as a reader runs it.
+#![cfg(unix)]
+
+use std::fs;
+use std::process::Command;
+
+use super::{Ran, program};
+use crate::sources::path as project;
+
+/// A copy of the example.
+struct Example {
+    folder: tempfile::TempDir,
+}
+
+impl Example {
+    fn new() -> Example {
+        let folder = tempfile::tempdir().unwrap();
+        let from = project("examples/golden");
+        fs::copy(from.join("check"), folder.path().join("check")).unwrap();
+        for part in ["scenes", "golden"] {
+            fs::create_dir(folder.path().join(part)).unwrap();
+            for entry in fs::read_dir(from.join(part)).unwrap() {
+                let entry = entry.unwrap();
+                fs::copy(entry.path(), folder.path().join(part).join(entry.file_name())).unwrap();
+            }
+        }
+        Example { folder }
+    }
+
+    fn check(&self, arguments: &[&str]) -> Ran {
+        let output = Command::new(self.folder.path().join("check"))
+            .args(arguments)
+            .env("WGRAY", program())
+            .env_remove("OUT")
+            .output()
+            .unwrap();
+        Ran {
+            code: output.status.code().unwrap_or(-1),
+            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+        }
+    }
+
+    /// Makes the change that the page makes.
+    fn change(&self) {
+        let scene = self.folder.path().join("scenes/ball.toml");
+        let text = fs::read_to_string(&scene).unwrap();
+        assert!(text.contains("radius = 0.7\n"));
+        fs::write(&scene, text.replace("radius = 0.7\n", "radius = 0.68\n")).unwrap();
+    }
+}
+
+fn page() -> String {
+    fs::read_to_string(project("docs/golden-pictures.md")).unwrap()
+}
+
+#[test]
+fn the_golden_pictures_hold() {
+    let example = Example::new();
+    let ran = example.check(&[]);
+    let hint = "pictures that are meant to change: examples/golden/check update";
+    assert_eq!(ran.code, 0, "{hint}\n{}{}", ran.stdout, ran.stderr);
+    assert_eq!(ran.stdout.matches("color R G B: the same bits").count(), 2);
+}
+
+#[test]
+fn a_changed_scene_fails_as_the_page_says_until_it_is_taken() {
+    let example = Example::new();
+    example.change();
+    let ran = example.check(&[]);
+    assert_eq!(ran.code, 5, "{}{}", ran.stdout, ran.stderr);
+    let told = page();
+    let told = told.split("```text\n").nth(1).and_then(|text| text.split("```").next());
+    let told = told.expect("the page shows what is told");
+    assert!(ran.stdout.contains(told), "{}is not\n{told}", ran.stdout);
+    assert!(
+        ran.stdout.contains("out/balls.png against golden/balls.png"),
+        "all are checked"
+    );
+    // the picture in the page is the one that is made
+    let made = image::open(example.folder.path().join("out/ball.diff.png")).unwrap();
+    assert_eq!(
+        made,
+        image::open(project("docs/golden-pictures/ball.diff.png")).unwrap()
+    );
+
+    let other = fs::read(example.folder.path().join("golden/balls.png")).unwrap();
+    let ran = example.check(&["update"]);
+    assert_eq!((ran.code, ran.stdout.as_str()), (0, "golden/ball.exr is new\n"));
+    assert_eq!(other, fs::read(example.folder.path().join("golden/balls.png")).unwrap());
+    assert_eq!(example.check(&[]).code, 0);
+}
+
+#[test]
+fn a_scene_without_a_golden_picture_fails_until_it_has_one() {
+    let example = Example::new();
+    let scenes = example.folder.path().join("scenes");
+    fs::copy(scenes.join("ball.toml"), scenes.join("new.toml")).unwrap();
+    let ran = example.check(&[]);
+    assert_eq!(ran.code, 1);
+    assert!(ran.stderr.contains("golden/new.exr: cannot be read"), "{}", ran.stderr);
+    assert_eq!(example.check(&["update"]).stdout, "golden/new.exr is new\n");
+    assert_eq!(example.check(&[]).code, 0);
+    // a scene that cannot be rendered is told as such
+    fs::write(scenes.join("new.toml"), "image = 3").unwrap();
+    assert_eq!(example.check(&[]).code, 3);
+}
+
+#[test]
+fn the_page_names_what_there_is() {
+    let (page, help) = (page(), super::Place::new().run(&["diff", "--help"]).stdout);
+    let help = help.split_whitespace().collect::<Vec<_>>().join(" "); // lines are as long as the terminal
+    for metric in [
+        "different",
+        "largest",
+        "share",
+        "rmse",
+        "rel_mse",
+        "psnr",
+        "ssim",
+        "flip",
+    ] {
+        assert!(page.contains(&format!("| `{metric}` |")), "{metric}");
+    }
+    for option in [
+        "--fail",
+        "--metrics",
+        "--layers",
+        "--threshold",
+        "--ppd",
+        "--out",
+        "--json",
+    ] {
+        assert!(page.contains(option), "{option}");
+        assert!(help.contains(option), "{option}");
+    }
+    for code in [0, 1, 2, 5, 8] {
+        assert!(page.contains(&format!("\n| {code} | ")), "{code}");
+        assert!(help.contains(&format!("{code} ")), "{code}");
+    }
+}

@@ -1,0 +1,645 @@
+//! Jobs that end early and go on, and pictures in parts: by the program itself, its signals and its files.
+
+use std::fs;
+use std::io::Write as _;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::{Place, Ran, program};
+
+/// A render that takes a few seconds, with layers of both kinds.
+const LONG: [&str; 8] = [
+    "render",
+    "small.toml",
+    "--size",
+    "160x160",
+    "--spp",
+    "300",
+    "--aov",
+    "normal",
+];
+
+/// The uninterrupted picture.
+fn expected(place: &Place) -> Vec<u8> {
+    let mut arguments = LONG.to_vec();
+    arguments.extend(["-o", "whole.exr", "--reproducible", "--device", "cpu"]);
+    place.quietly(&arguments);
+    place.read("whole.exr")
+}
+
+fn start(place: &Place, arguments: &[&str]) -> Child {
+    Command::new(program())
+        .current_dir(place.path("."))
+        .args(LONG)
+        .args(["--reproducible"])
+        .args(arguments)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program")
+}
+
+/// Waits until there is more in the checkpoint than so many bytes.
+fn wait_for(place: &Place, file: &str, bytes: u64) {
+    let start = Instant::now();
+    while fs::metadata(place.path(file)).map_or(0, |data| data.len()) <= bytes {
+        assert!(start.elapsed() < Duration::from_secs(60), "{file} does not grow");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn ended(child: Child) -> Ran {
+    let output = child.wait_with_output().expect("an end");
+    Ran {
+        code: output.status.code().unwrap_or(-1),
+        stdout: String::new(),
+        stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+    }
+}
+
+/// Runs the program on the given checkpoint, from what is there to the end.
+fn go_on(place: &Place, device: &str) -> Ran {
+    let mut arguments = LONG.to_vec();
+    arguments.extend(["--reproducible", "--checkpoint", "c", "--resume", "--device", device]);
+    arguments.extend(["-o", "out.exr"]);
+    place.run(&arguments)
+}
+
+#[test]
+fn a_killed_render_goes_on_where_it_was() {
+    let place = Place::new();
+    let expected = expected(&place);
+    for (round, device) in (0..).zip(["cpu", "gpu", "cpu", "gpu"]) {
+        let mut child = start(
+            &place,
+            &[
+                "--checkpoint",
+                "c",
+                "--resume",
+                "--checkpoint-interval",
+                "0.02",
+                "-o",
+                "out.exr",
+                "--device",
+                device,
+            ],
+        );
+        let before = fs::metadata(place.path("c")).map_or(0, |data| data.len());
+        wait_for(&place, "c", before + 100_000);
+        std::thread::sleep(Duration::from_millis(7 * round));
+        child.kill().expect("a kill"); // SIGKILL
+        child.wait().expect("an end");
+    }
+    let ran = go_on(&place, "cpu");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(place.read("out.exr") == expected);
+    // It remains, whole, and is gone on from at once.
+    let ran = go_on(&place, "gpu");
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    assert!(place.read("out.exr") == expected);
+    assert_eq!(place.files(), ["c", "out.exr", "whole.exr"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn signals_end_a_render_with_a_checkpoint_and_a_code() {
+    crate::cli::heed_interrupts();
+    let place = Place::new();
+    let expected = expected(&place);
+    for (signal, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
+        // Nothing is kept for an hour, but at the signal.
+        let child = start(
+            &place,
+            &[
+                "--checkpoint",
+                "c",
+                "--resume",
+                "--checkpoint-interval",
+                "1h",
+                "-o",
+                "out.exr",
+                "--device",
+                "cpu",
+            ],
+        );
+        let before = fs::metadata(place.path("c")).map_or(0, |data| data.len());
+        let begun = Instant::now();
+        while !place.files().iter().any(|name| name.ends_with("-out.exr")) {
+            assert!(begun.elapsed() < Duration::from_secs(60), "{:?}", place.files());
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        std::thread::sleep(Duration::from_millis(300)); // for the handler, and some work
+        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
+        assert!(sent.expect("kill").success());
+        let ran = ended(child);
+        assert_eq!(
+            (ran.code, ran.stderr.as_str()),
+            (
+                code,
+                "note: c has what was rendered; --resume goes on from it\nerror: cancelled\n"
+            ),
+            "{signal}"
+        );
+        assert!(
+            fs::metadata(place.path("c")).expect("the checkpoint").len() > before,
+            "{signal}"
+        );
+        assert_eq!(place.files(), ["c", "whole.exr"]);
+    }
+    let ran = go_on(&place, "cpu");
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    assert!(place.read("out.exr") == expected);
+}
+
+#[test]
+fn a_second_writer_waits_and_goes_on() {
+    let place = Place::new();
+    let expected = expected(&place);
+    let options = [
+        "--checkpoint",
+        "c",
+        "--resume",
+        "--checkpoint-interval",
+        "0.05",
+        "--device",
+        "cpu",
+    ];
+    let mut first = start(&place, &[&options[..], &["-o", "first.exr"]].concat());
+    wait_for(&place, "c", 100_000);
+    let second = start(&place, &[&options[..], &["-o", "second.exr"]].concat());
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(!place.path("second.exr").exists());
+    first.kill().expect("a kill");
+    first.wait().expect("an end");
+    let ran = ended(second);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(place.read("second.exr") == expected);
+    // What the first had done was not done again: the file has each finished piece once.
+    let third = start(
+        &place,
+        &[&options[..], &["-o", "third.exr", "--stats", "stats.json"]].concat(),
+    );
+    assert_eq!(ended(third).code, 0);
+    assert!(place.read("third.exr") == expected);
+    let stats: serde_json::Value = serde_json::from_slice(&place.read("stats.json")).expect("JSON");
+    assert_eq!(stats["share_rendered"], 0.0);
+}
+
+/// What is written after a checkpoint that is there, under other options, or is none.
+#[test]
+fn checkpoints_of_other_jobs_are_refused() {
+    let place = Place::new();
+    let base = ["render", "small.toml", "-o", "out.png", "--device", "cpu"];
+    let run = |more: &[&str]| place.run(&[&base[..], more].concat());
+    assert_eq!(run(&["--checkpoint", "c"]).code, 0);
+    let good = place.read("c");
+    let refused = |more: &[&str], rule: &str| {
+        let ran = run(more);
+        assert_eq!(ran.code, 2, "{more:?}: {}", ran.stderr);
+        assert!(ran.stderr.contains(rule), "{more:?}: {}", ran.stderr);
+        assert!(!ran.stderr.contains("panicked"), "{}", ran.stderr);
+    };
+    refused(
+        &["--checkpoint", "c"],
+        "--checkpoint: c: is there already; --resume goes on from it",
+    );
+    let resume = ["--checkpoint", "c", "--resume"];
+    for (option, value, rule) in [
+        ("--seed", "7", "another scene"),
+        ("--spp", "4", "another number of samples"),
+        ("--size", "11x6", "another size"),
+        ("--crop", "0,0,5,5", "another crop"),
+        ("--light-samples", "9", "another scene"),
+    ] {
+        refused(
+            &[&resume[..], &[option, value]].concat(),
+            &format!("--checkpoint: c: is of {rule}"),
+        );
+    }
+    refused(&[&resume[..], &["--exact-rounding"]].concat(), "another rounding");
+    place.write("small.toml", &super::SCENE.replace("0.8, 0.8, 0.8", "0.8, 0.8, 0.9"));
+    refused(&resume, "another scene");
+    place.write("small.toml", &super::SCENE.replace("# ", "#  "));
+    assert_eq!(run(&resume).code, 0, "a comment is no part of the scene");
+    for (bytes, rule) in [
+        (Vec::new(), "it is no file of pieces that wgray made"),
+        (b"width = 3\n".repeat(20), "it is no file of pieces that wgray made"),
+        (good[..40].to_vec(), "its header is damaged or cut short"),
+    ] {
+        fs::write(place.path("c"), &bytes).expect("a file");
+        refused(&resume, rule);
+        assert_eq!(place.read("c"), bytes, "what is refused stays");
+    }
+    fs::remove_file(place.path("c")).expect("a file");
+    assert_eq!(run(&resume).code, 0, "where there is none yet, one is begun");
+    assert_eq!(place.read("c"), good, "the same job makes the same file");
+    for (name, option) in [
+        ("small.toml", "that is a scene's name"),
+        ("out.png", "that is a picture's name"),
+        ("-", "must be a file"),
+        ("/dev/null", "must be a file"),
+        ("x.toml", "that is a scene's name"),
+        ("x.part", "that is a part's name"),
+    ] {
+        refused(&["--checkpoint", name, "--resume"], option);
+    }
+    let ran = run(&["--checkpoint", "nowhere/c"]);
+    assert_eq!(ran.code, 8, "{}", ran.stderr);
+    refused(&["--resume"], "--checkpoint");
+    refused(&["--checkpoint-interval", "3"], "--checkpoint");
+    for bad in ["-1", "x", "3 s", "1e999", "nan", "5d", ""] {
+        refused(
+            &["--checkpoint", "d", &format!("--checkpoint-interval={bad}")],
+            "--checkpoint-interval",
+        );
+    }
+    for good in ["0", "0.3", "90", "90s", "1.5m", "2h", "250ms", "1e9"] {
+        let _ = fs::remove_file(place.path("d"));
+        let interval = format!("--checkpoint-interval={good}");
+        assert_eq!(run(&["--checkpoint", "d", &interval]).code, 0, "{good}");
+    }
+}
+
+/// Pieces of another job, moved behind the header of this one.
+#[test]
+fn pieces_of_another_job_are_not_believed() {
+    let place = Place::new();
+    let render = |more: &[&str]| {
+        let ran = place.run(&[&["render", "small.toml", "--device", "cpu", "--reproducible"], more].concat());
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        ran.stderr
+    };
+    render(&["--checkpoint", "a", "-o", "a.exr"]);
+    render(&["--checkpoint", "b", "--seed", "1", "-o", "b.exr"]);
+    let [a, b] = ["a", "b"].map(|name| place.read(name));
+    assert_eq!(a.len(), b.len(), "the headers are as long as each other");
+    let pieces = (10 * 6) * 16 + 14 * 4 + 32 + 32;
+    let start = a.len() - pieces;
+    fs::write(place.path("c"), [&a[..start], &b[start..]].concat()).expect("a file");
+    let told = render(&["--checkpoint", "c", "--resume", "-o", "c.exr"]);
+    assert!(told.contains("are damaged"), "{told}");
+    assert!(place.read("c.exr") == place.read("a.exr") && place.read("a.exr") != place.read("b.exr"));
+}
+
+/// Somebody moves, removes or replaces the checkpoint while it is written.
+#[cfg(unix)]
+#[test]
+fn a_checkpoint_that_goes_away_is_put_back_or_told_of() {
+    let place = Place::new();
+    let expected = expected(&place);
+    std::os::unix::fs::symlink("target", place.path("link")).expect("a link");
+    let options = [
+        "--checkpoint",
+        "link",
+        "--resume",
+        "--checkpoint-interval",
+        "0.02",
+        "--device",
+        "cpu",
+    ];
+    let child = start(&place, &[&options[..], &["-o", "out.exr"]].concat());
+    wait_for(&place, "target", 50_000);
+    fs::remove_file(place.path("target")).expect("a file");
+    let ran = ended(child);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    assert!(place.read("out.exr") == expected);
+    let ran = ended(start(
+        &place,
+        &[&options[..], &["-o", "again.exr", "--stats", "stats.json"]].concat(),
+    ));
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    assert!(place.read("again.exr") == expected);
+    fs::remove_file(place.path("target")).expect("a file");
+    let child = start(&place, &[&options[..], &["-o", "out.exr"]].concat());
+    wait_for(&place, "target", 50_000);
+    fs::remove_file(place.path("target")).expect("a file");
+    place.write("target", "mine");
+    let ran = ended(child);
+    assert_eq!(ran.code, 0);
+    assert!(
+        ran.stderr.contains("is changed or replaced by somebody else"),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(place.read("target"), b"mine");
+}
+
+#[test]
+fn a_damaged_checkpoint_is_used_up_to_the_damage() {
+    let place = Place::new();
+    let expected = expected(&place);
+    let child = start(&place, &["--checkpoint", "c", "-o", "out.exr", "--device", "cpu"]);
+    assert_eq!(ended(child).code, 0);
+    let mut bytes = place.read("c");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(place.path("c"), &bytes).expect("a file");
+    let ran = go_on(&place, "cpu");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(
+        ran.stderr.starts_with("warning: c: ") && ran.stderr.contains("are damaged"),
+        "{}",
+        ran.stderr
+    );
+    assert!(place.read("out.exr") == expected);
+    // An append that was cut short.
+    let mut file = fs::File::options().append(true).open(place.path("c")).expect("a file");
+    file.write_all(&bytes[200..900]).expect("bytes");
+    let ran = go_on(&place, "cpu");
+    assert!(ran.stderr.contains(": 700 bytes from byte"), "{}", ran.stderr);
+    assert_eq!(go_on(&place, "cpu").stderr, "", "what was damaged is gone");
+    assert!(place.read("out.exr") == expected);
+}
+
+/// A disk that fills up under a render: the picture fails, what was kept is there, and with room the work goes on.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_loses_no_kept_work() {
+    let place = Place::new();
+    let expected = expected(&place);
+    // 250 KiB at most for each file: the checkpoint takes 400.
+    let line = "trap '' XFSZ; ulimit -f 500; exec \"$0\" render small.toml --size 160x160 --spp 300 --aov normal \
+                --reproducible --checkpoint c --checkpoint-interval 0.02 -o out.exr --exr-compression none --device cpu";
+    let ran = place.shell("sh", line);
+    assert_eq!(ran.code, 8, "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("out.exr: cannot be written: File too large"),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(place.files(), ["c", "whole.exr"], "no half file");
+    let kept = fs::metadata(place.path("c")).expect("the checkpoint").len();
+    assert!(kept > 50_000, "{kept}");
+    let ran = go_on(&place, "cpu");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(place.read("out.exr") == expected);
+}
+
+/// A file system that is full, or read-only, in a name space of its own; where the system has none for us, the limit on files
+/// above stands for the first, and the mode of a folder for the second.
+#[cfg(target_os = "linux")]
+#[test]
+fn full_and_read_only_file_systems() {
+    let place = Place::new();
+    fs::create_dir(place.path("disk")).expect("a folder");
+    let can = place.shell("sh", "unshare -rm mount -t tmpfs -o size=64k none disk");
+    if can.code != 0 {
+        eprintln!("no name space of one's own: {}", can.stderr);
+        return;
+    }
+    let run = |options: &str, command: &str| {
+        let line = format!("exec unshare -rm sh -c 'mount -t tmpfs -o {options} none disk && {command}' \"$0\"");
+        place.shell("sh", &line)
+    };
+    let render = "\"$0\" render small.toml --size 200x200 --device cpu";
+    let full = run(
+        "size=64k",
+        &format!("{render} --spp 1 -o disk/out.exr; echo $?; ls -A disk"),
+    );
+    assert_eq!(full.stdout, "8\n", "{}", full.stderr);
+    assert!(
+        full.stderr.contains("disk/out.exr: cannot be written: No space left"),
+        "{}",
+        full.stderr
+    );
+    let kept = format!("{render} --spp 1 --checkpoint disk/c -o out.png; echo $?; ls -A disk");
+    let full = run("size=256k", &kept);
+    assert_eq!(full.stdout, "0\nc\n", "{}", full.stderr);
+    assert!(
+        full.stderr
+            .contains("warning: disk/c: a piece could not be written, the work goes on"),
+        "{}",
+        full.stderr
+    );
+    let none = run("size=4k", &kept);
+    assert!(
+        none.stdout.starts_with("0\n") || none.stdout.starts_with("8\n"),
+        "{}",
+        none.stdout
+    );
+    for output in ["-o disk/out.png", "-o out.png --checkpoint disk/c"] {
+        let begun = Instant::now();
+        let read_only = run("ro", &format!("{render} --spp 60000 {output}; echo $?; ls -A disk"));
+        assert_eq!(read_only.stdout, "8\n", "{}", read_only.stderr);
+        assert!(
+            read_only.stderr.contains("Read-only file system"),
+            "{}",
+            read_only.stderr
+        );
+        assert!(begun.elapsed() < Duration::from_secs(20), "told before the work");
+    }
+}
+
+#[test]
+fn parts_make_the_same_picture() {
+    let place = Place::new();
+    let options = [
+        "small.toml",
+        "--size",
+        "30x23",
+        "--device",
+        "cpu",
+        "--reproducible",
+        "--aov",
+        "normal,depth,instance",
+    ];
+    let render = |more: &[&str]| place.quietly(&[&["render"], &options[..], more].concat());
+    render(&["-o", "whole.png", "-o", "whole.exr"]);
+    let names: Vec<String> = (1..=7).map(|i| format!("p{i}.part")).collect();
+    for (i, name) in (1..).zip(&names) {
+        render(&["--tile", &format!("{i}/7"), "-o", name]);
+    }
+    let shuffled: Vec<&str> = [3, 0, 6, 1, 5, 2, 4].map(|i| names[i].as_str()).to_vec();
+    let merge = |parts: &[&str]| {
+        place.run(&[&["merge"], parts, &["-o", "out.png", "-o", "out.exr", "--reproducible"]].concat())
+    };
+    let ran = merge(&shuffled);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    for end in ["png", "exr", "normal.png", "depth.png", "instance.png"] {
+        assert!(
+            place.read(&format!("out.{end}")) == place.read(&format!("whole.{end}")),
+            "{end}"
+        );
+        fs::remove_file(place.path(&format!("out.{end}"))).expect("a file");
+    }
+    let refused = |parts: &[&str], rule: &str| {
+        let ran = merge(parts);
+        assert_eq!(ran.code, 1, "{parts:?}: {}", ran.stderr);
+        assert!(ran.stderr.contains(rule), "{parts:?}: {}", ran.stderr);
+        assert!(
+            !place.files().iter().any(|name| name.contains("out.")),
+            "{:?}",
+            place.files()
+        );
+    };
+    refused(&shuffled[1..], "rows 9 to 12 are missing: there is no part 4/7");
+    refused(
+        &[&shuffled[..], &["p2.part"]].concat(),
+        "p2.part: has rows 3 to 5, which p2.part has too",
+    );
+    render(&["--tile", "2/3", "-o", "other.part"]);
+    refused(&[&shuffled[..], &["other.part"]].concat(), "other.part: has rows");
+    // Parts of several divisions that fit.
+    render(&["--tile", "1/1", "-o", "all.part"]);
+    assert_eq!(merge(&["all.part"]).code, 0);
+    for end in ["png", "exr", "normal.png", "depth.png", "instance.png"] {
+        fs::remove_file(place.path(&format!("out.{end}"))).expect("a file");
+    }
+    render(&["--tile", "1/7", "--seed", "3", "-o", "seed.part"]);
+    refused(&["seed.part", "p2.part"], "p2.part: is of another scene");
+    place.quietly(&[
+        "render",
+        "small.toml",
+        "--size",
+        "30x23",
+        "--device",
+        "cpu",
+        "--tile",
+        "1/7",
+        "-o",
+        "bare.part",
+    ]);
+    refused(&["bare.part", "p2.part"], "p2.part: has other layers than bare.part");
+    render(&["--tile", "1/7", "-D", "image.exposure=1", "-o", "bright.part"]);
+    let bright: Vec<&str> = ["bright.part"]
+        .into_iter()
+        .chain(names[1..].iter().map(String::as_str))
+        .collect();
+    refused(
+        &bright,
+        "p2.part: is shown by another view transform or exposure than bright.part",
+    );
+    let mut given = [&["merge"], &bright[..], &["-o", "given.png", "--reproducible"]].concat();
+    given.extend(["--exposure", "0", "--view-transform", "gamma22"]);
+    place.quietly(&given);
+    assert!(place.read("given.png") == place.read("whole.png"));
+    place.quietly(&[&["merge"], &shuffled[..], &["-o", "given.jpg"]].concat());
+    for length in [0, 10, 300, place.read("p2.part").len() - 1] {
+        fs::write(place.path("cut.part"), &place.read("p2.part")[..length]).expect("a file");
+        refused(&["p1.part", "cut.part"], "cut.part: ");
+    }
+    refused(&["small.toml"], "small.toml: it is no file of pieces that wgray made");
+    refused(&["nowhere.part"], "nowhere.part: ");
+    render(&["--checkpoint", "c", "-o", "whole.png"]);
+    fs::copy(place.path("c"), place.path("c.part")).expect("a copy");
+    refused(&["c.part"], "c.part: is a checkpoint");
+    for (arguments, rule) in [
+        (&["merge", "all.part", "-o", "all.part"][..], "is a part's name"),
+        (
+            &["merge", "all.part", "-o", "all.part", "--format", "png"],
+            "--output: all.part: is a file",
+        ),
+        (
+            &["render", "small.toml", "--tile", "1/7", "-o", "x.png"],
+            "--tile: needs one -o NAME.part",
+        ),
+        (
+            &["render", "small.toml", "--tile", "1/7"],
+            "--tile: needs one -o NAME.part",
+        ),
+        (&["render", "small.toml", "--tile", "0/7", "-o", "x.part"], "--tile"),
+        (&["render", "small.toml", "--tile", "8/7", "-o", "x.part"], "--tile"),
+        (
+            &["render", "small.toml", "--tile", "1/7", "-o", "x.part"],
+            "parts are whole rows, and the picture has 6 of them",
+        ),
+        (&["render", "small.toml", "-o", "x.part"], "is a part's name"),
+    ] {
+        let ran = place.run(arguments);
+        assert_eq!(ran.code, 2, "{arguments:?}: {}", ran.stderr);
+        assert!(ran.stderr.contains(rule), "{arguments:?}: {}", ran.stderr);
+    }
+}
+
+#[test]
+fn a_part_goes_on_from_its_own_checkpoint() {
+    let place = Place::new();
+    let part = |more: &[&str]| {
+        let base = ["render", "small.toml", "--device", "cpu", "--tile", "2/3"];
+        place.run(&[&base[..], more].concat())
+    };
+    assert_eq!(part(&["-o", "a.part", "--checkpoint", "c"]).code, 0);
+    assert_eq!(part(&["-o", "b.part", "--checkpoint", "c", "--resume"]).code, 0);
+    assert!(place.read("a.part") == place.read("b.part"));
+    let ran = place.run(&[
+        "render",
+        "small.toml",
+        "--device",
+        "cpu",
+        "-o",
+        "x.png",
+        "--checkpoint",
+        "c",
+        "--resume",
+    ]);
+    assert_eq!(ran.code, 2);
+    assert!(ran.stderr.contains("another crop"), "{}", ran.stderr);
+}
+
+#[test]
+fn a_time_limit_ends_with_a_whole_picture() {
+    let place = Place::new();
+    let begun = Instant::now();
+    let options = [
+        "render",
+        "small.toml",
+        "--size",
+        "300x200",
+        "--spp",
+        "65536",
+        "--reproducible",
+        "--device",
+        "cpu",
+    ];
+    let run = |more: &[&str]| place.run(&[&options[..], more].concat());
+    let ran = run(&["--time-limit", "0.5", "-o", "a.png", "--stats", "a.json"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stderr.starts_with("note: the time was up: "), "{}", ran.stderr);
+    assert!(begun.elapsed() < Duration::from_secs(30), "{:?}", begun.elapsed());
+    let stats = |name: &str| -> serde_json::Value { serde_json::from_slice(&place.read(name)).expect("JSON") };
+    let least = stats("a.json")["least_samples"].as_u64().expect("a number");
+    assert!((1..65536).contains(&least), "{least}");
+    let (_, _, pixels) = super::read_png(&place.path("a.png"));
+    assert!(
+        pixels.chunks(3).all(|pixel| pixel != [0, 0, 0]),
+        "every pixel has a sample"
+    );
+    let ran = run(&["--time-limit", "0", "-o", "a.png", "--stats", "a.json"]);
+    assert_eq!(
+        (ran.code, stats("a.json")["least_samples"].as_u64()),
+        (0, Some(1)),
+        "{}",
+        ran.stderr
+    );
+    for pattern in ["grid", "rotated_grid", "jittered"] {
+        let ran = run(&["--time-limit", "1", "--pixel-pattern", pattern, "-o", "b.png"]);
+        assert_eq!(ran.code, 2, "{}", ran.stderr);
+        assert!(
+            ran.stderr
+                .contains("--time-limit: needs samples of which a part is a picture too"),
+            "{}",
+            ran.stderr
+        );
+    }
+    // Enough time: the same picture. And one that was stopped goes on to the same picture.
+    let short = [
+        "render",
+        "small.toml",
+        "--size",
+        "300x200",
+        "--spp",
+        "300",
+        "--reproducible",
+        "--device",
+        "cpu",
+    ];
+    let short = |more: &[&str]| place.run(&[&short[..], more].concat());
+    assert_eq!(short(&["-o", "whole.exr"]).code, 0);
+    let ran = short(&["-o", "limited.exr", "--time-limit", "1h"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    assert_eq!(place.run(&["diff", "limited.exr", "whole.exr"]).code, 0);
+    let kept = ["--checkpoint", "c", "--resume", "-o", "kept.exr"];
+    assert_eq!(short(&[&kept[..], &["--time-limit", "0"]].concat()).code, 0);
+    assert!(place.read("kept.exr") != place.read("whole.exr"));
+    assert_eq!(short(&kept).code, 0);
+    assert!(place.read("kept.exr") == place.read("whole.exr"));
+}

@@ -1,0 +1,669 @@
+//! Formats, what they hold and what is told in them; several of one render; how light is shown.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use exr::prelude::{FlatSamples, f16};
+use wgray::image::{read_exr, to_8_bits, to_16_bits};
+use wgray::scene::{ViewSettings, ViewTransform};
+
+use super::outputs::refused;
+use super::{Place, SCENE, read_png};
+
+/// Runs a render on the CPU, in silence.
+fn render(place: &Place, arguments: &[&str]) {
+    place.quietly(&[&["render", "small.toml", "--device", "cpu"], arguments].concat());
+}
+
+/// What a PNG says of itself.
+fn png_info(path: &Path) -> png::Info<'static> {
+    let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
+    png::Decoder::new(file).read_info().unwrap().info().clone()
+}
+
+/// The texts of a PNG.
+fn texts(path: &Path) -> BTreeMap<String, String> {
+    let info = png_info(path);
+    let texts = info.uncompressed_latin1_text.iter();
+    texts.map(|chunk| (chunk.keyword.clone(), chunk.text.clone())).collect()
+}
+
+/// The samples of an EXR by channel, as bits; halves as they are.
+fn samples(path: &Path) -> BTreeMap<String, Vec<u32>> {
+    let image = exr::prelude::read_first_flat_layer_from_file(path).unwrap();
+    let bits = |samples: &FlatSamples| match samples {
+        FlatSamples::F32(values) => values.iter().map(|value| value.to_bits()).collect(),
+        FlatSamples::U32(values) => values.clone(),
+        FlatSamples::F16(values) => values.iter().map(|value| u32::from(value.to_bits())).collect(),
+    };
+    let channels = image.layer_data.channel_data.list.iter();
+    channels
+        .map(|channel| (channel.name.to_string(), bits(&channel.sample_data)))
+        .collect()
+}
+
+fn path_scene() -> String {
+    SCENE
+        .replace("[render]", "[render]\nintegrator = \"path\"\nalpha = true")
+        .replace("ambient = [0.1, 0.1, 0.1]\n", "")
+        .replace("light_samples = { pattern = \"grid\", count = 4 }\n", "")
+        .replace("type = \"plane\"", "type = \"rectangle\"\nsize = [3, 3]")
+        .replace("point = [0, 0, 0]", "center = [0, 0, 0]")
+        .replace("\"phong\"", "\"diffuse\"")
+}
+
+#[test]
+fn one_render_writes_several_pictures() {
+    const NAMES: [&str; 6] = ["a.png", "a.exr", "a.jpg", "a.jpeg", "a.webp", "b.PNG"];
+    let place = Place::new();
+    let aovs = ["--aov", "depth,primitive"];
+    let outputs = NAMES.map(|name| ["-o", name]).concat();
+    render(&place, &[&outputs[..], &aovs].concat());
+    let all = place.files();
+    assert_eq!(
+        all,
+        [
+            "a.depth.png",
+            "a.exr",
+            "a.jpeg",
+            "a.jpg",
+            "a.png",
+            "a.primitive.png",
+            "a.webp",
+            "b.PNG",
+            "b.depth.png",
+            "b.primitive.png"
+        ]
+    );
+    let together: Vec<Vec<u8>> = all.iter().map(|name| place.read(name)).collect();
+    for name in NAMES {
+        match name {
+            "a.jpg" | "a.jpeg" | "a.webp" => render(&place, &["-o", name]),
+            _ => render(&place, &[&["-o", name], &aovs[..]].concat()),
+        }
+    }
+    assert_eq!(place.files(), all);
+    for (name, together) in all.iter().zip(together) {
+        assert!(place.read(name) == together, "{name} is another one by itself");
+    }
+    assert_ne!(place.read("a.png"), place.read("a.depth.png"));
+}
+
+#[test]
+fn a_picture_that_fails_leaves_none_of_the_others() {
+    let place = Place::new();
+    let ran = place.run(&[
+        "render",
+        "small.toml",
+        "--device",
+        "cpu",
+        "-o",
+        "a.png",
+        "-o",
+        "a.exr",
+        "-o",
+        "/dev/full",
+        "-o",
+        "b.png",
+    ]);
+    assert_ne!(ran.code, 0);
+    assert!(ran.stderr.contains("/dev/full: cannot be written"), "{}", ran.stderr);
+    // Files get their names one after the other: those before it may be there, whole; none after it.
+    assert!(!place.files().contains(&"b.png".to_owned()), "{:?}", place.files());
+    assert!(
+        place.files().iter().all(|name| !name.starts_with('.')),
+        "{:?}",
+        place.files()
+    );
+}
+
+#[test]
+fn pngs_have_8_or_16_bits_and_tell_their_curve() {
+    let place = Place::new();
+    render(&place, &["-o", "a.exr"]);
+    let linear = read_exr(&place.path("a.exr")).unwrap().colors;
+    for transform in ViewTransform::ALL {
+        let settings = ViewSettings {
+            transform,
+            exposure: -0.5,
+        };
+        let (name, shown) = (
+            transform.name(),
+            linear.iter().flat_map(|color| settings.display(*color)),
+        );
+        let options = ["--view-transform", name, "--exposure", "-0.5"];
+        render(&place, &[&["-o", "a.png"], &options[..]].concat());
+        render(
+            &place,
+            &[&["-o", "b.png", "--bit-depth", "16", "--aov", "normal"], &options[..]].concat(),
+        );
+        let expected: Vec<u8> = shown.clone().map(to_8_bits).collect();
+        assert_eq!(read_png(&place.path("a.png")).2, expected, "{name}");
+        let image::DynamicImage::ImageRgb16(deep) = image::open(place.path("b.png")).unwrap() else {
+            panic!("not 16 bits");
+        };
+        let expected: Vec<u16> = shown.map(to_16_bits).collect();
+        assert_eq!(deep.into_raw(), expected, "{name}");
+        assert!(
+            expected.iter().any(|value| value % 257 != 0),
+            "more than 8 bits would hold"
+        );
+        assert_eq!(png_info(&place.path("b.normal.png")).bit_depth, png::BitDepth::Sixteen);
+        let info = png_info(&place.path("a.png"));
+        let (srgb, gamma) = (info.srgb.is_some(), info.gama_chunk.map(|gamma| gamma.into_scaled()));
+        match transform {
+            ViewTransform::Gamma22 => assert_eq!((srgb, gamma), (false, Some(45_454))),
+            _ => assert!(srgb, "{name}"),
+        }
+    }
+}
+
+#[test]
+fn the_scene_says_how_it_is_shown_and_options_stand_in() {
+    let place = Place::new();
+    let keys = "view_transform = 'khronos-pbr-neutral', exposure = 1.5";
+    place.write(
+        "shown.toml",
+        &SCENE.replacen("height = 6", &format!("height = 6, {keys}"), 1),
+    );
+    let shown = |options: &[&str]| {
+        place.quietly(&[&["render", "shown.toml", "--device", "cpu", "-o", "s.png"], options].concat());
+        read_png(&place.path("s.png"))
+    };
+    let plain = |options: &[&str]| {
+        render(&place, &[&["-o", "p.png"], options].concat());
+        read_png(&place.path("p.png"))
+    };
+    let of_scene = shown(&[]);
+    assert_eq!(
+        of_scene,
+        plain(&["--view-transform", "khronos-pbr-neutral", "--exposure", "1.5"])
+    );
+    assert_ne!(of_scene, plain(&["--view-transform", "khronos-pbr-neutral"]));
+    assert_ne!(of_scene, plain(&["--exposure", "1.5"]));
+    assert_eq!(shown(&["--view-transform", "gamma22", "--exposure", "0"]), plain(&[]));
+    assert_eq!(
+        shown(&["--exposure", "-2"]),
+        plain(&["--view-transform", "khronos-pbr-neutral", "--exposure", "-2"])
+    );
+    // An EXR is linear, whatever the scene says; and the library's pictures are the program's.
+    place.quietly(&["render", "shown.toml", "--device", "cpu", "-o", "s.exr"]);
+    render(&place, &["-o", "p.exr"]);
+    assert_eq!(place.read("s.exr"), place.read("p.exr"));
+    let scene = wgray::Scene::load(place.path("shown.toml")).unwrap();
+    let options = wgray::Options {
+        device: wgray::Device::Cpu,
+        ..Default::default()
+    };
+    let picture = wgray::render(&scene, &options).unwrap();
+    assert_eq!(picture.rgb8(), of_scene.2);
+    picture.save(place.path("l.webp")).unwrap();
+    assert_eq!(
+        image::open(place.path("l.webp")).unwrap().into_rgb8().into_raw(),
+        of_scene.2
+    );
+    for (keys, told) in [
+        ("exposure = 101", "image.exposure: 101 must be stops from -100 to 100"),
+        ("exposure = nan", "image.exposure: NaN must be stops"),
+        ("view_transform = 'filmic'", "image.view_transform: "),
+        ("view = 'srgb'", "view"),
+    ] {
+        place.write(
+            "bad.toml",
+            &SCENE.replacen("height = 6", &format!("height = 6, {keys}"), 1),
+        );
+        let ran = place.run(&["check", "bad.toml"]);
+        assert_eq!(ran.code, 3, "{keys}: {}", ran.stderr);
+        assert!(ran.stderr.contains(told), "{keys}: {}", ran.stderr);
+    }
+}
+
+#[test]
+fn exrs_are_compressed_in_every_way_without_loss() {
+    let place = Place::new();
+    let aovs = ["--aov", "depth,primitive", "--size", "75x70"];
+    render(&place, &[&["-o", "zip.exr"], &aovs[..]].concat());
+    let floats = samples(&place.path("zip.exr"));
+    let halves: BTreeMap<String, Vec<u32>> = (floats.iter())
+        .map(|(name, bits)| match name.as_str() {
+            "primitive.ID" => (name.clone(), bits.clone()),
+            _ => {
+                let half = |bits: &u32| u32::from(f16::from_f32(f32::from_bits(*bits)).to_bits());
+                (name.clone(), bits.iter().map(half).collect())
+            }
+        })
+        .collect();
+    let mut sizes = BTreeMap::new();
+    for method in ["none", "rle", "zips", "zip", "piz"] {
+        for (numbers, expected) in [("float", &floats), ("half", &halves)] {
+            let options = ["--exr-compression", method, "--exr-type", numbers];
+            render(&place, &[&["-o", "a.exr"], &aovs[..], &options].concat());
+            assert!(samples(&place.path("a.exr")) == *expected, "{method} {numbers}");
+            sizes.insert((method, numbers), place.read("a.exr").len());
+            // A part whose first row is inside of a block, and whose last block is not full.
+            render(
+                &place,
+                &[&["-o", "c.exr", "--crop", "3,5,70,62"], &aovs[..], &options].concat(),
+            );
+            let part = samples(&place.path("c.exr"));
+            for (name, whole) in expected {
+                let rows = whole.chunks(75).skip(5).take(57);
+                let cut: Vec<u32> = rows.flat_map(|row| row[3..70].to_vec()).collect();
+                assert!(part[name] == cut, "{method} {numbers}: {name}");
+            }
+        }
+    }
+    let (pixels, header) = (75 * 70, 2000);
+    assert!(sizes[&("none", "float")] >= pixels * 5 * 4 && sizes[&("none", "float")] < pixels * 5 * 4 + header);
+    assert!(sizes[&("none", "half")] < pixels * (4 * 2 + 4) + header);
+    assert!(sizes[&("zip", "float")] < sizes[&("none", "float")]);
+    let depth = |bits: &BTreeMap<String, Vec<u32>>| bits["depth.Z"][3000];
+    assert_ne!(depth(&floats), depth(&halves));
+}
+
+#[test]
+fn halves_that_are_too_large_are_counted() {
+    let place = Place::new();
+    place.write(
+        "small.toml",
+        &SCENE.replace("background = [0.2, 0.3, 2]", "background = [65504, 65519, 70000]"),
+    );
+    let ran = place.run(&[
+        "render",
+        "small.toml",
+        "--device",
+        "cpu",
+        "-o",
+        "h.exr",
+        "--exr-type",
+        "half",
+    ]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let found = samples(&place.path("h.exr"));
+    let infinite = |name: &str| found[name].iter().filter(|bits| **bits == 0x7c00).count();
+    let of_blue = infinite("B");
+    assert!(of_blue > 5, "{of_blue}");
+    // What is nearer to 65504 than to the next step, 65536, is that.
+    assert_eq!((infinite("R"), infinite("G")), (0, 0));
+    let told = format!(
+        "warning: h.exr: {of_blue} values are too large for 16 bits, which hold 65504 at most, and are infinite there\n"
+    );
+    assert_eq!(ran.stderr, told);
+    place.quietly(&[
+        "render",
+        "small.toml",
+        "--device",
+        "cpu",
+        "-o",
+        "h.exr",
+        "--exr-type",
+        "half",
+        "-q",
+    ]);
+    place.quietly(&["render", "small.toml", "--device", "cpu", "-o", "f.exr"]);
+}
+
+#[test]
+fn thumbnails_show_the_picture() {
+    let place = Place::new();
+    let size = ["--size", "160x96"];
+    render(
+        &place,
+        &[&["-o", "a.png", "-o", "a.webp", "-o", "a.jpg"], &size[..]].concat(),
+    );
+    render(&place, &[&["-o", "b.jpg", "--quality", "20"], &size[..]].concat());
+    let (_, _, exact) = read_png(&place.path("a.png"));
+    let image::DynamicImage::ImageRgb8(webp) = image::open(place.path("a.webp")).unwrap() else {
+        panic!("no RGB");
+    };
+    assert_eq!(webp.into_raw(), exact, "WebP is without loss");
+    let error = |name: &str| {
+        let found = image::open(place.path(name)).unwrap().into_rgb8().into_raw();
+        let squares = found
+            .iter()
+            .zip(&exact)
+            .map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
+        (squares.sum::<f64>() / exact.len() as f64).sqrt()
+    };
+    let (fine, coarse) = (error("a.jpg"), error("b.jpg"));
+    assert!(fine > 0.0 && fine < 6.0, "{fine}");
+    assert!(coarse > fine, "{coarse}, {fine}");
+    assert!(place.read("b.jpg").len() < place.read("a.jpg").len());
+}
+
+#[test]
+fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
+    let place = Place::new();
+    place.write("small.toml", &path_scene());
+    render(
+        &place,
+        &[
+            "-o",
+            "a.png",
+            "-o",
+            "a.webp",
+            "-o",
+            "a.exr",
+            "-o",
+            "a.jpg",
+            "--quality",
+            "100",
+        ],
+    );
+    let image::DynamicImage::ImageRgba8(png) = image::open(place.path("a.png")).unwrap() else {
+        panic!("no alpha in a PNG");
+    };
+    let image::DynamicImage::ImageRgba8(webp) = image::open(place.path("a.webp")).unwrap() else {
+        panic!("no alpha in a WebP");
+    };
+    let clear = png.pixels().filter(|pixel| pixel.0[3] == 0).count();
+    let part = png.pixels().filter(|pixel| !matches!(pixel.0[3], 0 | 255)).count();
+    assert!(clear > 5 && part > 3, "{clear}, {part}");
+    for (a, b) in png.pixels().zip(webp.pixels()) {
+        // Where nothing is no colour is told.
+        assert!(a == b || (a.0[3], b.0[3]) == (0, 0), "{a:?} {b:?}");
+    }
+    let jpeg = image::open(place.path("a.jpg")).unwrap().into_rgb8();
+    let over_black = read_exr(&place.path("a.exr")).unwrap().colors;
+    for (found, color) in jpeg.pixels().zip(over_black) {
+        let expected = ViewSettings::default().rgb8(color);
+        let apart = found.0.iter().zip(expected).map(|(a, b)| a.abs_diff(b)).max();
+        assert!(apart <= Some(12), "{found:?} {expected:?}");
+    }
+}
+
+/// Light is shown as the picture is, a share of light by the curve alone, and all else as it is.
+#[test]
+fn layers_of_light_are_shown_as_the_picture() {
+    let place = Place::new();
+    place.write("small.toml", &path_scene());
+    let names = ["albedo", "direct", "indirect", "emission"];
+    let options = [
+        "--view-transform",
+        "agx",
+        "--exposure",
+        "2",
+        "--aov",
+        "normal,albedo,direct,indirect,emission",
+    ];
+    render(&place, &[&["-o", "a.png", "-o", "a.exr"], &options[..]].concat());
+    let numbers = samples(&place.path("a.exr"));
+    let settings = ViewSettings {
+        transform: ViewTransform::Agx,
+        exposure: 2.0,
+    };
+    let mut differing = 0;
+    for name in names {
+        let (_, _, shown) = read_png(&place.path(&format!("a.{name}.png")));
+        for (i, found) in shown.chunks(3).enumerate() {
+            let color = ["R", "G", "B"].map(|part| f32::from_bits(numbers[&format!("{name}.{part}")][i]));
+            let light = settings.rgb8(color);
+            let share = settings.display_share(color).map(to_8_bits);
+            differing += usize::from(light != share);
+            assert_eq!(found, if name == "albedo" { share } else { light }, "{name} {i}");
+        }
+    }
+    assert!(differing > 30, "{differing}");
+    let (_, _, bent) = read_png(&place.path("a.normal.png"));
+    render(&place, &["-o", "b.png", "--aov", "normal"]);
+    assert_eq!(read_png(&place.path("b.normal.png")).2, bent);
+    // With 16 bits alpha has them too.
+    render(&place, &["-o", "c.png", "--bit-depth", "16"]);
+    let image::DynamicImage::ImageRgba16(deep) = image::open(place.path("c.png")).unwrap() else {
+        panic!("not 16 bits with alpha");
+    };
+    for (pixel, alpha) in deep.pixels().zip(&numbers["A"]) {
+        assert_eq!(pixel.0[3], to_16_bits(f64::from(f32::from_bits(*alpha))));
+    }
+}
+
+#[test]
+fn pictures_tell_how_they_came_to_be() {
+    let place = Place::new();
+    render(
+        &place,
+        &[
+            "-o",
+            "a.png",
+            "-o",
+            "a.jpg",
+            "-o",
+            "a.webp",
+            "-o",
+            "a.exr",
+            "--seed",
+            "7",
+            "--view-transform",
+            "agx",
+        ],
+    );
+    let png = texts(&place.path("a.png"));
+    assert_eq!(png["Software"], concat!("wgray ", env!("CARGO_PKG_VERSION")));
+    let known: Vec<(&str, &str)> = [
+        ("seed", "7"),
+        ("integrator", "phong"),
+        ("pixel_samples", "3 random"),
+        ("device", "cpu"),
+        ("view_transform", "agx"),
+        ("exposure", "0"),
+    ]
+    .into();
+    for (name, text) in &known {
+        assert_eq!(png[*name], *text, "{name}");
+    }
+    assert_eq!((png["shader_hash"].len(), png["scene_hash"].len()), (64, 64));
+    place.write("other.toml", &SCENE.replacen("0.8", "0.7", 1));
+    place.quietly(&["render", "other.toml", "--device", "cpu", "-o", "b.png", "--seed", "7"]);
+    let other = texts(&place.path("b.png"));
+    assert_ne!(other["scene_hash"], png["scene_hash"]);
+    assert_eq!(other["shader_hash"], png["shader_hash"]);
+    let shown = |name: &str| {
+        let data = exif::Reader::new()
+            .read_from_container(&mut std::io::Cursor::new(place.read(name)))
+            .unwrap();
+        let text = |tag| match &data.get_field(tag, exif::In::PRIMARY).unwrap().value {
+            exif::Value::Ascii(texts) => String::from_utf8(texts[0].clone()).unwrap(),
+            _ => panic!("no text"),
+        };
+        (text(exif::Tag::Software), text(exif::Tag::ImageDescription))
+    };
+    let meta = exr::meta::MetaData::read_from_file(place.path("a.exr"), true).unwrap();
+    let own = &meta.headers[0].own_attributes;
+    let text = |text: &Option<exr::meta::attribute::Text>| text.as_ref().unwrap().to_string();
+    for (name, (software, lines)) in [
+        ("a.jpg", shown("a.jpg")),
+        ("a.webp", shown("a.webp")),
+        ("a.exr", (text(&own.software_name), text(&own.comments))),
+    ] {
+        assert_eq!(software, png["Software"], "{name}");
+        for (key, value) in &png {
+            let there = lines.lines().any(|line| line == format!("{key}: {value}"));
+            let of_display = ["view_transform", "exposure"].contains(&key.as_str()) && name == "a.exr";
+            assert_eq!(there, key != "Software" && !of_display, "{name}: {key}");
+        }
+    }
+}
+
+#[test]
+fn a_reproducible_picture_is_the_same_wherever_it_was_rendered() {
+    let place = Place::new();
+    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
+    const NAMES: [&str; 5] = ["a.png", "a.normal.png", "a.exr", "a.webp", "a.jpg"];
+    for device in ["cpu", "gpu"] {
+        if device == "gpu" && !crate::adapter::device().is_some_and(crate::adapter::bit_exact) {
+            continue;
+        }
+        for reproducible in [true, false] {
+            let outputs = [
+                "-o", "a.png", "-o", "a.exr", "-o", "a.webp", "-o", "a.jpg", "--aov", "normal", "--device", device,
+            ];
+            let option: &[&str] = if reproducible { &["--reproducible"] } else { &[] };
+            place.quietly(&[&["render", "small.toml"], &outputs[..], option].concat());
+            for name in NAMES {
+                let bytes = place.read(name);
+                let mut others = files.iter().filter(|(other, _)| other == name);
+                let same = others.any(|(_, other)| *other == bytes);
+                assert_eq!(same, reproducible && device == "gpu", "{name} {device}");
+                files.push((name.to_owned(), bytes));
+            }
+            let told = texts(&place.path("a.png"));
+            assert_eq!(told.contains_key("device"), !reproducible);
+            assert!(told.contains_key("shader_hash") && told.contains_key("seed"));
+        }
+    }
+}
+
+#[test]
+fn options_that_no_picture_heeds_are_refused() {
+    let place = Place::new();
+    for (arguments, told) in [
+        (
+            &["-o", "a.exr", "--bit-depth", "16"][..],
+            "--bit-depth: is for a PNG, and no output is one",
+        ),
+        (
+            &["-o", "a.exr", "--exposure", "1"],
+            "--exposure: is for a PNG, a JPEG, a WebP, and no output is one",
+        ),
+        (
+            &["-o", "a.exr", "--view-transform", "agx"],
+            "--view-transform: is for a PNG, a JPEG",
+        ),
+        (
+            &["--exr-type", "half"],
+            "--exr-type: is for an EXR, and no output is one",
+        ),
+        (&["--exr-compression", "rle"], "--exr-compression: is for an EXR"),
+        (
+            &["-o", "a.webp", "--quality", "80"],
+            "--quality: is for a JPEG, and no output is one",
+        ),
+        (
+            &["-o", "a.jpg", "-o", "a.webp", "--aov", "depth"],
+            "--aov depth: is in an EXR or beside a PNG, and no output is one; a further -o NAME.exr",
+        ),
+        (
+            &["-o", "a.jpg", "-o", "b", "--format", "exr", "-o", "c.gif", "-o", "./b"],
+            "--output: ./b: is where --output writes to",
+        ),
+        (
+            &["-o", "a.png", "-o", "a.normal.png", "--aov", "normal"],
+            "--output: a.normal.png: is where --aov normal writes to",
+        ),
+        (
+            &["-o", "a.png", "-o", "a.png"],
+            "--output: a.png: is where --output writes to",
+        ),
+        (&["-o", "-", "-o", "/dev/stdout"], "is where --output writes to"),
+        (
+            &["-o", "a.png", "-o", "b.exr", "--format", "png"],
+            "--format: must be what the name of --output says, b.exr ends in .exr",
+        ),
+        (
+            &["-o", "a.png", "-o", "b"],
+            "--output: b: must end in .png, .exr, .jpg, .jpeg or .webp, or --format must say",
+        ),
+        (&["--stats", "a.webp"], "--stats: a.webp: must not end in .webp"),
+    ] {
+        refused(&place, &[&["small.toml"], arguments].concat(), 2, told);
+    }
+    for (option, value, told) in [
+        ("--quality", "0", "0"),
+        ("--quality", "101", "101"),
+        ("--exposure", "nan", "must be stops from -100 to 100"),
+        ("--exposure", "-101", "must be stops from -100 to 100"),
+        ("--exposure", "one", "must be stops from -100 to 100"),
+        ("--bit-depth", "12", "12"),
+        ("--exr-compression", "dwaa", "none, rle, zips, zip, piz"),
+        ("--view-transform", "filmic", "gamma22, srgb, agx, khronos-pbr-neutral"),
+    ] {
+        let ran = place.run(&["render", "small.toml", "-o", "a.jpg", "-o", "a.exr", option, value]);
+        assert_eq!(ran.code, 2, "{option} {value}: {}", ran.stderr);
+        assert!(
+            ran.stderr.contains(option) && ran.stderr.contains(told),
+            "{option} {value}: {}",
+            ran.stderr
+        );
+    }
+    // A picture that tells is heeded.
+    render(
+        &place,
+        &[
+            "-o",
+            "a.jpg",
+            "-o",
+            "b",
+            "--format",
+            "exr",
+            "--exr-type",
+            "half",
+            "--exposure",
+            "-1.5",
+        ],
+    );
+    assert_eq!(place.files(), ["a.jpg", "b"]);
+    assert!(samples(&place.path("b")).contains_key("R"));
+}
+
+/// Told before anything is rendered: a picture of that size would take long.
+#[test]
+fn pictures_that_a_format_has_no_room_for_are_refused() {
+    let place = Place::new();
+    for (name, size, told) in [
+        (
+            "a.jpg",
+            "65536x60000",
+            "--output: a.jpg: 65536 x 60000 pixels are too many for a JPEG, which has 65535 along a side at most",
+        ),
+        (
+            "a.webp",
+            "60000x16384",
+            "--output: a.webp: 60000 x 16384 pixels are too many for a WebP, which has 16383 along a side",
+        ),
+    ] {
+        refused(
+            &place,
+            &["small.toml", "--size", size, "-o", "b.png", "-o", name],
+            2,
+            told,
+        );
+    }
+    // A crop that fits is no such picture, and the largest ones are written.
+    let crop = [
+        "--size",
+        "65536x60000",
+        "--crop",
+        "65500,59990,65536,60000",
+        "--spp",
+        "1",
+    ];
+    render(&place, &[&crop[..], &["-o", "a.jpg", "-o", "a.webp"]].concat());
+    render(
+        &place,
+        &[
+            "--size",
+            "65535x1",
+            "--spp",
+            "1",
+            "--light-samples",
+            "1",
+            "-o",
+            "wide.jpg",
+        ],
+    );
+    render(
+        &place,
+        &[
+            "--size",
+            "1x16383",
+            "--spp",
+            "1",
+            "--light-samples",
+            "1",
+            "-o",
+            "high.webp",
+        ],
+    );
+    assert_eq!(image::image_dimensions(place.path("wide.jpg")).unwrap(), (65_535, 1));
+    assert_eq!(image::image_dimensions(place.path("high.webp")).unwrap(), (1, 16_383));
+}

@@ -1,0 +1,239 @@
+//! The driver that fails on demand, made ready, and the program run on it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::OnceLock;
+use std::time::Duration;
+use std::{env, fs};
+
+use tempfile::TempDir;
+
+use crate::sources::path as project;
+
+/// A scene of 40 x 30 pixels in which everything random differs from pixel to pixel.
+pub const SCENE: &str = r#"image = { width = 40, height = 30 }
+camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40 }
+[render]
+ambient = [0.1, 0.1, 0.1]
+background = [0.2, 0.3, 2]
+pixel_samples = { pattern = "random", count = 3 }
+light_samples = { pattern = "grid", count = 4 }
+[materials.gray]
+type = "phong"
+color = [0.5, 0.4, 0.3]
+[[lights]]
+type = "rectangle"
+center = [0, -1, 4]
+size = [2, 2]
+normal = [0, 0, -1]
+tangent = [1, 0, 0]
+color = [0.8, 0.8, 0.8]
+[[shapes]]
+type = "sphere"
+material = "gray"
+center = [0, 0, 1]
+radius = 0.8
+[[shapes]]
+type = "plane"
+material = "gray"
+point = [0, 0, 0]
+normal = [0, 0, 1]
+tangent = [1, 0, 0]
+"#;
+
+/// What Vulkan's loader and the driver need in their environment.
+pub struct Driver {
+    manifest: PathBuf,
+    library: PathBuf,
+    lavapipe: PathBuf,
+}
+
+/// The driver, compiled. `None` only where the environment says to do without one; else it is an error of the tests.
+pub fn driver() -> Option<&'static Driver> {
+    static DRIVER: OnceLock<Option<Driver>> = OnceLock::new();
+    DRIVER.get_or_init(prepare).as_ref()
+}
+
+fn prepare() -> Option<Driver> {
+    let Some((lavapipe, api_version)) = lavapipe() else {
+        let without = env::var_os("WGRAY_TEST_WITHOUT_GPU").is_some_and(|value| value == "1");
+        assert!(
+            without,
+            "faults are tested on lavapipe, of which there is no manifest: on Debian, 'apt-get install mesa-vulkan-drivers'"
+        );
+        return None;
+    };
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("faults");
+    fs::create_dir_all(&folder).expect("a folder below target/");
+    // Under names of their own until they are whole, as other tests may run too.
+    let [library, manifest] = ["libfaults.so", "faults.json"].map(|name| folder.join(name));
+    let own = tempfile::tempdir_in(&folder).expect("a temporary folder");
+    let made = own.path().join("libfaults.so");
+    let rustc = Command::new(env::var_os("RUSTC").unwrap_or("rustc".into()))
+        .args(["--crate-type", "cdylib", "--edition", "2024", "-O", "-o"])
+        .args([&made, &project("tests/faults/icd.rs")])
+        .output()
+        .expect("rustc runs");
+    assert!(rustc.status.success(), "{}", String::from_utf8_lossy(&rustc.stderr));
+    fs::rename(&made, &library).expect("the library in its place");
+    let json = serde_json::json!({
+        "file_format_version": "1.0.0",
+        "ICD": { "library_path": library, "api_version": api_version },
+    });
+    let made = own.path().join("faults.json");
+    fs::write(&made, json.to_string()).expect("a manifest");
+    fs::rename(&made, &manifest).expect("the manifest in its place");
+    Some(Driver {
+        manifest,
+        library,
+        lavapipe,
+    })
+}
+
+/// lavapipe's library and the version of Vulkan that it has, from its manifest.
+fn lavapipe() -> Option<(PathBuf, String)> {
+    let mut manifests = Vec::new();
+    for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
+        manifests.extend(env::var_os(variable).iter().flat_map(env::split_paths));
+    }
+    for folder in ["/usr/local/share", "/usr/share", "/usr/local/etc", "/etc"] {
+        let entries = fs::read_dir(Path::new(folder).join("vulkan/icd.d"));
+        manifests.extend(entries.into_iter().flatten().flatten().map(|entry| entry.path()));
+    }
+    manifests.iter().find_map(|manifest| {
+        let text = fs::read_to_string(manifest).ok()?;
+        let json: serde_json::Value = serde_json::from_str(&text).ok()?;
+        let of_driver = |key: &str| Some(json.get("ICD")?.get(key)?.as_str()?.to_string());
+        let library = of_driver("library_path")?;
+        let is_path = library.contains('/'); // else the system knows where it is
+        let is_lavapipe = library.contains("libvulkan_lvp");
+        let library = match is_path {
+            true => manifest.parent()?.join(library),
+            false => library.into(),
+        };
+        (is_lavapipe && (!is_path || library.exists())).then_some((library, of_driver("api_version")?))
+    })
+}
+
+/// What a run of the program left.
+pub struct Ran {
+    pub code: i32,
+    pub stderr: String,
+    /// What the driver has done, line for line.
+    pub log: Vec<String>,
+    /// The picture with its layers, as bits.
+    pub picture: Option<Picture>,
+}
+
+/// The channels' names and the bits of their values.
+pub type Picture = Vec<(String, Vec<u32>)>;
+
+impl Ran {
+    /// How many lines of the driver's log start so.
+    pub fn count(&self, start: &str) -> usize {
+        self.log.iter().filter(|line| line.starts_with(start)).count()
+    }
+
+    /// The lines on standard error.
+    pub fn lines(&self) -> Vec<&str> {
+        self.stderr.lines().collect()
+    }
+}
+
+/// A folder of its own with a scene in it.
+pub struct Place {
+    folder: TempDir,
+}
+
+impl Place {
+    pub fn new(scene: &str) -> Place {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        fs::write(folder.path().join("scene.toml"), scene).expect("a scene");
+        Place { folder }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// The program, on the driver that has these faults.
+    pub fn command(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_wgray"));
+        command
+            .current_dir(self.folder.path())
+            .args(["render", "scene.toml", "-o", "out.exr", "--aov", "normal"])
+            .args(arguments)
+            .envs(driver.environment(&self.path("log")))
+            .envs(faults.iter().copied());
+        command
+    }
+
+    /// Runs the program, which leaves nothing but a picture.
+    pub fn run(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Ran {
+        let out = self.path("out.exr");
+        for name in ["out.exr", "log"] {
+            let _ = fs::remove_file(self.path(name)); // of the run before, if there was one
+        }
+        let mut command = assert_cmd::Command::from_std(self.command(driver, arguments, faults));
+        let output = command
+            .timeout(Duration::from_secs(120))
+            .output()
+            .expect("the program runs");
+        let entries = fs::read_dir(self.folder.path()).expect("the folder");
+        let names = entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
+        let known = |name: &String| ["scene.toml", "log", "out.exr"].contains(&name.as_str()) || name.ends_with(".png");
+        let strange: Vec<String> = names.filter(|name| !known(name)).collect();
+        assert_eq!(strange, [""; 0], "a part of a file");
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        assert!(
+            !stderr.contains("panicked") && !stderr.contains("backtrace"),
+            "{stderr}"
+        );
+        let log = fs::read_to_string(self.path("log")).unwrap_or_default();
+        Ran {
+            code: output.status.code().unwrap_or(-1),
+            stderr,
+            log: log.lines().map(str::to_string).collect(),
+            picture: out.exists().then(|| read(&out)),
+        }
+    }
+
+    /// The picture by the CPU, which has no driver.
+    pub fn expected(&self, driver: &Driver, arguments: &[&str]) -> Picture {
+        let ran = self.run(driver, &[arguments, &["--device", "cpu"]].concat(), &[]);
+        assert_eq!((ran.code, ran.stderr.as_str(), ran.log.len()), (0, "", 0));
+        ran.picture.expect("a picture")
+    }
+
+    /// Starts the program.
+    pub fn start(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Child {
+        let mut command = self.command(driver, arguments, faults);
+        command.stderr(Stdio::piped()).spawn().expect("the program starts")
+    }
+}
+
+impl Driver {
+    /// The environment of a program that is to meet this driver and no other.
+    pub fn environment(&self, log: &Path) -> [(&'static str, PathBuf); 5] {
+        [
+            ("VK_DRIVER_FILES", self.manifest.clone()),
+            ("VK_ICD_FILENAMES", self.manifest.clone()),
+            ("FAULTS_DRIVER", self.lavapipe.clone()),
+            ("FAULTS_ITSELF", self.library.clone()),
+            ("FAULTS_LOG", log.to_path_buf()),
+        ]
+    }
+}
+
+fn read(path: &Path) -> Picture {
+    let image = exr::prelude::read_first_flat_layer_from_file(path).expect("an OpenEXR file");
+    let bits = |samples: &exr::prelude::FlatSamples| match samples {
+        exr::prelude::FlatSamples::F32(values) => values.iter().map(|value| value.to_bits()).collect(),
+        exr::prelude::FlatSamples::U32(values) => values.clone(),
+        exr::prelude::FlatSamples::F16(_) => panic!("half precision"),
+    };
+    let channels = image.layer_data.channel_data.list.iter();
+    channels
+        .map(|channel| (channel.name.to_string(), bits(&channel.sample_data)))
+        .collect()
+}

@@ -1,0 +1,297 @@
+//! A Vulkan driver that fails on demand. It hands everything on to another driver, and in between loses its device, opens none,
+//! has no memory, or is slow. Compiled by the tests by itself, as a library that Vulkan's loader takes for a driver.
+//!
+//! What it does is in the environment; numbers count from 1, submits and allocations over all devices of a process:
+//!
+//! | variable | meaning |
+//! | --- | --- |
+//! | `FAULTS_DRIVER` | the library of the driver that does the work |
+//! | `FAULTS_ITSELF` | this library, which stays loaded and goes on counting |
+//! | `FAULTS_LOG` | a file that gets a line for everything that is done here |
+//! | `FAULTS_LOSE` | the submits that lose the device, with commas between them, or `every:N`, the N-th of each device |
+//! | `FAULTS_LOSE_IN` | what tells of the loss first: `submit`, `status` (a question whether work has ended) or `wait` |
+//! | `FAULTS_REFUSE` | so many devices are refused after each loss |
+//! | `FAULTS_REFUSE_FIRST` | so many devices are refused at first |
+//! | `FAULTS_REFUSE_WITH` | the code that they are refused with, else that of a driver that cannot be initialised |
+//! | `FAULTS_IDLE` | the code that waiting for a queue of a lost device returns, else that of the loss |
+//! | `FAULTS_LARGEST` | allocations of more bytes are refused for want of memory |
+//! | `FAULTS_NO_MEMORY_FROM` | from this allocation on all are refused |
+//! | `FAULTS_NO_MEMORY_IN` | the submit that is refused for want of memory |
+//! | `FAULTS_SLEEP` | `N:MS`, the N-th submit first sleeps for MS milliseconds |
+
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::io::Write;
+use std::ptr::null_mut;
+use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicPtr, AtomicU64, Ordering::SeqCst};
+use std::time::Duration;
+
+type Handle = *mut c_void;
+type Code = i32;
+type Function = *mut c_void;
+type GetProcAddr = unsafe extern "system" fn(Handle, *const c_char) -> Function;
+
+const SUCCESS: Code = 0;
+const OUT_OF_DEVICE_MEMORY: Code = -2;
+const INITIALIZATION_FAILED: Code = -3;
+const DEVICE_LOST: Code = -4;
+
+unsafe extern "C" {
+    fn dlopen(name: *const c_char, flags: c_int) -> *mut c_void;
+    fn dlsym(library: *mut c_void, name: *const c_char) -> *mut c_void;
+}
+const RTLD_NOW: c_int = 2;
+const RTLD_NODELETE: c_int = 0x1000;
+
+static SUBMITS: AtomicU64 = AtomicU64::new(0);
+static SUBMITS_OF_DEVICE: AtomicU64 = AtomicU64::new(0);
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+/// The device is gone, and every call tells.
+static LOST: AtomicBool = AtomicBool::new(false);
+/// The device is gone, and the call that is to tell of it first has not come yet.
+static LOST_UNTOLD: AtomicBool = AtomicBool::new(false);
+/// How many devices are still to be refused.
+static TO_REFUSE: AtomicI64 = AtomicI64::new(-1);
+
+fn variable<T: FromStr>(name: &str) -> Option<T> {
+    std::env::var(name).ok()?.parse().ok()
+}
+
+fn log(line: &str) {
+    let Ok(path) = std::env::var("FAULTS_LOG") else { return };
+    let file = std::fs::OpenOptions::new().append(true).create(true).open(path);
+    let _ = file.and_then(|mut file| writeln!(file, "{line}"));
+}
+
+/// A function of the driver behind this one.
+fn of_driver(name: &CStr) -> *mut c_void {
+    let path = std::env::var("FAULTS_DRIVER").expect("FAULTS_DRIVER names a driver");
+    let path = CString::new(path).expect("a path");
+    let library = unsafe { dlopen(path.as_ptr(), RTLD_NOW) };
+    assert!(!library.is_null(), "{path:?} cannot be loaded");
+    unsafe { dlsym(library, name.as_ptr()) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "system" fn vk_icdNegotiateLoaderICDInterfaceVersion(version: *mut u32) -> Code {
+    let itself = std::env::var("FAULTS_ITSELF").expect("FAULTS_ITSELF names this library");
+    let itself = CString::new(itself).expect("a path");
+    let library = unsafe { dlopen(itself.as_ptr(), RTLD_NOW | RTLD_NODELETE) };
+    assert!(!library.is_null(), "{itself:?} cannot be loaded");
+    let real = of_driver(c"vk_icdNegotiateLoaderICDInterfaceVersion");
+    let real: unsafe extern "system" fn(*mut u32) -> Code = unsafe { std::mem::transmute(real) };
+    unsafe { real(version) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "system" fn vk_icdGetPhysicalDeviceProcAddr(instance: Handle, name: *const c_char) -> Function {
+    let real = of_driver(c"vk_icdGetPhysicalDeviceProcAddr");
+    let real: GetProcAddr = unsafe { std::mem::transmute(real) };
+    unsafe { replaced(name, real(instance, name)) }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "system" fn vk_icdGetInstanceProcAddr(instance: Handle, name: *const c_char) -> Function {
+    let real = of_driver(c"vk_icdGetInstanceProcAddr");
+    let real: GetProcAddr = unsafe { std::mem::transmute(real) };
+    unsafe { replaced(name, real(instance, name)) }
+}
+
+/// Functions of the driver that have others in their places: the type of each, where the driver's is kept, and what is called.
+macro_rules! replacements {
+    ($($name:literal $($other:literal)* => $place:ident, $function:ident: fn($($ty:ty),*) -> $result:ty;)*) => {
+        $(static $place: AtomicPtr<c_void> = AtomicPtr::new(null_mut());)*
+
+        /// What a caller gets for the driver's function of a name.
+        unsafe fn replaced(name: *const c_char, real: Function) -> Function {
+            if real.is_null() {
+                return real;
+            }
+            match unsafe { CStr::from_ptr(name) }.to_bytes() {
+                $($name $(| $other)* => {
+                    $place.store(real, SeqCst);
+                    let function: unsafe extern "system" fn($($ty),*) -> $result = $function;
+                    function as Function
+                })*
+                _ => real,
+            }
+        }
+
+        /// The driver's own functions.
+        mod real {
+            use super::*;
+            $(pub unsafe fn $function() -> unsafe extern "system" fn($($ty),*) -> $result {
+                unsafe { std::mem::transmute($place.load(SeqCst)) }
+            })*
+        }
+    };
+}
+
+replacements! {
+    b"vkGetDeviceProcAddr" => GET_DEVICE_PROC_ADDR, get_device_proc_addr: fn(Handle, *const c_char) -> Function;
+    b"vkCreateDevice" => CREATE_DEVICE, create_device: fn(Handle, Handle, Handle, *mut Handle) -> Code;
+    b"vkAllocateMemory" => ALLOCATE_MEMORY, allocate_memory: fn(Handle, *const Allocation, Handle, Handle) -> Code;
+    b"vkQueueSubmit" => QUEUE_SUBMIT, queue_submit: fn(Handle, u32, Handle, u64) -> Code;
+    b"vkQueueSubmit2" b"vkQueueSubmit2KHR" => QUEUE_SUBMIT_2, queue_submit_2: fn(Handle, u32, Handle, u64) -> Code;
+    b"vkQueueWaitIdle" => QUEUE_WAIT_IDLE, queue_wait_idle: fn(Handle) -> Code;
+    b"vkDeviceWaitIdle" => DEVICE_WAIT_IDLE, device_wait_idle: fn(Handle) -> Code;
+    b"vkWaitForFences" => WAIT_FOR_FENCES, wait_for_fences: fn(Handle, u32, Handle, u32, u64) -> Code;
+    b"vkWaitSemaphores" b"vkWaitSemaphoresKHR" => WAIT_SEMAPHORES, wait_semaphores: fn(Handle, Handle, u64) -> Code;
+    b"vkGetFenceStatus" => GET_FENCE_STATUS, get_fence_status: fn(Handle, u64) -> Code;
+    b"vkGetSemaphoreCounterValue" b"vkGetSemaphoreCounterValueKHR" =>
+        GET_COUNTER, get_counter: fn(Handle, u64, *mut u64) -> Code;
+}
+
+/// `VkMemoryAllocateInfo`.
+#[repr(C)]
+struct Allocation {
+    kind: i32,
+    next: *const c_void,
+    size: u64,
+    memory_type: u32,
+}
+
+unsafe extern "system" fn get_device_proc_addr(device: Handle, name: *const c_char) -> Function {
+    unsafe { replaced(name, real::get_device_proc_addr()(device, name)) }
+}
+
+unsafe extern "system" fn create_device(physical: Handle, info: Handle, host: Handle, device: *mut Handle) -> Code {
+    if TO_REFUSE.load(SeqCst) < 0 {
+        TO_REFUSE.store(variable("FAULTS_REFUSE_FIRST").unwrap_or(0), SeqCst);
+    }
+    if TO_REFUSE.load(SeqCst) > 0 {
+        TO_REFUSE.fetch_sub(1, SeqCst);
+        log("device refused");
+        return variable("FAULTS_REFUSE_WITH").unwrap_or(INITIALIZATION_FAILED);
+    }
+    let code = unsafe { real::create_device()(physical, info, host, device) };
+    if code == SUCCESS {
+        log("device");
+        SUBMITS_OF_DEVICE.store(0, SeqCst);
+        LOST.store(false, SeqCst);
+        LOST_UNTOLD.store(false, SeqCst);
+    }
+    code
+}
+
+unsafe extern "system" fn allocate_memory(device: Handle, info: *const Allocation, host: Handle, out: Handle) -> Code {
+    let number = 1 + ALLOCATIONS.fetch_add(1, SeqCst);
+    let size = unsafe { (*info).size };
+    let too_large = variable("FAULTS_LARGEST").is_some_and(|largest: u64| size > largest);
+    let too_many = variable("FAULTS_NO_MEMORY_FROM").is_some_and(|first: u64| number >= first);
+    if too_large || too_many {
+        log(&format!("allocation {number} of {size} refused"));
+        return OUT_OF_DEVICE_MEMORY;
+    }
+    log(&format!("allocation {number} of {size}"));
+    unsafe { real::allocate_memory()(device, info, host, out) }
+}
+
+/// Whether a submit, by its numbers in the process and of the device, is to lose the device.
+fn loses(number: u64, of_device: u64) -> bool {
+    let Ok(which) = std::env::var("FAULTS_LOSE") else {
+        return false;
+    };
+    match which.strip_prefix("every:") {
+        Some(n) => n.parse() == Ok(of_device),
+        None => which.split(',').any(|n| n.parse() == Ok(number)),
+    }
+}
+
+fn lose(by: &str) -> Code {
+    log(&format!("lost in {by}"));
+    LOST.store(true, SeqCst);
+    LOST_UNTOLD.store(false, SeqCst);
+    TO_REFUSE.store(variable("FAULTS_REFUSE").unwrap_or(0), SeqCst);
+    DEVICE_LOST
+}
+
+/// Whether a call is the first that tells of a loss.
+fn tells(by: &str) -> bool {
+    LOST_UNTOLD.load(SeqCst) && std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first == by)
+}
+
+unsafe fn submit(queue: Handle, forward: impl FnOnce() -> Code) -> Code {
+    if LOST.load(SeqCst) {
+        return DEVICE_LOST;
+    }
+    let number = 1 + SUBMITS.fetch_add(1, SeqCst);
+    let of_device = 1 + SUBMITS_OF_DEVICE.fetch_add(1, SeqCst);
+    log(&format!("submit {number}"));
+    if let Some((n, milliseconds)) = std::env::var("FAULTS_SLEEP")
+        .ok()
+        .as_deref()
+        .and_then(|s| s.split_once(':'))
+        && n.parse() == Ok(number)
+    {
+        log("sleep");
+        std::thread::sleep(Duration::from_millis(milliseconds.parse().unwrap_or(0)));
+    }
+    if variable("FAULTS_NO_MEMORY_IN") == Some(number) {
+        log("no memory for a submit");
+        return OUT_OF_DEVICE_MEMORY;
+    }
+    if !loses(number, of_device) {
+        return forward();
+    }
+    // The driver behind has ended all work before anybody is told, and gives back what is taken from it in peace.
+    let at_once = std::env::var("FAULTS_LOSE_IN").is_ok_and(|first| first != "submit");
+    let code = if at_once { forward() } else { SUCCESS };
+    unsafe { real::queue_wait_idle()(queue) };
+    if !at_once {
+        return lose("submit");
+    }
+    LOST_UNTOLD.store(true, SeqCst);
+    code
+}
+
+unsafe extern "system" fn queue_submit(queue: Handle, count: u32, submits: Handle, fence: u64) -> Code {
+    unsafe { submit(queue, || real::queue_submit()(queue, count, submits, fence)) }
+}
+
+unsafe extern "system" fn queue_submit_2(queue: Handle, count: u32, submits: Handle, fence: u64) -> Code {
+    unsafe { submit(queue, || real::queue_submit_2()(queue, count, submits, fence)) }
+}
+
+/// A call that tells of a loss, if there is one; else it is handed on.
+fn asked(by: &str, forward: impl FnOnce() -> Code) -> Code {
+    if LOST.load(SeqCst) {
+        return DEVICE_LOST;
+    }
+    if tells(by) { lose(by) } else { forward() }
+}
+
+/// A call that waits until nothing is under way.
+fn idle(forward: impl FnOnce() -> Code) -> Code {
+    if !LOST.load(SeqCst) {
+        return forward();
+    }
+    log("idle");
+    variable("FAULTS_IDLE").unwrap_or(DEVICE_LOST)
+}
+
+unsafe extern "system" fn queue_wait_idle(queue: Handle) -> Code {
+    idle(|| unsafe { real::queue_wait_idle()(queue) })
+}
+
+unsafe extern "system" fn device_wait_idle(device: Handle) -> Code {
+    idle(|| unsafe { real::device_wait_idle()(device) })
+}
+
+unsafe extern "system" fn wait_for_fences(device: Handle, count: u32, fences: Handle, all: u32, time: u64) -> Code {
+    asked("wait", || unsafe {
+        real::wait_for_fences()(device, count, fences, all, time)
+    })
+}
+
+unsafe extern "system" fn wait_semaphores(device: Handle, info: Handle, time: u64) -> Code {
+    asked("wait", || unsafe { real::wait_semaphores()(device, info, time) })
+}
+
+unsafe extern "system" fn get_fence_status(device: Handle, fence: u64) -> Code {
+    asked("status", || unsafe { real::get_fence_status()(device, fence) })
+}
+
+unsafe extern "system" fn get_counter(device: Handle, semaphore: u64, value: *mut u64) -> Code {
+    asked("status", || unsafe { real::get_counter()(device, semaphore, value) })
+}

@@ -1,0 +1,74 @@
+//! The library on a driver that loses its device, in a process of its own, as drivers are found by the environment.
+
+use std::ops::ControlFlow;
+use std::process::Command;
+
+use wgray::{Device, Options, Picture, Scene};
+
+use super::driver::{Place, SCENE, driver};
+
+/// Set for the process that renders: to its scene file.
+const FILE: &str = "WGRAY_TEST_FAULTS_SCENE";
+
+fn render(scene: &Scene, device: Device) -> Picture {
+    let options = Options {
+        device,
+        ..Options::default()
+    };
+    wgray::render(scene, &options).expect("a picture")
+}
+
+/// Does nothing, but in the process that [`pictures_survive`] starts.
+#[test]
+fn in_a_process_of_its_own() {
+    let Ok(file) = std::env::var(FILE) else { return };
+    let scene = Scene::load(&file).expect("a scene");
+    let expected = render(&scene, Device::Cpu);
+    let picture = render(&scene, Device::Gpu);
+    assert!(picture.device().name.starts_with("llvmpipe"));
+    assert_eq!(picture.pixels(), expected.pixels());
+    // The picture is copied from the device after every call.
+    let options = Options {
+        device: Device::Gpu,
+        ..Options::default()
+    };
+    let mut looks = 0;
+    let grown = wgray::render_growing(&scene, &options, &mut |growing| {
+        growing.picture()?;
+        looks += 1;
+        Ok(ControlFlow::Continue(()))
+    });
+    assert_eq!(grown.expect("a picture").pixels(), expected.pixels());
+    assert!(looks > 0);
+}
+
+#[test]
+fn pictures_survive() {
+    let Some(driver) = driver() else { return };
+    let place = Place::new(SCENE);
+    // Of the first picture the samples; of the second, which has 6 submits before it, the samples and a look at them.
+    for (lose, losses) in [("2", 1), ("2,7,10", 3), ("9", 0)] {
+        let log = place.path("log");
+        let _ = std::fs::remove_file(&log); // of the one before
+        let output = Command::new(std::env::current_exe().expect("this program"))
+            .args(["--exact", "--nocapture", "faults::library::in_a_process_of_its_own"])
+            .envs(driver.environment(&log))
+            .env(FILE, place.path("scene.toml"))
+            .envs([("FAULTS_LOSE", lose), ("FAULTS_LOSE_IN", "wait")])
+            .output()
+            .expect("it runs");
+        assert!(
+            output.status.success(),
+            "{lose}: {}",
+            String::from_utf8_lossy(&output.stdout)
+        );
+        // wgpu does panic, and this process has no hook that is silent about it. Without a loss it does not.
+        let told = String::from_utf8_lossy(&output.stderr)
+            .matches("Error in Device::poll")
+            .count();
+        assert_eq!(told, losses, "{lose}");
+        let log = std::fs::read_to_string(&log).expect("the driver's log");
+        assert_eq!(log.matches("lost").count(), losses, "{lose}: {log}");
+        assert!(log.contains("submit 7\n"), "{lose}: {log}");
+    }
+}

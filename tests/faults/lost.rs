@@ -1,0 +1,334 @@
+//! A device that is lost: opened anew, time after time if need be, until it does not come back. The picture is the same
+//! whatever happens.
+
+use std::io::{Read as _, Write as _};
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use super::driver::{Place, Ran, SCENE, driver};
+
+/// What may tell of a loss first.
+const WAYS: [&str; 3] = ["submit", "status", "wait"];
+
+/// The submits of [`SCENE`]: the warm-up, the samples, the film, the first hits, and these.
+const SUBMITS: usize = 5;
+
+const GPU: [&str; 2] = ["--device", "gpu"];
+const AUTO: [&str; 2] = ["--device", "auto"];
+
+/// Holds a run to so many warnings of a device that is opened anew, and nothing else on standard error but these lines.
+fn warned(ran: &Ran, anew: usize, rest: &[&str]) {
+    let lines = ran.lines();
+    assert_eq!(lines.len(), anew + rest.len(), "{}", ran.stderr);
+    for line in &lines[..anew] {
+        assert!(line.starts_with("warning: llvmpipe"), "{line}");
+        assert!(line.contains(": the device was lost: its driver ended it"), "{line}");
+        assert!(line.ends_with("; it is opened anew"), "{line}");
+    }
+    for (line, start) in lines[anew..].iter().zip(rest) {
+        assert!(line.starts_with(start), "{line}");
+    }
+}
+
+#[test]
+fn without_faults_the_driver_renders_as_lavapipe_does() {
+    let Some(driver) = driver() else { return };
+    let place = Place::new(SCENE);
+    let expected = place.expected(driver, &[]);
+    for device in [GPU, AUTO, ["--device", "llvmpipe"]] {
+        let ran = place.run(driver, &device, &[]);
+        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{device:?}");
+        assert_eq!(
+            (ran.count("device"), ran.count("submit")),
+            (1, SUBMITS),
+            "{:?}",
+            ran.log
+        );
+        assert!(ran.picture == Some(expected.clone()), "{device:?}");
+    }
+    // Bits are compared: another seed is another picture.
+    let other = place.run(driver, &["--device", "gpu", "--seed", "7"], &[]);
+    assert!(other.code == 0 && other.picture != Some(expected));
+}
+
+#[test]
+fn a_device_that_is_lost_anywhere_is_opened_anew() {
+    let Some(driver) = driver() else { return };
+    let place = Place::new(SCENE);
+    let expected = place.expected(driver, &[]);
+    for way in WAYS {
+        for submit in 1..=SUBMITS {
+            let at = submit.to_string();
+            let ran = place.run(driver, &GPU, &[("FAULTS_LOSE", &at), ("FAULTS_LOSE_IN", way)]);
+            assert_eq!(ran.code, 0, "{way} {submit}: {}", ran.stderr);
+            warned(&ran, 1, &[]);
+            let happened = (
+                ran.count("lost in"),
+                ran.count(&format!("lost in {way}")),
+                ran.count("device"),
+            );
+            assert_eq!(happened, (1, 1, 2), "{way} {submit}: {:?}", ran.log);
+            assert!(ran.picture == Some(expected.clone()), "{way} {submit}");
+        }
+    }
+}
+
+#[test]
+fn a_device_that_is_lost_several_times_is_opened_as_often() {
+    let Some(driver) = driver() else { return };
+    let place = Place::new(SCENE);
+    let expected = place.expected(driver, &[]);
+    let twice = place.run(driver, &GPU, &[("FAULTS_LOSE", "2,4")]);
+    assert_eq!((twice.code, twice.count("lost")), (0, 2), "{}", twice.stderr);
+    warned(&twice, 2, &[]);
+    assert!(twice.picture == Some(expected.clone()));
+    // Twice in the samples, and, as these are finished then, twice again in the first hits: the last submit but one, and the one
+    // after the warm-up that follows. Four times in a row would be too often.
+    let hits = twice.count("submit") - 1;
+    let lose = format!("2,4,{hits},{}", hits + 2);
+    // How many submits there are before them is a matter of time: on a busy machine the aim may be missed.
+    let mut runs = (0..5).map(|_| place.run(driver, &GPU, &[("FAULTS_LOSE", &lose)]));
+    let ran = runs.find(|ran| (ran.code, ran.count("lost")) == (0, 4));
+    let ran = ran.unwrap_or_else(|| panic!("{lose}: no run of five survived four losses"));
+    warned(&ran, 4, &[]);
+    assert!(ran.picture == Some(expected));
+}
+
+/// In the midst of a call of several, in a picture that takes many.
+#[test]
+fn a_long_render_survives() {
+    let Some(driver) = driver() else { return };
+    let place = Place::new(SCENE);
+    let size = ["--size", "512x512", "--spp", "16"];
+    let expected = place.expected(driver, &size);
+    for way in WAYS {
+        let ran = place.run(
+            driver,
+            &[&size[..], &GPU].concat(),
+            &[("FAULTS_LOSE", "4"), ("FAULTS_LOSE_IN", way)],
+        );
+        assert_eq!((ran.code, ran.count("lost")), (0, 1), "{way}: {}", ran.stderr);
+        warned(&ran, 1, &[]);
+        assert!(ran.picture == Some(expected.clone()), "{way}");
+    }
+}
+
+#[test]
+fn a_device_that_never_comes_back_is_an_error_or_leaves_the_work_to_the_cpu() {
+    let Some(driver) = driver() else { return };
+    let place = Place::new(SCENE);
+    let expected = place.expected(driver, &[]);
+    // Each waits for some seconds, so they do so together.
+    let never = |lose: &str, device: &str| {
+        let place = Place::new(SCENE);
+        let faults = [("FAULTS_LOSE", lose), ("FAULTS_REFUSE", "99")];
+        let ran = place.run(driver, &["--device", device], &faults);
+        assert_eq!((ran.code, ran.picture.is_some()), (6, false), "{lose}");
+        warned(&ran, 1, &["error: llvmpipe"]);
+        let end = "; it did not come back: its driver does not open it";
+        assert!(ran.stderr.trim_end().ends_with(end), "{}", ran.stderr);
+        assert_eq!((ran.count("device refused"), ran.count("lost")), (3, 1));
+        let ran = place.run(driver, &AUTO, &faults);
+        assert_eq!(ran.code, 0, "{lose}: {}", ran.stderr);
+        warned(&ran, 1, &["warning: rendering on the CPU: llvmpipe"]);
+        assert!(ran.picture == Some(expected.clone()), "{lose}");
+    };
+    std::thread::scope(|scope| {
+        for (lose, device) in [("1", "gpu"), ("2", "llvmpipe"), ("4", "gpu")] {
+            let never = &never;
+            scope.spawn(move || never(lose, device));
+        }
+    });
+    let faults = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "99")];
+    let ran = place.run(driver, &["--device", "auto", "--quiet"], &faults);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    assert!(ran.picture == Some(expected.clone()));
+    // One that comes back late is waited for.
+    let late = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "2")];
+    let ran = place.run(driver, &GPU, &late);
+    assert_eq!((ran.code, ran.count("device refused")), (0, 2), "{}", ran.stderr);
+    warned(&ran, 1, &[]);
+    assert!(ran.picture == Some(expected));
+}
+
+#[test]
+fn a_device_that_is_lost_again_and_again_is_given_up() {
+    let Some(driver) = driver() else { return };
+    let place = Place::new(SCENE);
+    let expected = place.expected(driver, &[]);
+    // In the warm-up it never becomes ready; in the samples it does, and is told of each time.
+    let again = |lose: &str, told: usize| {
+        let place = Place::new(SCENE);
+        let ran = place.run(driver, &GPU, &[("FAULTS_LOSE", lose)]);
+        assert_eq!((ran.code, ran.picture.is_some()), (6, false), "{lose}");
+        assert_eq!(
+            (ran.count("lost"), ran.count("device")),
+            (4, 4),
+            "{lose}: {:?}",
+            ran.log
+        );
+        warned(&ran, told, &["error: llvmpipe"]);
+        let ran = place.run(driver, &AUTO, &[("FAULTS_LOSE", lose)]);
+        assert_eq!((ran.code, ran.count("lost")), (0, 4), "{lose}: {}", ran.stderr);
+        warned(&ran, told, &["warning: rendering on the CPU: llvmpipe"]);
+        assert!(ran.picture == Some(expected.clone()), "{lose}");
+    };
+    std::thread::scope(|scope| {
+        for (lose, told) in [("every:1", 1), ("every:2", 3)] {
+            let again = &again;
+            scope.spawn(move || again(lose, told));
+        }
+    });
+}
+
+/// wgpu panics where it gives back the queue of a device whose driver says so.
+#[test]
+fn a_lost_device_that_cannot_be_given_back_is_no_end() {
+    let Some(driver) = driver() else { return };
+    let place = Place::new(SCENE);
+    let expected = place.expected(driver, &[]);
+    for code in ["-1", "-2", "-13"] {
+        for way in WAYS {
+            let faults = [("FAULTS_LOSE", "2"), ("FAULTS_LOSE_IN", way), ("FAULTS_IDLE", code)];
+            let ran = place.run(driver, &GPU, &faults);
+            assert_eq!((ran.code, ran.count("lost")), (0, 1), "{code} {way}: {}", ran.stderr);
+            assert!(ran.count("idle") > 0, "the driver was asked: {:?}", ran.log);
+            warned(&ran, 1, &[]);
+            assert!(ran.picture == Some(expected.clone()), "{code} {way}");
+        }
+    }
+}
+
+/// A device that its driver does not open in the first place.
+#[test]
+fn a_device_that_cannot_be_opened_is_tried_again_if_it_was_asked_for() {
+    let Some(driver) = driver() else { return };
+    let place = Place::new(SCENE);
+    let expected = place.expected(driver, &[]);
+    let ran = place.run(driver, &GPU, &[("FAULTS_REFUSE_FIRST", "2")]);
+    assert_eq!((ran.code, ran.count("device refused")), (0, 2), "{}", ran.stderr);
+    assert!(ran.picture == Some(expected.clone()));
+    let ran = place.run(driver, &GPU, &[("FAULTS_REFUSE_FIRST", "99")]);
+    assert_eq!((ran.code, ran.picture.is_some()), (6, false), "{}", ran.stderr);
+    let ran = place.run(driver, &AUTO, &[("FAULTS_REFUSE_FIRST", "99")]);
+    assert_eq!(
+        (ran.code, ran.count("device refused")),
+        (0, 1),
+        "at once: {}",
+        ran.stderr
+    );
+    assert!(ran.picture == Some(expected));
+}
+
+#[test]
+fn a_slow_call_changes_nothing() {
+    let Some(driver) = driver() else { return };
+    let place = Place::new(SCENE);
+    let size = ["--size", "256x256"];
+    let expected = place.expected(driver, &size);
+    let ran = place.run(driver, &[&size[..], &GPU].concat(), &[("FAULTS_SLEEP", "2:1500")]);
+    assert_eq!((ran.code, ran.stderr.as_str(), ran.count("sleep")), (0, "", 1));
+    assert!(ran.picture == Some(expected));
+}
+
+#[test]
+fn waiting_for_a_device_can_be_interrupted() {
+    let Some(driver) = driver() else { return };
+    crate::cli::heed_interrupts();
+    let place = Place::new(SCENE);
+    let faults = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "99")];
+    let mut child = place.start(driver, &GPU, &faults);
+    // Two devices were refused: the longest pause, of two seconds, has begun.
+    let log = place.path("log");
+    let refused = || std::fs::read_to_string(&log).map_or(0, |log| log.matches("device refused").count());
+    let start = Instant::now();
+    while refused() < 2 {
+        assert!(start.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let sent = Instant::now();
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(killed.unwrap().success());
+    let status = child.wait().unwrap();
+    assert!(sent.elapsed() < Duration::from_millis(1500), "{:?}", sent.elapsed());
+    assert_eq!(status.code(), Some(130));
+    assert_eq!(refused(), 2, "it has not waited to the end");
+    let mut told = String::new();
+    child.stderr.unwrap().read_to_string(&mut told).unwrap();
+    assert!(!told.contains("panicked"), "{told}");
+    assert!(!place.path("out.exr").exists());
+}
+
+/// How many renders are disturbed at random.
+const CASES: &str = "WGRAY_TEST_FAULTS";
+
+/// Faults by chance, of devices that come back and that do not. `scripts/test-slow faults` has many.
+#[test]
+fn faults_at_random_change_nothing() {
+    let Some(driver) = driver() else { return };
+    let asked = std::env::var(CASES).ok();
+    let cases = asked
+        .as_ref()
+        .map_or(4, |n| n.parse().expect("WGRAY_TEST_FAULTS is a number"));
+    let place = Place::new(SCENE);
+    let size = ["--size", "320x240", "--spp", "16"];
+    let expected = place.expected(driver, &size);
+    let (mut losses, mut refused, mut on_cpu) = (0, 0, 0);
+    for case in 0..cases {
+        let faults = at_random(&mut Draws::new(case));
+        let faults: Vec<(&str, &str)> = faults.iter().map(|(name, value)| (*name, value.as_str())).collect();
+        let ran = place.run(driver, &[&size[..], &AUTO].concat(), &faults);
+        assert_eq!(ran.code, 0, "{faults:?}: {}", ran.stderr);
+        assert!(ran.picture.as_ref() == Some(&expected), "{faults:?}");
+        losses += ran.count("lost");
+        refused += ran.log.iter().filter(|line| line.ends_with("refused")).count();
+        on_cpu += usize::from(ran.stderr.contains("rendering on the CPU"));
+    }
+    if asked.is_some() {
+        let what = format!("{losses} losses, {refused} refusals, {on_cpu} of them ended by the CPU");
+        let _ = writeln!(
+            std::io::stderr(),
+            "{cases} renders with faults: {what}; all pictures the same"
+        );
+    }
+    assert!(losses as u64 >= cases, "{losses} losses in {cases} renders");
+}
+
+/// Losses, each some submits after the other, told in one of the ways; devices that are refused after each; and sometimes no
+/// memory from some allocation on.
+fn at_random(draws: &mut Draws) -> Vec<(&'static str, String)> {
+    let mut submit = 1 + draws.below(5);
+    let mut lose = submit.to_string();
+    for _ in 0..draws.below(5) {
+        submit += 1 + draws.below(5);
+        lose += &format!(",{submit}");
+    }
+    let mut faults = vec![
+        ("FAULTS_LOSE", lose),
+        ("FAULTS_LOSE_IN", WAYS[draws.below(3) as usize].to_string()),
+        ("FAULTS_REFUSE", draws.below(6).saturating_sub(2).to_string()),
+    ];
+    if draws.below(4) == 0 {
+        faults.push(("FAULTS_NO_MEMORY_FROM", (5 + draws.below(20)).to_string()));
+    }
+    faults
+}
+
+/// Numbers that look random, the same in every run.
+struct Draws(u64);
+
+impl Draws {
+    fn new(seed: u64) -> Draws {
+        Draws(seed)
+    }
+
+    /// A number below another: SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014,
+    /// figure 17).
+    fn below(&mut self, end: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ (z >> 31)) % end
+    }
+}

@@ -1,0 +1,117 @@
+//! A device that has no memory for what is asked: a message with the sizes, or the CPU.
+
+use super::driver::{Place, Ran, SCENE, driver};
+
+const ADVICE: &str = "; a crop or a smaller picture takes less there, and the CPU has the machine's own memory \
+                      (--crop, --size, --device cpu)\n";
+
+/// Holds a run to one error for want of memory that tells this.
+fn told(ran: &Ran, parts: &[&str]) {
+    assert_eq!((ran.code, ran.picture.is_some()), (7, false), "{}", ran.stderr);
+    assert!(ran.stderr.starts_with("error: llvmpipe"), "{}", ran.stderr);
+    assert_eq!(ran.lines().len(), 1, "{}", ran.stderr);
+    for part in parts {
+        assert!(ran.stderr.contains(part), "{part}: {}", ran.stderr);
+    }
+}
+
+#[test]
+fn a_film_that_does_not_fit_tells_its_size() {
+    let Some(driver) = driver() else { return };
+    let place = Place::new(SCENE);
+    let (large, gpu) = (["--size", "1024x1024"], ["--device", "gpu"]);
+    let expected = place.expected(driver, &large);
+    let ran = place.run(driver, &[large, gpu].concat(), &[("FAULTS_LARGEST", "8388608")]);
+    let parts = [
+        ": out of memory: its driver has no 16.0 MiB for a film of 1024 x 1024 pixels",
+        ADVICE,
+    ];
+    told(&ran, &parts);
+    assert!(ran.count("allocation") > 0 && ran.log.iter().any(|line| line.ends_with("of 16777216 refused")));
+    // A part of it does fit, and so does everything in what is enough.
+    let crop = ["--size", "1024x1024", "--crop", "0,0,1024,64", "--device", "gpu"];
+    let ran = place.run(driver, &crop, &[("FAULTS_LARGEST", "8388608")]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let ran = place.run(driver, &[large, gpu].concat(), &[("FAULTS_LARGEST", "67108864")]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    assert!(ran.picture.as_ref() == Some(&expected));
+    let ran = place.run(
+        driver,
+        &[large, ["--device", "auto"]].concat(),
+        &[("FAULTS_LARGEST", "8388608")],
+    );
+    assert_eq!((ran.code, ran.lines().len()), (0, 1), "{}", ran.stderr);
+    assert!(
+        ran.stderr.starts_with("warning: rendering on the CPU: llvmpipe"),
+        "{}",
+        ran.stderr
+    );
+    assert!(ran.picture == Some(expected));
+}
+
+/// From any allocation on: while the device is opened, for the film, for the copies of it.
+#[test]
+fn memory_that_runs_out_anywhere_is_told_or_leaves_the_work_to_the_cpu() {
+    let Some(driver) = driver() else { return };
+    let place = Place::new(SCENE);
+    let large = ["--size", "1024x1024"];
+    let expected = place.expected(driver, &large);
+    let free = place.run(driver, &[large, ["--device", "gpu"]].concat(), &[]);
+    let allocations = free.count("allocation");
+    assert!((2..100).contains(&allocations), "{:?}", free.log);
+    let mut refused = 0;
+    for from in 1..=allocations {
+        let from = from.to_string();
+        let faults = [("FAULTS_NO_MEMORY_FROM", from.as_str())];
+        let ran = place.run(driver, &[large, ["--device", "gpu"]].concat(), &faults);
+        // How many there are depends on how fast it goes.
+        if ran.log.iter().any(|line| line.ends_with("refused")) {
+            told(&ran, &[": out of memory: its driver has n"]);
+            refused += 1;
+        } else {
+            assert_eq!(ran.code, 0, "{from}: {}", ran.stderr);
+        }
+        let ran = place.run(driver, &[large, ["--device", "auto"]].concat(), &faults);
+        assert_eq!(ran.code, 0, "{from}: {}", ran.stderr);
+        assert!(ran.picture.as_ref() == Some(&expected), "{from}");
+    }
+    assert!(refused >= 2, "{refused}");
+}
+
+#[test]
+fn a_scene_that_does_not_fit_tells_its_size() {
+    let Some(driver) = driver() else { return };
+    let textured = SCENE.replace("color = [0.5, 0.4, 0.3]", "color = { texture = \"large\" }")
+        + "[textures.large]\ntype = \"image\"\nfile = \"large.png\"\n";
+    let place = Place::new(&textured);
+    // 4 MiB of texels, and a third of that of smaller copies.
+    let large = image::RgbImage::from_fn(1024, 1024, |x, y| image::Rgb([x as u8, y as u8, (x * y) as u8]));
+    large.save(place.path("large.png")).expect("an image");
+    let limit = [("FAULTS_LARGEST", "4194304")];
+    let ran = place.run(driver, &["--device", "gpu"], &limit);
+    told(
+        &ran,
+        &[": out of memory: its driver has no 5.3 MiB for the scene; ", ADVICE],
+    );
+    let ran = place.run(driver, &["--device", "gpu"], &[]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+}
+
+/// Where a submit has no memory, wgpu gives up the device.
+#[test]
+fn a_call_that_has_no_memory_is_no_loss() {
+    let Some(driver) = driver() else { return };
+    let place = Place::new(SCENE);
+    let expected = place.expected(driver, &[]);
+    for submit in ["1", "2", "3", "4", "5"] {
+        let faults = [("FAULTS_NO_MEMORY_IN", submit)];
+        let ran = place.run(driver, &["--device", "gpu"], &faults);
+        told(&ran, &[": out of memory: its driver has no "]);
+        let ran = place.run(driver, &["--device", "auto"], &faults);
+        assert_eq!((ran.code, ran.lines().len()), (0, 1), "{submit}: {}", ran.stderr);
+        assert!(ran.picture.as_ref() == Some(&expected), "{submit}");
+    }
+    let refused = [("FAULTS_REFUSE_FIRST", "1"), ("FAULTS_REFUSE_WITH", "-2")];
+    let ran = place.run(driver, &["--device", "gpu"], &refused);
+    told(&ran, &[": out of memory: its driver has none to open it with; "]);
+}

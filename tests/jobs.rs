@@ -1,0 +1,408 @@
+//! Work that ends early and goes on: whatever was kept, wherever it was cut, and whichever backend goes on with it, the film has
+//! the same bits. And files of pieces: what is damaged in them is not believed.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use wgray::backend::Backend;
+use wgray::cpu::Cpu;
+use wgray::error::RenderError;
+use wgray::film::{Film, Region};
+use wgray::job::checkpoint::{Checkpoint, CheckpointError, Opening};
+use wgray::job::{Bands, Cut, Flow, Identity, Keeper, Kept, Order, Piece, Tile};
+use wgray::pack::Packed;
+
+use crate::contract::{bits, subjects};
+use crate::pictures::{self, Way, whole};
+use crate::scenes;
+
+/// Keeps pieces in memory, every time it can.
+#[derive(Default)]
+struct Shelf {
+    pieces: BTreeMap<u32, Piece>,
+    /// Forgets, of an unfinished piece, that a pass was made: the control.
+    forgetful: bool,
+}
+
+impl Keeper for Shelf {
+    fn pieces(&self) -> Vec<Kept> {
+        let kept = |(y, piece): (&u32, &Piece)| Kept {
+            number: *y as usize,
+            region: piece.region,
+            film: piece.film.region,
+            reached: piece.reached.clone(),
+        };
+        self.pieces.iter().map(kept).collect()
+    }
+
+    fn load(&mut self, number: usize) -> Result<Piece, RenderError> {
+        Ok(self.pieces[&(number as u32)].clone())
+    }
+
+    fn keep(&mut self, piece: &Piece) {
+        let Region { y0, y1, .. } = piece.region;
+        self.pieces
+            .retain(|_, other| other.region.y1 <= y0 || other.region.y0 >= y1);
+        let mut piece = piece.clone();
+        if self.forgetful && !piece.reached.pass.is_empty() {
+            piece.reached.next = [piece.film.region.x0, piece.film.region.y0];
+        }
+        self.pieces.insert(y0, piece);
+    }
+
+    fn sync(&mut self) {}
+
+    fn interval(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    fn small_pieces(&self) -> bool {
+        true
+    }
+}
+
+/// Renders until so many calls were made, if there are so many; all bands that were handed out then, and whether those are all.
+fn some_calls(
+    packed: &Packed,
+    backend: &mut dyn Backend,
+    keeper: &mut dyn Keeper,
+    cut: &Cut,
+    at_once: bool,
+    calls: usize,
+) -> Option<Film> {
+    let (region, order) = (whole(packed), if at_once { Order::Pixels } else { Order::Rows });
+    let mut bands = Bands::new(region, packed.pixel_samples, cut, order, backend.largest_film(), keeper);
+    if at_once {
+        bands = bands.as_a_whole(packed.form()).expect("memory");
+    }
+    let mut made = 0;
+    let mut watch = |_: &mut dyn Backend, _: Region, share: f64| {
+        assert!((0.0..=1.0 + 1e-9).contains(&share), "{share}");
+        made += 1;
+        Ok(Flow::from(made < calls))
+    };
+    let mut film = Film::of(region, packed.form());
+    loop {
+        match bands.render_next(backend, &mut watch, &mut || {}) {
+            Ok(Some(band)) => {
+                let start = (band.film.region.y0 * region.width()) as usize;
+                for (to, from) in film.lists_mut().zip(band.film.lists()) {
+                    if let Some(to) = to.get_mut(start..start + from.len()) {
+                        to.copy_from_slice(from);
+                    }
+                }
+            }
+            Ok(None) => return Some(film),
+            Err(RenderError::Cancelled) => return None,
+            Err(error) => panic!("{error}"),
+        }
+    }
+}
+
+/// The film of work that was broken off again and again; `None` if it never came to its end.
+fn in_pieces(packed: &Packed, keeper: &mut dyn Keeper, cut: &Cut, at_once: bool, calls: usize) -> Option<Film> {
+    (0..1000).find_map(|round| {
+        // Each time another backend goes on.
+        let mut backend: Box<dyn Backend> = match round % 3 {
+            0 => pictures::backend(packed, Way::Buffers),
+            1 => Box::new(Cpu::new(packed)),
+            _ => pictures::backend(packed, Way::Baked),
+        };
+        some_calls(packed, &mut *backend, keeper, cut, at_once, calls)
+    })
+}
+
+fn cuts() -> [Cut; 3] {
+    let cut = Cut::default();
+    [
+        cut,
+        Cut {
+            band_pixels: 70,
+            samples_per_call: Some(7),
+            rows_per_call: Some(2),
+        },
+        Cut {
+            band_pixels: 100,
+            samples_per_call: Some(1),
+            ..cut
+        },
+    ]
+}
+
+#[test]
+fn work_that_is_broken_off_and_gone_on_with_makes_the_same_film() {
+    for packed in subjects() {
+        let expected = bits(&pictures::film(
+            &mut Cpu::new(&packed),
+            &packed,
+            whole(&packed),
+            &Cut::default(),
+        ));
+        for (cut, calls) in cuts().into_iter().zip([1, 23, 57]) {
+            for at_once in [false, true] {
+                let mut shelf = Shelf::default();
+                let film = in_pieces(&packed, &mut shelf, &cut, at_once, calls).expect("an end");
+                assert!(
+                    bits(&film) == expected,
+                    "{cut:?}, all at once: {at_once}, {:?}",
+                    packed.form()
+                );
+            }
+        }
+    }
+}
+
+/// The control: a keeper that loses where a piece stands makes another film.
+#[test]
+fn a_keeper_that_forgets_is_found() {
+    let [packed, ..] = subjects();
+    let expected = bits(&pictures::film(
+        &mut Cpu::new(&packed),
+        &packed,
+        whole(&packed),
+        &Cut::default(),
+    ));
+    let mut shelf = Shelf {
+        forgetful: true,
+        ..Shelf::default()
+    };
+    let [_, cut, _] = cuts();
+    let film = in_pieces(&packed, &mut shelf, &cut, false, 23);
+    assert!(film.is_none_or(|film| bits(&film) != expected));
+}
+
+#[test]
+fn when_the_time_is_up_every_pixel_has_a_sample() {
+    for packed in subjects() {
+        let cut = Cut {
+            band_pixels: 70,
+            samples_per_call: Some(1),
+            rows_per_call: Some(1),
+        };
+        let (mut cpu, mut shelf) = (Cpu::new(&packed), Shelf::default());
+        let region = whole(&packed);
+        let most = cpu.largest_film();
+        let bands = Bands::new(region, packed.pixel_samples, &cut, Order::Pixels, most, &mut shelf);
+        let mut bands = bands.as_a_whole(packed.form()).expect("memory");
+        let mut watch = |_: &mut dyn Backend, _: Region, _: f64| Ok(Flow::TimeIsUp);
+        let mut pixels = 0;
+        while let Some(band) = bands.render_next(&mut cpu, &mut watch, &mut || {}).expect("bands") {
+            assert!(band.least_samples >= 1);
+            assert!(band.film.sums.iter().all(|sum| sum.w != 0.0));
+            pixels += band.film.region.pixels();
+        }
+        assert_eq!(pixels, region.pixels());
+    }
+}
+
+fn cornell() -> (Packed, Identity) {
+    let mut scene = scenes::scene("cornell.toml");
+    (scene.image.width, scene.image.height) = (24, 40);
+    scene.render.pixel_samples.count = 4;
+    let packed = scenes::packed(&scene);
+    let identity = Identity::of(&packed, whole(&packed), false);
+    (packed, identity)
+}
+
+fn open(
+    path: &Path,
+    packed: &Packed,
+    identity: &Identity,
+) -> Result<(Checkpoint<'static>, Vec<String>), CheckpointError> {
+    let (sender, told) = std::sync::mpsc::channel();
+    let mut rounds = 0;
+    let opening = Opening {
+        path: path.to_owned(),
+        resume: true,
+        interval: Duration::ZERO,
+        // A program that this process starts has its files, and so the lock, for a moment.
+        wait: Box::new(move || {
+            rounds += 1;
+            assert!(rounds < 200, "somebody else writes it");
+            true
+        }),
+        tell: Box::new(move |what| sender.send(what.to_owned()).expect("a listener")),
+    };
+    let checkpoint = Checkpoint::open(opening, identity.clone(), packed.form())?;
+    Ok((checkpoint, told.try_iter().collect()))
+}
+
+fn folder_with_checkpoint(packed: &Packed, identity: &Identity) -> (tempfile::TempDir, PathBuf, Film) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("c");
+    let (mut checkpoint, told) = open(&path, packed, identity).expect("a checkpoint");
+    assert!(told.is_empty(), "{told:?}");
+    let [_, cut, _] = cuts();
+    let film = some_calls(packed, &mut Cpu::new(packed), &mut checkpoint, &cut, false, usize::MAX);
+    (folder, path, film.expect("a film"))
+}
+
+#[test]
+fn of_a_damaged_file_all_before_the_damage_is_used() {
+    let (packed, identity) = cornell();
+    let (_folder, path, film) = folder_with_checkpoint(&packed, &identity);
+    let good = std::fs::read(&path).expect("the file");
+    let (checkpoint, _) = open(&path, &packed, &identity).expect("a checkpoint");
+    let whole_file = checkpoint.pieces();
+    drop(checkpoint);
+    assert!(whole_file.len() > 2, "{}", whole_file.len());
+    let header = {
+        let length = u32::from_le_bytes(good[16..20].try_into().expect("four bytes")) as usize;
+        16 + 4 + length + 32
+    };
+    for at in (0..good.len()).step_by(good.len() / 211) {
+        for cut_short in [false, true] {
+            let mut bytes = good.clone();
+            match cut_short {
+                true => bytes.truncate(at),
+                false => bytes[at] ^= 0x10,
+            }
+            std::fs::write(&path, &bytes).expect("a file");
+            match open(&path, &packed, &identity) {
+                Err(error) => {
+                    assert!(at < header, "byte {at}: {error}");
+                    assert!(
+                        matches!(error, CheckpointError::Unreadable { .. }),
+                        "byte {at}: {error}"
+                    );
+                }
+                Ok((mut checkpoint, told)) => {
+                    assert!(at >= header, "a damaged header was believed: byte {at}");
+                    // Between two pieces a file may end.
+                    assert!(told.len() == 1 || (cut_short && told.is_empty()), "byte {at}: {told:?}");
+                    let left = checkpoint.pieces();
+                    assert!(left.len() < whole_file.len());
+                    for piece in left {
+                        let Piece {
+                            region, film: found, ..
+                        } = checkpoint.load(piece.number).expect("a piece");
+                        assert_eq!(bits(&film.clone().part(region)), bits(&found.part(region)));
+                    }
+                    let [_, cut, _] = cuts();
+                    let again = some_calls(
+                        &packed,
+                        &mut Cpu::new(&packed),
+                        &mut checkpoint,
+                        &cut,
+                        false,
+                        usize::MAX,
+                    );
+                    assert_eq!(bits(&again.expect("a film")), bits(&film));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_no_longer_needed_does_not_pile_up() {
+    let mut scene = scenes::scene("cornell.toml");
+    (scene.image.width, scene.image.height) = (1024, 512);
+    scene.render.pixel_samples.count = 64;
+    let packed = scenes::packed(&scene);
+    let identity = Identity::of(&packed, whole(&packed), false);
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("c");
+    let (mut checkpoint, _) = open(&path, &packed, &identity).expect("a checkpoint");
+    let film = Film::of(whole(&packed), packed.form());
+    let bytes = film.region.pixels() * packed.form().bytes() as u64;
+    let mut largest = 0;
+    for round in 1..40 {
+        let piece = Piece {
+            region: film.region,
+            reached: wgray::job::Reached {
+                pass: round - 1..round,
+                next: [0, 0],
+            },
+            film: film.clone(),
+        };
+        checkpoint.keep(&piece);
+        checkpoint.sync();
+        largest = largest.max(std::fs::metadata(&path).expect("the file").len());
+        let [kept] = checkpoint.pieces().try_into().expect("one piece");
+        assert_eq!(checkpoint.load(kept.number).expect("a piece"), piece);
+    }
+    assert!(largest > 3 * bytes, "nothing was ever left in the file: {largest}");
+    assert!(largest < 3 * bytes + (64 << 20) + 4096, "{largest}");
+    drop(checkpoint);
+    let (checkpoint, told) = open(&path, &packed, &identity).expect("a checkpoint");
+    assert_eq!((checkpoint.pieces().len(), told), (1, Vec::new()));
+}
+
+/// What a change of something is told as.
+type Change<'a, T> = (&'a str, &'a dyn Fn(&mut T));
+
+#[test]
+fn another_job_has_another_identity() {
+    let scene = scenes::scene("cornell.toml");
+    let of = |change: &dyn Fn(&mut wgray::Description)| {
+        let mut scene = scene.clone();
+        change(&mut scene);
+        let packed = scenes::packed(&scene);
+        Identity::of(&packed, whole(&packed), false)
+    };
+    let this = of(&|_| ());
+    assert_eq!(this, of(&|_| ()), "of the same scene the same");
+    let changes: [Change<wgray::Description>; 6] = [
+        ("another size", &|scene| scene.image.width += 1),
+        ("another number of samples", &|scene| {
+            scene.render.pixel_samples.count = 1
+        }),
+        ("another scene", &|scene| scene.render.seed += 1),
+        ("another scene", &|scene| scene.render.ambient.x += 1e-3),
+        ("another scene", &|scene| scene.shapes.truncate(3)),
+        ("another scene", &|scene| scene.lights.truncate(0)),
+    ];
+    for (what, change) in changes {
+        let told = this.difference(&of(change)).unwrap_or_default();
+        assert!(told.starts_with(what), "{what}: {told}");
+    }
+    let changes: [Change<Identity>; 6] = [
+        ("another version", &|job| job.version.push('1')),
+        ("another crop", &|job| job.region[0] = 1),
+        ("another kind of sampling", &|job| job.adaptive = true),
+        ("another form", &|job| job.layers = true),
+        ("another rounding", &|job| job.exact_rounding = true),
+        ("other shaders", &|job| job.shaders.push('1')),
+    ];
+    for (what, change) in changes {
+        let mut other = this.clone();
+        change(&mut other);
+        let told = this.difference(&other).unwrap_or_default();
+        assert!(told.starts_with(what), "{what}: {told}");
+    }
+    // Layers are no part of the scene.
+    let [_, _, layered, _] = subjects();
+    let plain = layered.clone().without_layers();
+    let hashes = [layered, plain].map(|packed| Identity::of(&packed, whole(&packed), false).scene);
+    assert_eq!(hashes[0], hashes[1]);
+}
+
+#[test]
+fn tiles_are_all_rows_once() {
+    for (height, of) in [(1, 1), (7, 3), (7, 7), (65_536, 1), (65_536, 65_536), (65_536, 9999)] {
+        let region = Region {
+            x0: 3,
+            y0: 11,
+            x1: 5,
+            y1: 11 + height,
+        };
+        let mut next = region.y0;
+        for number in 1..=of {
+            let rows = Tile { number, of }.rows(region).expect("rows");
+            assert_eq!((rows.x0, rows.x1, rows.y0), (3, 5, next));
+            assert!(rows.height() == height / of || rows.height() == height / of + 1);
+            next = rows.y1;
+        }
+        assert_eq!(next, region.y1);
+        assert_eq!(
+            Tile {
+                number: 1,
+                of: height + 1
+            }
+            .rows(region),
+            None
+        );
+    }
+}
