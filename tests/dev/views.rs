@@ -79,8 +79,9 @@ fn an_edit_of_the_file_changes_of_a_moved_camera_what_it_changes() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
+    let before = running.revision();
     running.session.send(Command::Move(Move::Orbit(0.4, 0.2)));
-    running.wait_done(running.revision());
+    running.wait_done(before);
     let moved = running.state().camera.clone();
     files.edit("scene.toml", "fov = 40", "fov = 44");
     let wide = moved.replace("fov = 40", "fov = 44");
