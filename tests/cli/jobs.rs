@@ -31,7 +31,7 @@ fn start(place: &Place, arguments: &[&str]) -> Child {
     Command::new(program())
         .current_dir(place.path("."))
         .args(LONG)
-        .args(["--reproducible"])
+        .args(["--reproducible", "--threads", "1"]) // so that it takes a while on any machine
         .args(arguments)
         .stderr(Stdio::piped())
         .spawn()
@@ -84,7 +84,7 @@ fn a_killed_render_goes_on_where_it_was() {
             ],
         );
         let before = fs::metadata(place.path("c")).map_or(0, |data| data.len());
-        wait_for(&place, "c", before + 100_000);
+        wait_for(&place, "c", before + 50_000);
         std::thread::sleep(Duration::from_millis(7 * round));
         child.kill().expect("a kill"); // SIGKILL
         child.wait().expect("an end");
@@ -127,7 +127,7 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
             assert!(begun.elapsed() < Duration::from_secs(60), "{:?}", place.files());
             std::thread::sleep(Duration::from_millis(2));
         }
-        std::thread::sleep(Duration::from_millis(300)); // for the handler, and some work
+        std::thread::sleep(Duration::from_millis(100)); // for the handler, and some work
         let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
         assert!(sent.expect("kill").success());
         let ran = ended(child);
