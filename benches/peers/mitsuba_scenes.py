@@ -33,6 +33,7 @@ sys.dont_write_bytecode = True
 import mitsuba as mi
 import numpy as np
 
+import mitsuba_ggx
 import mitsuba_phong
 import scenes
 
@@ -50,7 +51,7 @@ def tint(value):
     return {"type": "rgb", "value": value}
 
 
-def paint(material, traced):
+def paint(material, traced, exact):
     if material.kind == "phong" and traced:
         plugin = {"type": mitsuba_phong.NAME, "kd": tint(material.diffuse), "ks": tint(material.specular),
                   "shininess": material.shininess}
@@ -58,9 +59,54 @@ def paint(material, traced):
         plugin = {"type": "diffuse", "reflectance": tint(material.diffuse if material.kind == "phong" else material.color)}
     elif material.kind == "conductor":
         plugin = {"type": "conductor", "material": "none", "specular_reflectance": tint(material.color)}
+        if material.index:
+            eta, k = (wide(value) for value in material.index)
+            plugin = {"type": "conductor", "eta": eta, "k": k}
+        if any(material.alpha) and exact:
+            plugin = {"type": mitsuba_ggx.CONDUCTOR, "color": tint(material.color)} | microfacets(*material.alpha)
+            if material.index:
+                plugin |= {f"{name}{i}": float(x) for name, values in zip(("eta", "k"), material.index) for i, x in enumerate(values)}
+        elif any(material.alpha):
+            plugin |= {"type": "roughconductor", "distribution": "ggx"} | microfacets(*material.alpha)
+    elif material.kind == "principled":
+        # As much work, and not the same: nearly so is the metal alone, GGX of alpha = roughness^2 with Schlick's formula, but without what
+        # facets reflect more than once. Disney's diffuse term, its specular part, clearcoat and sheen are others than glTF's.
+        plugin = {"type": "principled", "base_color": tint(material.color), "metallic": float(material.metallic),
+                  "roughness": float(material.alpha[0]) ** 0.5, "specular": 0.5, "clearcoat": float(material.coat[0]),
+                  "clearcoat_gloss": 1.0 - material.coat[1]}
+    elif material.thin:
+        return {"type": "thindielectric", "int_ior": float(material.ior), "ext_ior": 1.0, "specular_transmittance": tint(material.color)}
     else:
-        return {"type": "dielectric", "int_ior": float(material.ior), "ext_ior": 1.0, "specular_transmittance": tint(material.color)}
+        plugin = {"type": "dielectric", "int_ior": float(material.ior), "ext_ior": 1.0, "specular_transmittance": tint(material.color)}
+        if any(material.alpha) and exact:
+            plugin = {"type": mitsuba_ggx.DIELECTRIC, "int_ior": float(material.ior), "color": tint(material.color)} | microfacets(*material.alpha)
+        elif any(material.alpha):
+            plugin |= {"type": "roughdielectric", "distribution": "ggx"} | microfacets(*material.alpha)
+        return plugin
     return {"type": "twosided", "b": plugin}
+
+
+def wide(value):
+    """Three numbers that may be above 1."""
+    return {"type": "rgb", "value": value}
+
+
+def microfacets(along, across):
+    return {"alpha_u": float(along), "alpha_v": float(across)}
+
+
+def surroundings(T, environment):
+    """A colour, or an image, whose rows of texels Mitsuba has at even angles from pole to pole and wgray in the middles of as many bands: with
+    twice as many rows and one more each of wgray's is there, and what lies between two is their mean in both."""
+    if not isinstance(environment, scenes.Map):
+        return {"type": "constant", "radiance": tint(environment)}
+    rows = np.array(mi.Bitmap(environment.file).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+    image = np.empty((2 * len(rows) + 1, *rows.shape[1:]), np.float32)
+    image[1::2] = rows
+    image[2:-1:2] = (rows[:-1] + rows[1:]) / 2
+    image[0], image[-1] = rows[0].mean(0), rows[-1].mean(0)
+    place = T().rotate([0, 0, 1], environment.rotate) @ T(np.array([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]]))
+    return {"type": "envmap", "bitmap": mi.Bitmap(image), "scale": float(environment.scale), "to_world": place}
 
 
 def rectangle(T, center, u, v, kind="rectangle"):
@@ -153,6 +199,10 @@ def sensor(T, scene, width, height, spp):
     row = {"film": {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}},
            "sampler": {"type": "independent", "sample_count": spp}}
     place = T().look_at(origin=scene.position, target=scene.look_at, up=scene.up)
+    if scene.height_seen is None and scene.lens:
+        diameter, distance = scene.lens
+        return row | {"type": "thinlens", "fov": scene.fov, "fov_axis": "y", "to_world": place, "aperture_radius": diameter / 2,
+                      "focus_distance": float(distance)}
     if scene.height_seen is None:
         return row | {"type": "perspective", "fov": scene.fov, "fov_axis": "y", "to_world": place}
     # Mitsuba's orthographic camera sees from -1 to 1 along x, and along y by the picture's shape
@@ -164,6 +214,10 @@ def lights(T, scene):
     for l in scene.lights:
         if isinstance(l, scenes.Point):
             yield {"type": "point", "position": l.position, "intensity": tint(l.color)}
+        elif isinstance(l, scenes.Spot):
+            other = np.eye(3)[int(np.argmin(np.abs(l.direction)))]
+            place = T().look_at(origin=l.position, target=list(np.add(l.position, l.direction)), up=list(other))
+            yield {"type": "spot", "to_world": place, "intensity": tint(l.color), "cutoff_angle": l.angle, "beam_width": 0.9999 * l.angle}
         elif isinstance(l, scenes.Sun):
             yield {"type": "directional", "direction": l.direction, "irradiance": tint(l.color)}
         else:
@@ -179,22 +233,23 @@ def integrator(scene, light_samples):
     return {"type": "volpath" if absorbs else "path", "max_depth": scene.max_depth + 1, "rr_depth": scene.rr_depth + 1}
 
 
-def load(scene, size, spp, light_samples, curved="auto"):
-    """Mitsuba's scene; `curved` is as --ellipsoids has it."""
+def load(scene, size, spp, light_samples, curved="auto", exact=False):
+    """Mitsuba's scene; `curved` is as --ellipsoids has it. `exact`: rough metal and glass as wgray has them (mitsuba_ggx.py)."""
     T = mi.ScalarTransform4f
     folder = tempfile.mkdtemp()
     width, height = size or (scene.width, scene.height)
     traced = scene.integrator == "path"
     if traced:
         mitsuba_phong.register()
+        mitsuba_ggx.register()
     parts = {"type": "scene", "integrator": integrator(scene, light_samples), "sensor": sensor(T, scene, width, height, spp)}
-    if scene.environment and any(scene.environment):
-        parts["environment"] = {"type": "constant", "radiance": tint(scene.environment)}
+    if scene.environment and (isinstance(scene.environment, scenes.Map) or any(scene.environment)):
+        parts["environment"] = surroundings(T, scene.environment)
     bsdfs = {}  # by the material, so that shapes share them
 
     def painted(row, material):
         name = bsdfs.setdefault(id(material), f"material{len(bsdfs)}")
-        parts.setdefault(name, paint(material, traced))
+        parts.setdefault(name, paint(material, traced, exact))
         row = row | {"bsdf": {"type": "ref", "id": name}}
         if shines(material):
             row["emitter"] = {"type": "area", "radiance": tint(material.emission)}

@@ -110,6 +110,15 @@ SHAPES = (shape("disk", "ball", center=[-0.8, 0.2, 0.5], radius=0.4, normal=[0.4
 MESH = shape("mesh", "ball", file="meshes/blob.obj", normals="flat", scale=0.5, rotate=[20, 0, 30], translate=[0, 0, 0.6])
 CHECKER = '\n[textures.checker]\ntype = "checker"\neven = [0.8, 0.7, 0.2]\nodd = [0.1, 0.2, 0.6]\nscale = [{0}, {0}]\n'
 
+# Of the path tracer's models those of which Mitsuba has the same: without compensation of energy, which it has not.
+GOLD = "eta = [0.143, 0.375, 1.442]\nk = [3.983, 2.386, 1.603]"
+SKY = '\n[environment]\nfile = "maps/lobes.hdr"\n'
+
+
+def rough(kind, roughness, keys):
+    return f'type = "{kind}"\nroughness = {roughness}\nenergy_compensation = false\n{keys}'
+
+
 SCENES = {
     "diffuse": ball('type = "diffuse"\ncolor = [0.8, 0.5, 0.2]'),
     "conductor": ball('type = "conductor"\ncolor = [0.9, 0.7, 0.4]'),
@@ -152,6 +161,21 @@ SCENES = {
     "instances": head() + ENVIRONMENT + FLOOR + material("ball", 'type = "diffuse"\ncolor = [0.7, 0.4, 0.3]') + '\n[meshes.blob]\nfile = "meshes/blob.obj"\n'
     + "".join(f'\n[[instances]]\nmesh = "blob"\nmaterial = "ball"\nscale = 0.2\nrotate = [0, {40 * i}, {70 * i}]\ntranslate = [{0.5 * i - 1}, {0.3 * i - 0.8}, 0.25]\n'
               for i in range(5)) + lamp(),
+    **{f"conductor-rough{n}": ball(rough("conductor", n, "color = [0.9, 0.7, 0.4]")) for n in (0.1, 0.3, 0.6, 1)},
+    "conductor-gold": ball(rough("conductor", 0.4, GOLD)), "conductor-gold-smooth": ball('type = "conductor"\n' + GOLD),
+    "conductor-brushed": ball(rough("conductor", 0.3, GOLD + "\nanisotropy = 0.8")),
+    "conductor-brushed-across": ball(rough("conductor", 0.3, GOLD + "\nanisotropy = 0.8\nanisotropy_rotation = 90")),
+    "conductor-mesh": head() + ENVIRONMENT + FLOOR + material("ball", rough("conductor", 0.4, GOLD)) + MESH + lamp(),
+    **{f"dielectric-rough{n}": ball(rough("dielectric", n, "ior = 1.5")) for n in (0.2, 0.5, 0.9)},
+    "dielectric-rough-color": ball(rough("dielectric", 0.4, "ior = 1.33\ncolor = [0.9, 0.6, 0.3]")),
+    "dielectric-rough-air": ball(rough("dielectric", 0.4, "ior = 0.7")),
+    "dielectric-thin": ball('type = "dielectric"\nior = 1.5\nthin = true'),
+    "lens": head(CAMERA + "\naperture = 0.5\nfocus_distance = 3.2") + ENVIRONMENT + FLOOR + material("ball", GREY) + SHAPES + lamp(),
+    "map": head() + SKY + FLOOR + material("ball", 'type = "diffuse"\ncolor = [0.7, 0.7, 0.7]') + SHAPES,
+    "map-turned": head() + SKY + "scale = 0.5\nrotate = 130\n" + FLOOR + material("ball", 'type = "conductor"\ncolor = [0.9, 0.8, 0.7]') + SHAPES,
+    "map-rough": head() + SKY + FLOOR + material("ball", rough("conductor", 0.3, GOLD)) + shape("sphere", "ball", center=[0, 0, 0.55], radius=0.5),
+    "spot": head() + FLOOR + WALL + material("ball", GREY) + SHAPES
+    + table("lights", "spot", position=[-0.8, -1.5, 2], direction=[0.7, 1.3, -1.6], color=[9, 8, 7], cone_angle=25, inner_angle=25),
     "depth0": room(0), "depth1": room(1), "depth2": room(2), "depth24": room(24, 3), "roulette": room(64, 0),
 }
 
@@ -215,6 +239,27 @@ COURSE = {
 }
 
 
+def write_map(path, width=256):
+    """A pale sky with a warm, bright side and a cold one, as a Radiance file without compression."""
+    height = width // 2
+    lobes = [((0.5, -0.7, 0.5), 30, (12, 10, 7)), ((-0.8, 0.1, 0.3), 8, (0.5, 0.9, 1.6))]
+    lobes = [([x / math.hypot(*to) for x in to], sharp, color) for to, sharp, color in lobes]
+    texels = bytearray()
+    for row in range(height):
+        polar = math.pi * (row + 0.5) / height
+        for column in range(width):
+            turn = math.pi * (1 - 2 * (column + 0.5) / width)  # the middle is towards +x, the left half towards +y
+            d = (math.sin(polar) * math.cos(turn), math.sin(polar) * math.sin(turn), math.cos(polar))
+            color = [0.15, 0.18, 0.22]
+            for to, sharp, light in lobes:
+                near = math.exp(sharp * (sum(a * b for a, b in zip(d, to)) - 1))
+                color = [c + near * l for c, l in zip(color, light)]
+            _, exponent = math.frexp(max(color))
+            texels += bytes(min(255, int(c * 256 / 2 ** exponent)) for c in color) + bytes([exponent + 128])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n" + f"-Y {height} +X {width}\n".encode() + texels)
+
+
 def write_obj(path, mesh):
     path.parent.mkdir(parents=True, exist_ok=True)
     vertices, faces = mesh
@@ -225,6 +270,7 @@ def write(folder):
     """Writes everything; returns the paths of the scenes by their names."""
     folder = pathlib.Path(folder)
     write_obj(folder / "meshes" / "blob.obj", blob())
+    write_map(folder / "maps" / "lobes.hdr")
     for name, mesh in ASSETS.items():
         write_obj(folder / "assets" / f"{name}.obj", mesh)
     (folder / "configs").mkdir(exist_ok=True)

@@ -43,6 +43,11 @@ class Material:
     ior: float = 1
     absorption: list | None = None
     emission: list | None = None
+    alpha: tuple = (0, 0)  # of the microfacets, along the tangent and across it; (0, 0) is smooth
+    index: tuple | None = None  # the metal's n and k
+    thin: bool = False
+    metallic: float = 0
+    coat: tuple = (0, 0)  # clearcoat and its roughness
 
 
 @dataclass
@@ -75,6 +80,23 @@ class Disk:
 class Point:
     position: list
     color: list
+
+
+@dataclass
+class Spot:
+    """A cone with a hard edge."""
+    position: list
+    direction: list
+    color: list
+    angle: float
+
+
+@dataclass
+class Map:
+    """An equirectangular image around the scene, its middle towards +x and its upper edge towards +z, turned about z by degrees."""
+    file: str
+    scale: float
+    rotate: float
 
 
 @dataclass
@@ -129,7 +151,8 @@ class Scene:
     lights: list = field(default_factory=list)
     integrator: str = "phong"
     height_seen: float | None = None  # of an orthographic camera
-    environment: list | None = None
+    environment: list | Map | None = None
+    lens: tuple | None = None  # diameter and distance of focus
     max_depth: int = 8
     rr_depth: int = 5
     spp: int = 16
@@ -193,9 +216,32 @@ def material(path, row, textures, traced):
     kind = {"mirror": "conductor", "glass": "dielectric"}.get(row["type"], row["type"])
     if kind != "phong" and not traced:
         raise ValueError(f"{path}: a material {row['type']!r}: the peers' materials are phong")
-    if row.get("roughness", 0) != 0 or "normal_map" in row:
-        raise ValueError(f"{path}: the peers have neither roughness nor normal maps")
+    rough = kind in ("conductor", "dielectric", "principled")
+    if "normal_map" in row or "metal" in row or isinstance(row.get("roughness"), dict):
+        raise ValueError(f"{path}: the peers have neither normal maps, rough textures nor the named metals")
+    if row.get("roughness", 0) != 0 and not rough:
+        raise ValueError(f"{path}: a rough {kind}: the peers have no such model")
+    if rough and row.get("roughness", 0) != 0 and kind != "principled" and row.get("energy_compensation", True):
+        raise ValueError(f"{path}: the peers compensate for no energy: energy_compensation must be false")
     made = Material(kind, emission=color(path, row, "emission", textures))
+    if kind == "principled":
+        other = set(row) - {"type", "base_color", "metallic", "roughness", "clearcoat", "clearcoat_roughness"}
+        if other:
+            raise ValueError(f"{path}: the peers' principled has no {', '.join(sorted(other))}")
+        made.color, made.metallic = color(path, row, "base_color", textures, [1, 1, 1]), row.get("metallic", 1)
+        made.alpha = (row.get("roughness", 1) ** 2,) * 2
+        made.coat = (row.get("clearcoat", 0), row.get("clearcoat_roughness", 0))
+        return made
+    if rough:
+        # glTF's: along the tangent mix(alpha, 1, anisotropy^2). A quarter of a turn exchanges the two.
+        alpha = row.get("roughness", 0) ** 2
+        along = alpha + (1 - alpha) * row.get("anisotropy", 0) ** 2 if alpha else 0
+        turn = row.get("anisotropy_rotation", 0)
+        if turn not in (0, 90):
+            raise ValueError(f"{path}: the peers turn anisotropy by 0 or 90 degrees")
+        made.alpha = (along, alpha) if turn == 0 else (alpha, along)
+        made.index = (row["eta"], row["k"]) if "eta" in row else None
+        made.thin = row.get("thin", False)
     if kind == "phong":
         plain = color(path, row, "color", textures)
         made.ambient, made.diffuse, made.specular = (color(path, row, term, textures, plain) for term in ("ambient", "diffuse", "specular"))
@@ -216,6 +262,8 @@ def load(path, integrator="phong"):
         text = tomllib.load(file)
     camera, render = text["camera"], text.get("render", {})
     orthographic = camera.get("type", "perspective") == "orthographic"
+    if camera.get("type") == "panorama" or camera.get("blades", 0) or "f_number" in camera:
+        raise ValueError(f"{path}: the peers have neither panoramas, blades nor f-numbers")
     if render.get("integrator", "phong") != integrator:
         raise ValueError(f"{path}: render.integrator must be {integrator!r} here")
     if orthographic and not traced:
@@ -224,8 +272,9 @@ def load(path, integrator="phong"):
         raise ValueError(f"{path}: the peers' scenes have a black background")
     scene = Scene(text["image"]["width"], text["image"]["height"], camera["position"], camera["look_at"],
                   camera.get("up", [0, 0, 1]), camera.get("fov"), render.get("ambient", [0, 0, 0]), integrator=integrator,
-                  height_seen=camera["height"] if orthographic else None, environment=text.get("environment", {}).get("color"),
-                  max_depth=render.get("max_depth", 8), rr_depth=render.get("rr_depth", 5),
+                  height_seen=camera["height"] if orthographic else None, environment=surroundings(path, text.get("environment", {})),
+                  lens=(camera["aperture"], camera.get("focus_distance", math.dist(camera["position"], camera["look_at"])))
+                  if camera.get("aperture") else None, max_depth=render.get("max_depth", 8), rr_depth=render.get("rr_depth", 5),
                   spp=render.get("pixel_samples", {}).get("count", 16))
     textures = text.get("textures", {})
     materials = {name: material(path, row, textures, traced) for name, row in text["materials"].items()}
@@ -249,11 +298,23 @@ def load(path, integrator="phong"):
             scene.lights.append(quad(row, color=row["color"]))
         elif row["type"] == "point" and traced:
             scene.lights.append(Point(row["position"], row["color"]))
+        elif row["type"] == "spot" and traced:
+            if row.get("inner_angle", 0) != row["cone_angle"]:
+                raise ValueError(f"{path}: the peers' spots fall off by another formula: inner_angle must be cone_angle")
+            scene.lights.append(Spot(row["position"], row["direction"], row["color"], row["cone_angle"]))
         elif row["type"] == "directional" and traced:
             scene.lights.append(Sun(row["direction"], row["color"]))
         else:
             raise ValueError(f"{path}: the peers' lights are rectangles, not {row['type']!r}")
     return scene
+
+
+def surroundings(path, row):
+    if set(row) - {"color", "file", "scale", "rotate"} or isinstance(row.get("rotate", 0), (list, dict)):
+        raise ValueError(f"{path}: the peers' environments are colours, or files turned about z")
+    if "file" in row:
+        return Map(os.path.join(os.path.dirname(os.path.abspath(path)), row["file"]), row.get("scale", 1), row.get("rotate", 0))
+    return [x * row.get("scale", 1) for x in row["color"]] if "color" in row else None
 
 
 def shape(path, row, material):

@@ -77,5 +77,11 @@ PATH = {
     "path-rock70k": path("paths around a rock of 69,312 triangles", "path-rock70k", 400),
     "path-cold": path("paths in the assignment scene, whole process, caches empty", CORNELL_PATH, 400, "cold"),
 }
-WORKS = SMALL | LARGE | PATH
-SETS = {"small": list(SMALL), "large": list(LARGE), "paths": list(PATH), "all": list(WORKS)}
+MATERIALS = {name: dataclasses.replace(work, renderers=NO_POVRAY) for name, work in {  # cycles_scenes.py has not these
+    "spheres": path("a rough metal and a rough glass sphere under a map", "path-spheres", 400),
+    "lamps1": path("a room with one lamp", "path-lamps1", 400),
+    "lamps1000": path("a room with 1,000 lamps", "path-lamps1000", 400),
+    "principled70k": path("principled on a rock of 69,312 triangles", "path-principled70k", 400),
+}.items()}
+WORKS = SMALL | LARGE | PATH | MATERIALS
+SETS = {"small": list(SMALL), "large": list(LARGE), "paths": list(PATH), "materials": list(MATERIALS), "all": list(WORKS)}

@@ -1,0 +1,145 @@
+#!/usr/bin/env python3
+"""One lamp and a thousand of the same total power in a room: time, error, and the time at the error of one lamp, by kind of lamp and
+device, as a Markdown table.
+
+    target/peers/venv/bin/python benches/peers/lamps.py --wgray target/release/wgray
+
+The error is that of `path_error.py`: the root of the mean over the pixels of the relative variance, from pictures with other seeds.
+The time is the least of the renders' own (`--stats`: the work alone, without compiling). A lamp is a rectangle that shines downwards, a
+sphere or a point, and hidden from the camera, as what it would see of a small lamp is noise of another kind; a thousand are spread through the room, one to each cell of a grid of 10 x 10 x 10.
+"""
+import argparse
+import json
+import pathlib
+import random
+import subprocess
+import tempfile
+
+import numpy as np
+import OpenEXR
+
+ROOM = """[image]
+width = {size}
+height = {size}
+[camera]
+position = [0, -3.9, 1.6]
+look_at = [0, 0, 1.2]
+fov = 60
+[render]
+integrator = "path"
+max_depth = {depth}
+pixel_samples = {{ count = {spp} }}
+[materials]
+white = {{ type = "diffuse", color = [0.7, 0.7, 0.7] }}
+red = {{ type = "diffuse", color = [0.7, 0.2, 0.2] }}
+blue = {{ type = "diffuse", color = [0.2, 0.3, 0.7] }}
+lamp = {{ type = "diffuse", color = [0, 0, 0], emission = [{radiance}, {radiance}, {radiance}], visible = false }}
+dark = {{ type = "diffuse", color = [0.7, 0.7, 0.7], visible = false }}
+"""
+
+WALLS = [
+    ("white", [0, 0, 0], [4, 8], [0, 0, 1], [1, 0, 0]),
+    ("white", [0, 0, 3], [4, 8], [0, 0, -1], [1, 0, 0]),
+    ("red", [-2, 0, 1.5], [8, 3], [1, 0, 0], [0, 1, 0]),
+    ("blue", [2, 0, 1.5], [8, 3], [-1, 0, 0], [0, 1, 0]),
+    ("white", [0, 4, 1.5], [4, 3], [0, -1, 0], [1, 0, 0]),
+    ("white", [0, -4, 1.5], [4, 3], [0, 1, 0], [1, 0, 0]),
+    ("white", [-0.8, 1.2, 0.5], [0.9, 0.9], [0.3, -1, 0.4], [1, 0.3, 0]),
+    ("white", [0.7, 0.4, 0.4], [0.7, 0.8], [-0.4, -1, 0], [1, -0.4, 0]),
+]
+RADIANCE = 40
+AREA = 0.25
+
+
+def places(count):
+    """The middle under the ceiling, or one point of each cell of a grid."""
+    if count == 1:
+        return [(0, 0, 2.7)]
+    side = round(count ** (1 / 3))
+    chance = random.Random(7)
+    cells = [(i, j, k) for i in range(side) for j in range(side) for k in range(side)]
+    return [tuple(low + (high - low) * (cell + 0.1 + 0.8 * chance.random()) / side
+                  for cell, low, high in zip(place, (-1.9, -3.9, 0.3), (1.9, 3.9, 2.9))) for place in cells]
+
+
+def lamp(kind, count, place):
+    """One of so many lamps, as text."""
+    at = f"[{', '.join(f'{x:.4f}' for x in place)}]"
+    area = AREA / count
+    if kind == "rectangle":
+        side = area ** 0.5
+        return (f'[[lights]]\ntype = "rectangle"\ncenter = {at}\nsize = [{side}, {side}]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n'
+                f"color = [{RADIANCE}, {RADIANCE}, {RADIANCE}]\nvisible = false\n")
+    if kind == "sphere":
+        return f'[[shapes]]\ntype = "sphere"\nmaterial = "lamp"\ncenter = {at}\nradius = {(area / 4 / np.pi) ** 0.5}\n'
+    power = RADIANCE * area / 4
+    return f'[[lights]]\ntype = "point"\nposition = {at}\ncolor = [{power}, {power}, {power}]\n'
+
+
+def dark(kind, place):
+    """What is as large as one of a thousand lamps and does not shine; a point has no size."""
+    if kind == "point":
+        return ""
+    return lamp("sphere", 1000, place).replace('"lamp"', '"dark"')
+
+
+def scene(kind, count, arguments):
+    walls = "".join(f'[[shapes]]\ntype = "rectangle"\nmaterial = "{material}"\ncenter = {center}\nsize = {size}\nnormal = {normal}\n'
+                    f"tangent = {tangent}\n" for material, center, size, normal, tangent in WALLS)
+    start = ROOM.format(size=arguments.size, depth=arguments.depth, spp=arguments.spp, radiance=RADIANCE)
+    things = "".join(dark(kind, place) for place in places(1000)) if arguments.dark and count == 1 else ""
+    return start + walls + things + "".join(lamp(kind, count, place) for place in places(count))
+
+
+def render(folder, text, seed, device, arguments):
+    """The picture and the seconds of its work."""
+    (folder / "lamps.toml").write_text(text)
+    command = [arguments.wgray, "render", str(folder / "lamps.toml"), "-o", str(folder / "lamps.exr"), "--seed", str(seed),
+               "--device", device, "--stats", str(folder / "stats.json"), "--quiet"]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    channels = OpenEXR.File(str(folder / "lamps.exr"), separate_channels=True).channels()
+    picture = np.stack([channels[c].pixels for c in "RGB"], -1).astype(float)
+    return picture, json.loads((folder / "stats.json").read_text())
+
+
+def measure(folder, text, device, arguments):
+    """The least time, the relative error and the mean of a scene's pictures."""
+    pictures, seconds = [], []
+    for seed in range(1, 1 + arguments.pictures):
+        picture, stats = render(folder, text, seed, device, arguments)
+        pictures.append(picture)
+        seconds.append(stats["render_s"])
+    pictures = np.array(pictures)
+    variance = pictures.var(0, ddof=1).sum(-1)
+    relative = variance / ((pictures.mean(0) ** 2).sum(-1) + 1e-4)
+    return min(seconds), float(np.sqrt(relative.mean())), float(pictures.mean())
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--wgray", default="target/release/wgray")
+    parser.add_argument("--kinds", nargs="*", default=["rectangle", "sphere", "point"])
+    parser.add_argument("--counts", nargs="*", type=int, default=[1, 1000])
+    parser.add_argument("--devices", nargs="*", default=["cpu", "lavapipe"])
+    parser.add_argument("--dark", action="store_true", help="beside one lamp a thousand things of the size of lamps that do not shine")
+    parser.add_argument("--pictures", type=int, default=4)
+    parser.add_argument("--size", type=int, default=128)
+    parser.add_argument("--spp", type=int, default=16)
+    parser.add_argument("--depth", type=int, default=4)
+    arguments = parser.parse_args()
+    print("| lamps | device | count | mean | seconds | error | seconds at the error of the first | ratio |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    with tempfile.TemporaryDirectory() as name:
+        for kind in arguments.kinds:
+            for device in arguments.devices:
+                first = None
+                for count in arguments.counts:
+                    seconds, error, mean = measure(pathlib.Path(name), scene(kind, count, arguments), device, arguments)
+                    first = first or (seconds, error)
+                    equal = seconds * (error / first[1]) ** 2
+                    print(f"| {kind} | {device} | {count} | {mean:.4f} | {seconds:.3f} | {error:.4f} | {equal:.3f} | "
+                          f"{equal / first[0]:.2f} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
