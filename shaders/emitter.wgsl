@@ -22,14 +22,24 @@ fn chosen_emitter(bits: vec2u) -> Emitter {
     return load_emitter(select(emitter.other, first, unit_float(bits.y) < emitter.threshold));
 }
 
-// A sample of the light that arrives at p from `emitter`, for a uniform u.
-fn sample_emitter(emitter: Emitter, p: vec3f, u: vec2f) -> LightSample {
+// A sample of the light that arrives at p from what was chosen, for a uniform u.
+fn sample_emitter(chosen: Chosen, p: vec3f, u: vec2f) -> LightSample {
+    let emitter = chosen.emitter;
     if (EMITTER_KINDS & (1u << INSTANCE)) != 0u {
         if emitter.instance != 0u {
-            return sample_face(emitter, p, u);
+            return sample_face(chosen, p, u);
         }
     }
-    return sample_light(load_light(emitter.index), p, u);
+    var light = load_light(emitter.index);
+    if (EMITTER_KINDS & (1u << ENVIRONMENT)) != 0u {
+        if (EMITTER_KINDS == (1u << ENVIRONMENT)) | (light.kind == ENVIRONMENT) {
+            return sample_environment(light, u);
+        }
+    }
+    if LIGHT_TREE != 0u {
+        light.density = select(light.density, chosen.density, chosen.density > 0.0);
+    }
+    return sample_light(light, p, u);
 }
 
 fn sample_light(light: Light, p: vec3f, u: vec2f) -> LightSample {
@@ -51,6 +61,9 @@ fn sample_light(light: Light, p: vec3f, u: vec2f) -> LightSample {
     if (EMITTER_KINDS & (1u << POINT)) != 0u {
         radiance = select(radiance, light.color / dot(to, to), light.kind == POINT);
     }
+    if (EMITTER_KINDS & (1u << SPOT)) != 0u {
+        radiance = select(radiance, light.color * (spot_falloff(light, to) / dot(to, to)), light.kind == SPOT);
+    }
     if (EMITTER_KINDS & ((1u << RECTANGLE) | (1u << DISK) | (1u << TRIANGLE))) != 0u {
         pdf = select(solid_angle_pdf(pdf, to, light.normal), pdf, is_delta);
         behind = (light.sides == 1u) & (dot(light.normal, to) >= 0.0);
@@ -69,12 +82,19 @@ fn sample_light(light: Light, p: vec3f, u: vec2f) -> LightSample {
             radiance = emission_at(load_material(q.material), uv);
         }
     }
+    if SEES_THROUGH != 0u {
+        if !is_delta {
+            let q = load_primitive(light.primitive);
+            radiance *= presence_at(load_material(q.material), primitive_uv(q, point_to_local(q, p + to)));
+        }
+    }
     radiance = select(radiance, vec3f(0.0), behind);
     return LightSample(to, radiance, pdf, is_delta, light.reach, light.primitive);
 }
 
 // Of a triangle of a mesh.
-fn sample_face(emitter: Emitter, p: vec3f, u: vec2f) -> LightSample {
+fn sample_face(chosen: Chosen, p: vec3f, u: vec2f) -> LightSample {
+    let emitter = chosen.emitter;
     let b = triangle_sample(u);
     let face = face_of(load_instance(emitter.instance - 1u), Hit(0.0, emitter.instance, 0u, emitter.index, b));
     let material = material_of(face);
@@ -83,7 +103,14 @@ fn sample_face(emitter: Emitter, p: vec3f, u: vec2f) -> LightSample {
     if EMISSION_TEXTURES != 0u {
         radiance = emission_at(material, face_uv(face, b));
     }
-    let pdf = solid_angle_pdf(material.density, to, face.primitive.z);
+    if SEES_THROUGH != 0u {
+        radiance *= presence_at(material, face_uv(face, b));
+    }
+    var density = material.density;
+    if LIGHT_TREE != 0u {
+        density = chosen.density;
+    }
+    let pdf = solid_angle_pdf(density, to, face.primitive.z);
     return LightSample(to, radiance, pdf, false, environment.reach, NOTHING);
 }
 
@@ -91,21 +118,23 @@ fn sample_face(emitter: Emitter, p: vec3f, u: vec2f) -> LightSample {
 fn emission_at(material: Material, uv: vec2f) -> vec3f {
     var emission = material.emission;
     for (var i = 0u; i < LOOKUPS; i++) {
-        let lookup = material.lookups[i];
-        if (lookup & FOR_EMISSION) != 0u {
-            emission = texture_color(load_texture(lookup & TEXTURE_NUMBER), Footprint(uv, vec2f(0.0), vec2f(0.0)));
+        if i < material.lookups.y {
+            let lookup = load_lookup(material.lookups.x + i);
+            if (lookup.purposes & FOR_EMISSION) != 0u {
+                emission = texture_color(load_texture(lookup.texture), Footprint(uv, vec2f(0.0), vec2f(0.0)));
+            }
         }
     }
     return emission;
 }
 
-// The density that `sample_emitter` gives to what a ray has met, with the emitter's choice.
-fn emitter_pdf(spot: Spot, hit: Hit, material: Material, ray: Ray, normal: vec3f) -> f32 {
+// The density that `sample_emitter` gives to what a ray has met, with the emitter's choice, where samples have this density per area.
+fn emitter_pdf(spot: Spot, hit: Hit, density: f32, ray: Ray, normal: vec3f) -> f32 {
     if (EMITTER_KINDS & (1u << ELLIPSOID)) != 0u {
         if spot.primitive.kind == ELLIPSOID {
             let q = spot.primitive;
-            return material.density * ellipsoid_area(q) * ellipsoid_pdf(q, ray.origin, ray.direction);
+            return density * ellipsoid_area(q) * ellipsoid_pdf(q, ray.origin, ray.direction);
         }
     }
-    return solid_angle_pdf(material.density, ray.direction * hit.t, normal);
+    return solid_angle_pdf(density, ray.direction * hit.t, normal);
 }

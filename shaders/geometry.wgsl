@@ -55,7 +55,7 @@ fn surface_of(spot: Spot, hit: Hit, ray: Ray) -> Surface {
     }
     let q = spot.primitive;
     let surface = surface_at(q, hit.primitive, ray, hit.t, environment.shadow_epsilon);
-    if LOOKUPS + SPECULAR_LOOKUPS == 0u {
+    if LOOKUPS + SPECULAR_LOOKUPS + ANISOTROPIC == 0u {
         return surface;
     }
     return with_coordinates(surface, q);
@@ -85,10 +85,53 @@ fn footprint_of(spot: Spot, hit: Hit, surface: Surface, at: Arrival) -> Footprin
     return surface_footprint(spot.primitive, surface, at.x.position, at.y.position);
 }
 
+// The camera's ray through a point of the picture, and the middle of its lens.
+fn view_ray(place: vec2f) -> Ray {
+    if PANORAMIC != 0u {
+        return panorama_ray(camera, place);
+    }
+    return camera_ray(camera, place);
+}
+
+// A path from the camera, from behind the last surface that is hidden from it and before all others.
+fn seen_path(start: Path) -> Path {
+    var path = start;
+    for (var i = 0u; i < MOST_HIDDEN; i++) {
+        let hit = closest_hit(path.ray, path.left, path.wall);
+        if hit.primitive == NOTHING {
+            break;
+        }
+        let spot = spot_of(hit);
+        if material_of(spot).hidden == 0u {
+            break;
+        }
+        let surface = surface_of(spot, hit, path.ray);
+        path = passed_path(path, surface, arrival_of(spot, hit, surface, path.ray, path.differential));
+    }
+    return path;
+}
+
 // What the ray through a pixel's centre meets.
 fn pixel_first_hit(pixel: vec2u) -> FirstHit {
-    let ray = camera_ray(camera, vec2f(pixel) + 0.5);
-    let hit = closest_hit(ray, NOWHERE, NOWHERE);
+    let start = view_ray(vec2f(pixel) + 0.5);
+    var path = Path(start, Differential(), vec3f(1.0), 0u, 0u, NOWHERE, NOWHERE);
+    if HIDDEN != 0u {
+        path = seen_path(path);
+    }
+    var found = path_first_hit(path);
+    if (HIDDEN != 0u) & (found.shape != NOTHING) {
+        found.depth += dot(path.ray.origin - start.origin, start.direction);
+    }
+    return found;
+}
+
+// What a path meets first.
+fn path_first_hit(path: Path) -> FirstHit {
+    let ray = path.ray;
+    var hit = closest_hit(ray, path.left, path.wall);
+    if SEES_THROUGH != 0u {
+        hit = first_seen(ray, hit);
+    }
     if hit.primitive == NOTHING {
         let zero = vec3f(0.0);
         return FirstHit(zero, 0.0, zero.xy, NOTHING, NOTHING, zero, NOTHING, zero.xy, vec2u(0u));

@@ -20,3 +20,13 @@ fn segments_to_local(q: Primitive, to: Segments) -> Segments {
 fn segment(to: Segments, at: vec2f) -> vec3f {
     return to.towards + to.u * (2.0 * at.x - 1.0) + to.v * (2.0 * at.y - 1.0);
 }
+
+// How bright a spot is in the direction from which a point sees it, `to` being the vector from the point to the spot: the square of
+// a ramp that is linear in the cosine, as glTF's KHR_lights_punctual has it, 1 in the middle. 1 - cosine is computed from the
+// difference of two unit vectors, which loses nothing of small angles.
+fn spot_falloff(light: Light, to: vec3f) -> f32 {
+    let away = normalize(to) + light.normal;
+    let ramp = (light.cone - 0.5 * dot(away, away)) * light.falloff;
+    let bounded = min(max(ramp, 0.0), 1.0);
+    return bounded * bounded;
+}

@@ -75,3 +75,10 @@ fn refracted_path(path: Path, surface: Surface, at: Arrival, throughput: vec3f, 
     let differential = refracted_differential(at, d, surface.shading_normal, eta, cosine_t);
     return Path(ray, differential, throughput, path.depth + 1u, path.branch, surface.below, surface.above);
 }
+
+// The path behind a surface that it does not see.
+fn passed_path(path: Path, surface: Surface, at: Arrival) -> Path {
+    let below = surface.position - (surface.start - surface.position);
+    let ray = Ray(below, path.ray.direction);
+    return Path(ray, Differential(at.x, at.y), path.throughput, path.depth, path.branch, surface.below, surface.above);
+}

@@ -15,7 +15,21 @@ fn camera_sample(pixel: vec2u, sample: u32) -> CameraSample {
     let u = sample_square(PIXEL_PATTERN, PIXEL_SIDE, index, round, sample_key(pixel, camera.seed, 0u));
     let at = filtered(u);
     let place = vec2f(pixel) + at.xy;
-    return CameraSample(camera_ray(camera, place), differential_at(place), at.z);
+    var ray = view_ray(place);
+    if LENS != 0u {
+        ray = lens_ray(camera, place, lens_place(pixel, sample));
+    }
+    return CameraSample(ray, differential_at(place), at.z);
+}
+
+// Where on the lens a sample's ray starts: a decision of its own, and so a set over the pixel's samples.
+fn lens_place(pixel: vec2u, sample: u32) -> vec2f {
+    let key = hash4(vec4u(pixel.x, pixel.y, camera.seed, 0u)).zw;
+    var u = sobol_sample(sample, key);
+    if PIXEL_PATTERN == RANDOM {
+        u = random_sample(sample, 0u, key);
+    }
+    return lens_sample(camera.blades, u);
 }
 
 // What a pixel's samples show besides their sum, each a sum of weighted colours.
@@ -27,12 +41,16 @@ struct Layers {
     normal: vec4f,         // the shading normal, outwards
 }
 
-// How the camera's ray changes with its place in the picture.
+// How the camera's ray, that through the middle of its lens, changes with its place in the picture.
 fn differential_at(place: vec2f) -> Differential {
     if DIFFERENTIALS == 0u {
         return Differential();
     }
-    return camera_differential(camera, place, 1.0 / sqrt(f32(PIXEL_SAMPLES)));
+    let spacing = 1.0 / sqrt(f32(PIXEL_SAMPLES));
+    if PANORAMIC != 0u {
+        return panorama_differential(camera, place, spacing);
+    }
+    return camera_differential(camera, place, spacing);
 }
 
 // A uniform position as one that is distributed like the filter, from the pixel's corner, and its weight.

@@ -163,32 +163,66 @@ fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) ->
     return base + sum * select(0.0, 1.0 / total, total > 0.0);
 }
 
+// The value of a colour that gives a number.
+fn channel_of(color: vec3f, lookup: Lookup, place: u32) -> f32 {
+    let channel = (lookup.channels >> (2u * place)) & 3u;
+    return select(select(color.x, color.y, channel == 1u), color.z, channel == 2u);
+}
+
+// A principled material with what a colour gives of it alone.
+fn with_principled(before: Material, color: vec3f, lookup: Lookup) -> Material {
+    var m = before;
+    let purposes = lookup.purposes;
+    m.sheen = select(m.sheen, color, (purposes & FOR_SHEEN) != 0u);
+    m.metallic = select(m.metallic, channel_of(color, lookup, METALLIC_CHANNEL), (purposes & FOR_METALLIC) != 0u);
+    m.anisotropy = select(m.anisotropy, channel_of(color, lookup, ANISOTROPY_CHANNEL), (purposes & FOR_ANISOTROPY) != 0u);
+    m.specular_weight = select(m.specular_weight, channel_of(color, lookup, WEIGHT_CHANNEL), (purposes & FOR_WEIGHT) != 0u);
+    m.transmission = select(m.transmission, channel_of(color, lookup, TRANSMISSION_CHANNEL), (purposes & FOR_TRANSMISSION) != 0u);
+    m.clearcoat = select(m.clearcoat, channel_of(color, lookup, COAT_CHANNEL), (purposes & FOR_COAT) != 0u);
+    let coat_roughness = channel_of(color, lookup, COAT_ROUGHNESS_CHANNEL);
+    m.clearcoat_roughness = select(m.clearcoat_roughness, coat_roughness, (purposes & FOR_COAT_ROUGHNESS) != 0u);
+    let sheen_roughness = channel_of(color, lookup, SHEEN_ROUGHNESS_CHANNEL);
+    m.sheen_roughness = select(m.sheen_roughness, sheen_roughness, (purposes & FOR_SHEEN_ROUGHNESS) != 0u);
+    m.opacity = select(m.opacity, channel_of(color, lookup, OPACITY_CHANNEL), (purposes & FOR_OPACITY) != 0u);
+    return m;
+}
+
 // What a surface looks like: its material and its shading normal as its textures make them.
 struct Appearance {
     material: Material,
     normal: vec3f,
+    coat_normal: vec3f,    // of a clear coat
 }
 
 // `lookups` is how many the material has at most.
 fn appearance(spot: Spot, hit: Hit, material: Material, surface: Surface, at: Arrival, lookups: u32) -> Appearance {
-    var look = Appearance(material, surface.shading_normal);
+    var look = Appearance(material, surface.shading_normal, surface.shading_normal);
     if lookups == 0u {
         return look;
     }
     let footprint = footprint_of(spot, hit, surface, at);
     for (var i = 0u; i < lookups; i++) {
-        let lookup = material.lookups[i];
-        if lookup != 0u {
-            let t = load_texture(lookup & TEXTURE_NUMBER);
+        if i < material.lookups.y {
+            let lookup = load_lookup(material.lookups.x + i);
+            let t = load_texture(lookup.texture);
             let color = texture_color(t, footprint);
-            look.material.ambient = select(look.material.ambient, color, (lookup & FOR_AMBIENT) != 0u);
-            look.material.diffuse = select(look.material.diffuse, color, (lookup & FOR_DIFFUSE) != 0u);
-            look.material.specular = select(look.material.specular, color, (lookup & FOR_SPECULAR) != 0u);
-            look.material.tint = select(look.material.tint, color, (lookup & FOR_TINT) != 0u);
-            look.material.emission = select(look.material.emission, color, (lookup & FOR_EMISSION) != 0u);
-            look.material.roughness = select(look.material.roughness, color.x, (lookup & FOR_ROUGHNESS) != 0u);
+            let purposes = lookup.purposes;
+            look.material.ambient = select(look.material.ambient, color, (purposes & FOR_AMBIENT) != 0u);
+            look.material.diffuse = select(look.material.diffuse, color, (purposes & FOR_DIFFUSE) != 0u);
+            look.material.specular = select(look.material.specular, color, (purposes & FOR_SPECULAR) != 0u);
+            look.material.tint = select(look.material.tint, color, (purposes & FOR_TINT) != 0u);
+            look.material.emission = select(look.material.emission, color, (purposes & FOR_EMISSION) != 0u);
+            look.material.roughness = select(look.material.roughness, channel_of(color, lookup, ROUGHNESS_CHANNEL), (purposes & FOR_ROUGHNESS) != 0u);
+            if (MATERIALS & (1u << PRINCIPLED)) != 0u {
+                look.material = with_principled(look.material, color, lookup);
+                if (LOBES & LOBE_COAT) != 0u {
+                    if (purposes & FOR_COAT_NORMAL) != 0u {
+                        look.coat_normal = mapped_normal(surface, t, color);
+                    }
+                }
+            }
             if NORMAL_MAPS == 1u {
-                if (lookup & FOR_NORMAL) != 0u {
+                if (purposes & FOR_NORMAL) != 0u {
                     look.normal = mapped_normal(surface, t, color);
                 }
             }

@@ -41,6 +41,9 @@ const BEYOND: &[(&str, &str)] = &[
     ("textures.toml", "images and normal maps"),
     ("ground-grid.toml", "an image"),
     ("cornell-path.toml", "light from surface to surface"),
+    ("lens.toml", "the same, and a lens"),
+    ("panorama.toml", "the same, and another camera"),
+    ("materials.toml", "the same, and all its materials"),
 ];
 
 /// The scene, small, with grids of samples.

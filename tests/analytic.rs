@@ -62,6 +62,7 @@ fn floor(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shini
         shininess,
         normal_map: None,
         emission: None,
+        visible: None,
     };
     scene.materials.insert("m".into(), MaterialDescription::Phong(phong));
     scene.shapes.push(ShapeDescription::Plane(PlaneDescription {
@@ -139,6 +140,7 @@ fn light_of_a_rectangle_on_a_plane() {
             normal: -DVec3::Z,
             tangent: DVec3::X,
             color: DVec3::splat(0.9),
+            visible: true,
         }));
     let swapped = [size[1], size[0]];
     for way in both() {

@@ -13,13 +13,15 @@ use wgray::cpu::mesh::{Spot, face_primitive, shear_of};
 use wgray::cpu::path::Path;
 use wgray::cpu::phong::Lobes;
 use wgray::cpu::primitive::Tangents;
+use wgray::cpu::principled::{Mixture, principled_mixture};
 use wgray::cpu::ray::{Hit, Ray};
 use wgray::cpu::shadow::{Block, cone_to_light};
 use wgray::cpu::slab::{fan, slabs};
 use wgray::cpu::surface::Surface;
 use wgray::pack::tree::{Aabb, build};
 use wgray::pack::{
-    Camera, ELLIPSOID, FAR, Instance, KINDS, Light, Material, NOTHING, NOWHERE, Node, PAD, Primitive, Sphere, Texture,
+    Camera, ELLIPSOID, FAR, Instance, KINDS, LEAST_SHEEN, Light, LightNode, Material, NOTHING, NOWHERE, Node, PAD,
+    Primitive, SMALLEST_ALPHA, Sphere, Texture,
 };
 
 use crate::kernel::{Function, scalars};
@@ -345,6 +347,9 @@ impl Situation {
             primitive: NOTHING,
             color: color(random),
             number: random.below(4),
+            normal: vector(random).normalize().as_vec3(),
+            cone: random.pick(&[0.0, 2.0, 1.0, random.unit() * 2.0, random.magnitude(-9.0, 0.0)]) as f32,
+            falloff: random.magnitude(-0.3, 12.0) as f32,
             ..Light::zeroed()
         };
         let direction = target - start;
@@ -373,6 +378,7 @@ impl Situation {
         match type_name(module, ty).as_str() {
             "Primitive" => self.primitive.write(words),
             "Light" => self.light.write(words),
+            "LightNode" => self.light_node(random).write(words),
             "Ray" => self.ray(random).write(words),
             "Hit" => {
                 Hit {
@@ -405,6 +411,7 @@ impl Situation {
             "Sphere" => self.sphere(random).write(words),
             "Cone" => cone_to_light(&self.light, self.start.as_vec3()).write(words),
             "Material" => material(random).write(words),
+            "Mixture" => mixture(random).write(words),
             "Angles" => Angles {
                 wi: random.between(-0.2, 1.0) as f32,
                 wo: random.unit() as f32,
@@ -444,6 +451,7 @@ impl Situation {
                 let edge = vector(random).truncate() * random.magnitude(-3.0, 2.5);
                 edge.as_vec2().write(words);
             }
+            "vec2<f32>" if name == "alpha" => alpha(random).write(words),
             "vec2<f32>" => {
                 let size = random.pick(&[1.0, 1.0, 400.0]);
                 words.extend([(); 2].map(|()| ((random.unit() * size) as f32).to_bits()));
@@ -521,16 +529,41 @@ impl Situation {
         }
     }
 
+    /// About the target, or around the point that light is wanted at.
+    fn light_node(&self, random: &Random) -> LightNode {
+        let radius = self.direction.length() * random.pick(&[0.0, 0.01, 0.5, 1.0, 2.0]);
+        LightNode {
+            center: self.target.as_vec3(),
+            radius: radius as f32,
+            axis: random
+                .pick(&[vector(random).normalize(), -self.direction.normalize_or(DVec3::X)])
+                .as_vec3(),
+            cosine: random.pick(&[1.0, -1.0, random.between(-1.0, 1.0)]) as f32,
+            intensity: random.magnitude(-9.0, 0.0) as f32,
+            edge: random.pick(&[0.0, random.unit()]) as f32,
+            sides: 1 + random.below(2),
+            parent: random.pick(&[NOTHING, 0]),
+            children: random.pick(&[NOTHING, 1]),
+            density: random.magnitude(-9.0, 9.0) as f32,
+            instance: random.below(2),
+            index: random.below(4),
+        }
+    }
+
     fn camera(&self, random: &Random) -> Camera {
         Camera {
             position: self.start.as_vec3(),
-            projection: random.below(2),
+            projection: random.below(3),
             right: vector(random).as_vec3(),
             width: 1 + random.below(1000),
             up: vector(random).as_vec3(),
             height: 1 + random.below(1000),
             forward: self.direction.normalize_or(DVec3::X).as_vec3(),
             seed: random.bits() as u32,
+            lens_u: vector(random).as_vec3(),
+            blades: random.pick(&[0, 3, 5, 16]),
+            lens_v: vector(random).as_vec3(),
+            inverse_focus: random.pick(&[random.magnitude(-9.0, 9.0) as f32, random.unit() as f32, 0.0]),
         }
     }
 
@@ -542,7 +575,7 @@ impl Situation {
             "p" => random.pick(&[self.start, self.target]),
             "from_anchor" => self.local + self.primitive.middle.as_dvec3(),
             "to" | "direction" => self.direction,
-            "wi" | "wo" | "normal" => vector(random).normalize(),
+            "wi" | "wo" | "normal" | "coat_normal" | "half" | "w" | "m" => vector(random).normalize(),
             _ => vector(random) * random.magnitude(-2.0, 2.0),
         };
         v.as_vec3()
@@ -558,6 +591,8 @@ impl Situation {
             "start" => (self.local_start.length_squared() - 1.0) as f32,
             "reach" => random.pick(&[self.light.reach, 1.0 - 1e-5, 1e10, 1.0]),
             "cosine" | "cosine_i" | "cosine_t" | "random" | "line_width" | "on" => random.unit() as f32,
+            "alpha" => alpha(random).x,
+            "roughness" => random.between(f64::from(LEAST_SHEEN), 1.0) as f32,
             "eta" | "anisotropy" => random.magnitude(-1.0, 1.0) as f32,
             "epsilon" => random.pick(&[2e-6, 1e-4, 0.0]),
             _ => {
@@ -571,6 +606,13 @@ impl Situation {
             }
         }
     }
+}
+
+/// Of a rough surface.
+fn alpha(random: &Random) -> Vec2 {
+    let one = || random.pick(&[SMALLEST_ALPHA, 1.0, (random.unit() as f32).max(SMALLEST_ALPHA)]);
+    let x = one();
+    random.pick(&[Vec2::splat(x), Vec2::new(x, one())])
 }
 
 /// A vector that is not short.
@@ -676,15 +718,34 @@ fn material(random: &Random) -> Material {
     let exponent = random.pick(&[0, 1, 2, 16, 50, 4096]);
     let mut material: Material = bytemuck::Zeroable::zeroed();
     material.ambient = color(random);
-    material.kind = random.below(5);
-    material.roughness = random.unit() as f32;
+    material.kind = random.below(9);
+    material.roughness = random.pick(&[0.0, random.unit() as f32]);
     material.absorption = color(random);
     material.density = random.magnitude(-6.0, 3.0) as f32;
     material.diffuse = color(random);
     material.specular = color(random);
     material.tint = color(random);
     material.ior = random.magnitude(-1.0, 1.0) as f32;
+    if random.once_in(2) {
+        material.eta = color(random) * 4.0 + 0.01;
+        material.k = color(random) * 8.0;
+    }
+    material.rotation = random.between(-2.0, 2.0) as f32;
+    material.loss = random.pick(&[0.0, random.unit() as f32]);
     material.exponent = exponent;
+    for number in [
+        &mut material.metallic,
+        &mut material.transmission,
+        &mut material.specular_weight,
+        &mut material.clearcoat,
+        &mut material.clearcoat_roughness,
+        &mut material.sheen_roughness,
+        &mut material.anisotropy,
+    ] {
+        *number = random.pick(&[0.0, 1.0, random.unit() as f32]);
+    }
+    material.sheen = color(random);
+    material.thin = random.below(2);
     material.shininess = if random.once_in(2) {
         exponent as f32
     } else {
@@ -693,12 +754,31 @@ fn material(random: &Random) -> Material {
     material
 }
 
+/// A principled material as it is seen from somewhere.
+fn mixture(random: &Random) -> Mixture {
+    let material = Material {
+        ior: random.between(1.0, 3.0) as f32,
+        ..material(random)
+    };
+    let wo = vector(random).normalize().as_vec3();
+    let normal = random.pick(&[DVec3::Z, vector(random).normalize()]).as_vec3();
+    let outside = random.once_in(2);
+    principled_mixture(&material, wo.with_z(wo.z.abs()), outside, normal, random.below(32))
+}
+
 /// Whole numbers are small where they count something.
 fn whole(function: &str, name: &str, random: &Random) -> u32 {
     match name {
+        "lobes" => random.below(32),
         "kind" | "pattern" | "wrap" | "format" => random.below(8),
         "size" => 1 + random.pick(&[random.below(20), random.below(16_384)]),
         "level" => random.below(15),
+        "blades" | "corners" => random.pick(&[0, 3, 4, 5, 6, 16]),
+        // Of an image around the scene, both halves of it.
+        "width" => 1 + random.pick(&[random.below(4), random.below(16_384)]),
+        "height" => 5 + random.pick(&[random.below(4), random.below(16_380)]),
+        "row" => random.below(6),
+        "column" => random.pick(&[random.below(4), random.below(16_384)]),
         "bins" => 1 + random.below(512),
         "count" => 1 + random.below(256),
         "i" if function == "block_sample" => random.below(32),

@@ -5,8 +5,8 @@ use naga::proc::Layouter;
 use naga::{Expression, Literal, Module, TypeInner};
 use wgray::gpu::compose::{KERNELS, Source, built_in};
 use wgray::pack::{
-    Camera, Counts, Emitter, Environment, FirstHit, Instance, Item, Light, Material, Node, Primitive, Record,
-    Specialization, Sphere, Texture, Work,
+    Camera, Counts, Emitter, Environment, FirstHit, Instance, Item, Light, LightNode, Lookup, Material, Node,
+    Primitive, Record, Specialization, Sphere, Texture, Work,
 };
 
 use wgray::scene::Integrator;
@@ -55,9 +55,11 @@ fn records_have_the_same_layout() {
         size::<Primitive>(),
         size::<Sphere>(),
         size::<Material>(),
+        size::<Lookup>(),
         size::<Texture>(),
         size::<Light>(),
         size::<Emitter>(),
+        size::<LightNode>(),
         size::<Counts>(),
         size::<Node>(),
         size::<Item>(),

@@ -19,9 +19,18 @@ use wgray::cpu::disk::{disk_blocks, intersect_disk};
 use wgray::cpu::ellipsoid::{ellipsoid_blocks, ellipsoid_discriminant, ellipsoid_level, intersect_ellipsoid};
 use wgray::cpu::filter::{filter_bin, filter_offset};
 use wgray::cpu::footprint::{Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint};
-use wgray::cpu::light::{Segments, segment, segments_to_light, segments_to_local};
+use wgray::cpu::ggx::{
+    ggx_albedo, ggx_albedo_along, ggx_albedo_fit, ggx_d, ggx_g1, ggx_g2, ggx_length, ggx_pdf, ggx_sample,
+};
+use wgray::cpu::lens::{circle_point, lens_ray, lens_sample, polygon_sample};
+use wgray::cpu::light::{Segments, segment, segments_to_light, segments_to_local, spot_falloff};
 use wgray::cpu::light_sample::{
     ellipsoid_area, ellipsoid_cap, ellipsoid_pdf, ellipsoid_sample, power_heuristic, solid_angle_pdf, whole_below,
+};
+use wgray::cpu::light_tree::{first_share, light_importance, light_sibling};
+use wgray::cpu::lobe::{
+    LobeSample, facet_alpha, facet_eval, facet_loss, facet_pdf, facet_weight, half_vector, is_polished, lobe_frame,
+    plain_alpha, vector_from_lobe, vector_to_lobe,
 };
 use wgray::cpu::math::{
     atan2, cross, dot, exp2, floor, log2, max, min, normalize, positive_zero, power, power_whole, sine,
@@ -32,6 +41,7 @@ use wgray::cpu::mesh::{
     highest, lift, lowest, mesh_pad, normal_from_mesh, permuted, point_to_mesh, shear_of, sheared, spot_by_itself,
     triangle_crossing, turned_to, vector_from_mesh, vector_to_mesh,
 };
+use wgray::cpu::metal::{conductor_fresnel, metal_eval, metal_factor, metal_fresnel, metal_pdf, metal_sample};
 use wgray::cpu::modified_phong::{
     PhongFactors, modified_phong_eval, modified_phong_pdf, modified_phong_sample, phong_factors, phong_lobe,
 };
@@ -40,14 +50,21 @@ use wgray::cpu::node::{
     passed_bits, smaller, step_length, steps,
 };
 use wgray::cpu::normal_map::mapped_normal;
+use wgray::cpu::panorama::{panorama_angles, panorama_differential, panorama_ray};
 use wgray::cpu::path::{
-    Path, Scattered, glass_path, is_specular, is_usable, mirrored_path, reflected_path, refracted_path, usable_normal,
+    Path, Scattered, glass_path, is_specular, is_usable, mirrored_path, passed_path, reflected_path, refracted_path,
+    usable_normal,
 };
 use wgray::cpu::phong::{Lobes, is_lit, phong_block, phong_lobes, phong_power, unlit_samples};
 use wgray::cpu::plane::{intersect_plane, plane_blocks};
 use wgray::cpu::primitive::{
     Tangents, blocks, intersect, is_centered, is_round, local_tangents, primitive_gradient, primitive_normal,
     primitive_uv, uv_derivative,
+};
+use wgray::cpu::principled::{
+    Mixture, coat_eval, facets_eval, half_between, is_flat, luminance, mirrored_pdf, passed_eval, passes_straight,
+    principled_eval, principled_mixture, principled_pdf, principled_sample, refracting_density, refracting_half,
+    schlick, sheen_albedo, sheen_chance, sheen_lobe, to_frame_around,
 };
 use wgray::cpu::procedural::{
     along_edge, around_footprint, far_product, nearest_step, phase, procedural_share, sine_ratio, wave_integral,
@@ -59,6 +76,9 @@ use wgray::cpu::ray::{
 };
 use wgray::cpu::rectangle::{intersect_rectangle, rectangle_blocks};
 use wgray::cpu::rng::{hash4, unit_float};
+use wgray::cpu::rough_dielectric::{
+    dielectric_gain, refracting_normal, rough_dielectric_eval, rough_dielectric_pdf, rough_dielectric_sample,
+};
 use wgray::cpu::sampling::{
     decision_bits, grid_sample, jittered_sample, random_sample, rotated_grid_sample, sample_key, sample_square, wrap,
 };
@@ -69,11 +89,13 @@ use wgray::cpu::shadow::{Block, Cone, block_sample, cone_to_light, cuts, may_blo
 use wgray::cpu::slab::{Fan, Slabs, box_passage, fan, fan_passage, inverse_of, is_passed, slabs};
 use wgray::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
 use wgray::cpu::surface::{Surface, first_hit, largest, surface_at, with_coordinates, with_positive_zeros};
+use wgray::cpu::surroundings::{MapCell, cap_above, cell_towards, column_after, direction_in_cell};
 use wgray::cpu::texel::{gaussian_weight, level_size, near_coordinate, srgb_to_linear, unpacked_color, wrapped_index};
+use wgray::cpu::thin::{thin_eval, thin_pdf, thin_reflectance, thin_sample, turned_up};
 use wgray::cpu::triangle::{intersect_triangle, triangle_blocks};
 use wgray::cpu::warp::{cap_sample, disk_sample, frame_around, hemisphere_sample, triangle_sample, vector_around};
 use wgray::gpu::Device;
-use wgray::pack::{Camera, FirstHit, Instance, Light, Material, NOTHING, Node, Primitive, Sphere, Texture};
+use wgray::pack::{Camera, FirstHit, Instance, Light, LightNode, Material, NOTHING, Node, Primitive, Sphere, Texture};
 
 use crate::adapter::{self, allowed, judge};
 use crate::inputs::inputs;
@@ -189,6 +211,10 @@ probes! {
     primitive_uv(q: &Primitive, local: Vec3) -> Vec2;
     first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit;
     segments_to_light(light: &Light, p: Vec3) -> Segments;
+    spot_falloff(light: &Light, to: Vec3) -> f32;
+    light_importance(node: &LightNode, p: Vec3, n: Vec3) -> f32;
+    first_share(first: f32, second: f32) -> f32;
+    light_sibling(i: u32) -> u32;
     segments_to_local(q: &Primitive, to: Segments) -> Segments;
     segment(to: Segments, at: Vec2) -> Vec3;
     shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light, block: Block) -> u32;
@@ -206,6 +232,13 @@ probes! {
     camera_differential(camera: &Camera, at: Vec2, spacing: f32) -> Differential;
     camera_derivative(camera: &Camera, at: Vec2, step: Vec3) -> Derivative;
     image_plane_offset(camera: &Camera, at: Vec2) -> Vec3;
+    lens_ray(camera: &Camera, at: Vec2, p: Vec2) -> Ray;
+    lens_sample(blades: u32, u: Vec2) -> Vec2;
+    polygon_sample(corners: u32, u: Vec2) -> Vec2;
+    circle_point(angle: f32) -> Vec2;
+    panorama_ray(camera: &Camera, at: Vec2) -> Ray;
+    panorama_differential(camera: &Camera, at: Vec2, spacing: f32) -> Differential;
+    panorama_angles(camera: &Camera, at: Vec2) -> Vec2;
     transferred(derivative: Derivative, ray: Ray, t: f32, normal: Vec3) -> Derivative;
     normal_derivative(q: &Primitive, local: Vec3, dp: Vec3) -> Vec3;
     reflected_derivative(derivative: Derivative, d: Vec3, n: Vec3, dn: Vec3) -> Derivative;
@@ -217,6 +250,7 @@ probes! {
     refracted_direction(d: Vec3, n: Vec3, eta: f32, cosine_i: f32, cosine_t: f32) -> Vec3;
     refracted_cosine(cosine_i: f32, eta: f32) -> f32;
     fresnel(cosine_i: f32, cosine_t: f32, eta: f32) -> f32;
+    passed_path(path: Path, surface: Surface, at: Arrival) -> Path;
     mirrored_path(path: Path, surface: Surface, at: Arrival, material: &Material) -> Scattered;
     usable_normal(surface: Surface, normal: Vec3) -> Vec3;
     is_usable(surface: Surface, normal: Vec3) -> bool;
@@ -240,6 +274,61 @@ probes! {
     eta_of(surface: &Surface, material: &Material) -> f32;
     refracts_inwards(surface: &Surface, material: &Material, normal: Vec3) -> bool;
     dielectric_sample(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Passage;
+    principled_mixture(material: &Material, wo: Vec3, outside: bool, coat_normal: Vec3, lobes: u32) -> Mixture;
+    luminance(color: Vec3) -> f32;
+    sheen_chance(m: &Mixture) -> f32;
+    schlick(f0: Vec3, f90: f32, cosine: f32, eta: f32) -> Vec3;
+    passes_straight(m: &Mixture) -> bool;
+    is_flat(alpha: Vec2) -> bool;
+    facets_eval(alpha: Vec2, wo: Vec3, wi: Vec3, half: Vec3) -> f32;
+    half_between(wo: Vec3, wi: Vec3) -> Vec3;
+    refracting_half(wo: Vec3, wi: Vec3, eta: f32) -> Vec3;
+    refracting_density(wo: Vec3, wi: Vec3, half: Vec3, eta: f32) -> f32;
+    principled_eval(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> Vec3;
+    passed_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> Vec3;
+    coat_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> f32;
+    to_frame_around(n: Vec3, v: Vec3) -> Vec3;
+    principled_pdf(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> f32;
+    mirrored_pdf(alpha: Vec2, wo: Vec3, half: Vec3) -> f32;
+    principled_sample(m: &Mixture, wo: Vec3, u: Vec2, random: f32, lobes: u32) -> LobeSample;
+    sheen_lobe(alpha: f32, wo: Vec3, wi: Vec3) -> f32;
+    sheen_albedo(roughness: f32, cosine: f32) -> f32;
+    ggx_d(alpha: Vec2, m: Vec3) -> f32;
+    ggx_length(alpha: Vec2, w: Vec3) -> f32;
+    ggx_g1(alpha: Vec2, w: Vec3) -> f32;
+    ggx_g2(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32;
+    ggx_sample(alpha: Vec2, wo: Vec3, u: Vec2) -> Vec3;
+    ggx_pdf(alpha: Vec2, wo: Vec3, m: Vec3) -> f32;
+    ggx_albedo(alpha: f32, mu: f32) -> Vec2;
+    ggx_albedo_along(alpha: Vec2, w: Vec3) -> Vec2;
+    ggx_albedo_fit(alpha: f32, t: f32, l: f32) -> Vec2;
+    plain_alpha(material: &Material) -> Vec2;
+    is_polished(material: &Material) -> bool;
+    facet_alpha(material: &Material) -> Vec2;
+    lobe_frame(surface: &Surface, rotation: f32) -> Tangents;
+    vector_to_lobe(frame: Tangents, n: Vec3, w: Vec3) -> Vec3;
+    vector_from_lobe(frame: Tangents, n: Vec3, w: Vec3) -> Vec3;
+    half_vector(wo: Vec3, wi: Vec3) -> Vec3;
+    facet_eval(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32;
+    facet_pdf(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32;
+    facet_weight(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32;
+    facet_loss(alpha: Vec2, wo: Vec3) -> f32;
+    conductor_fresnel(eta: f32, k: f32, cosine: f32) -> f32;
+    metal_fresnel(material: &Material, cosine: f32) -> Vec3;
+    metal_factor(material: &Material, cosine: f32) -> Vec3;
+    metal_eval(material: &Material, wo: Vec3, wi: Vec3) -> Vec3;
+    metal_pdf(material: &Material, wo: Vec3, wi: Vec3) -> f32;
+    metal_sample(material: &Material, wo: Vec3, u: Vec2) -> LobeSample;
+    dielectric_gain(material: &Material) -> f32;
+    refracting_normal(material: &Material, wo: Vec3, wi: Vec3) -> Vec3;
+    rough_dielectric_eval(material: &Material, wo: Vec3, wi: Vec3) -> Vec3;
+    rough_dielectric_pdf(material: &Material, wo: Vec3, wi: Vec3) -> f32;
+    rough_dielectric_sample(material: &Material, wo: Vec3, u: Vec2, random: f32) -> LobeSample;
+    thin_reflectance(ior: f32, cosine: f32) -> f32;
+    turned_up(wi: Vec3) -> Vec3;
+    thin_eval(material: &Material, wo: Vec3, wi: Vec3) -> Vec3;
+    thin_pdf(material: &Material, wo: Vec3, wi: Vec3) -> f32;
+    thin_sample(material: &Material, wo: Vec3, u: Vec2, random: f32) -> LobeSample;
     solid_angle_pdf(density: f32, to: Vec3, normal: Vec3) -> f32;
     ellipsoid_area(q: &Primitive) -> f32;
     ellipsoid_cap(level: f32) -> f32;
@@ -247,6 +336,10 @@ probes! {
     ellipsoid_pdf(q: &Primitive, p: Vec3, wi: Vec3) -> f32;
     power_heuristic(own: f32, other: f32) -> f32;
     whole_below(bits: u32, count: u32) -> u32;
+    cell_towards(d: Vec3, width: u32, height: u32) -> MapCell;
+    column_after(column: u32, width: u32) -> u32;
+    cap_above(row: u32, height: u32) -> f32;
+    direction_in_cell(column: u32, row: u32, u: Vec2, width: u32, height: u32) -> Vec3;
     surface_footprint(q: &Primitive, surface: Surface, dx: Vec3, dy: Vec3) -> Footprint;
     uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2;
     texture_footprint(t: &Texture, f: Footprint) -> Footprint;
@@ -324,7 +417,7 @@ probes! {
 }
 
 /// Shared functions that are not probed, and why.
-const EXCEPTIONS: &[(&str, &str)] = &[("no_hit", "it has no arguments")];
+const EXCEPTIONS: &[(&str, &str)] = &[("no_hit", "it has no arguments"), ("nowhere", "it has no arguments")];
 
 /// The twin of a function.
 pub fn twin(name: &str) -> &'static Probe {

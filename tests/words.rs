@@ -6,16 +6,21 @@ use wgray::cpu::differential::{Arrival, Derivative, Differential};
 use wgray::cpu::diffuse::Angles;
 use wgray::cpu::footprint::{Ellipse, Footprint};
 use wgray::cpu::light::Segments;
+use wgray::cpu::lobe::LobeSample;
 use wgray::cpu::mesh::{Crossing, Shear, Spot};
 use wgray::cpu::modified_phong::PhongFactors;
 use wgray::cpu::path::{Path, Scattered};
 use wgray::cpu::phong::Lobes;
 use wgray::cpu::primitive::Tangents;
+use wgray::cpu::principled::Mixture;
 use wgray::cpu::ray::{Hit, Ray};
 use wgray::cpu::shadow::{Block, Cone};
 use wgray::cpu::slab::{Fan, Slabs};
 use wgray::cpu::surface::Surface;
-use wgray::pack::{Camera, Environment, FirstHit, Instance, Light, Material, Node, Primitive, Sphere, Texture};
+use wgray::cpu::surroundings::MapCell;
+use wgray::pack::{
+    Camera, Environment, FirstHit, Instance, Light, LightNode, Material, Node, Primitive, Sphere, Texture,
+};
 
 pub trait Words: Sized {
     /// Takes its words from the front.
@@ -69,6 +74,7 @@ pod![
     Primitive,
     Material,
     Light,
+    LightNode,
     FirstHit,
     Sphere,
     Texture,
@@ -100,11 +106,17 @@ records! {
     Arrival { x, y, normal_x, normal_y }
     Footprint { uv, dx, dy }
     Ellipse { m, major, minor }
+    MapCell { column, row, x, y }
     Tangents { u, v }
     Path { ray, differential, throughput, depth, branch, left, wall }
     Scattered { onward, other, splits }
     Passage { path, passes, eta }
     Angles { wi, wo, between }
+    LobeSample { wi, weight, pdf, eta }
+    Mixture {
+        diffuse, alpha, f0, f90, gain, passed, inner_f0, inner_f90, eta, thin, coat, coat_alpha, coat_normal, sheen,
+        sheen_alpha, chances,
+    }
     PhongFactors { diffuse, specular, diffuse_share }
     Segments { towards, u, v }
     Lobes { diffuse, specular }
@@ -148,7 +160,9 @@ by_reference![
     Environment,
     Primitive,
     Material,
+    Mixture,
     Light,
+    LightNode,
     Sphere,
     Surface,
     Cone,

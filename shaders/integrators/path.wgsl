@@ -14,13 +14,21 @@ struct PathState {
     ended: bool,
     layers: Layers,        // of the sample, where layers are wanted
     described: bool,       // whether they have the albedo
+    start: vec3f,          // where the path was last scattered, if a tree chooses lights
+    start_normal: vec3f,   // the normal there, or 0 where light may come from both sides
+    way: f32,              // from the last bounce to the ray's start, past surfaces that are not there
+    passed: u32,           // how many of these there were
 }
 
 // The sample's path at the camera.
 fn begin_path(pixel: vec2u, sample: u32) -> PathState {
     let start = camera_sample(pixel, sample);
-    let path = Path(start.ray, start.differential, vec3f(1.0), 0u, 0u, NOWHERE, NOWHERE);
-    return PathState(path, vec3f(0.0), 0.0, 1.0, vec3f(0.0), sample, start.weight, false, Layers(), false);
+    var path = Path(start.ray, start.differential, vec3f(1.0), 0u, 0u, NOWHERE, NOWHERE);
+    if HIDDEN != 0u {
+        path = seen_path(path);
+    }
+    return PathState(path, vec3f(0.0), 0.0, 1.0, vec3f(0.0), sample, start.weight, false, Layers(), false,
+                     vec3f(0.0), vec3f(0.0), 0.0, 0u);
 }
 
 // The path after one more surface. What comes of a path that ends here is computed and not taken, where that is short: software
@@ -30,8 +38,14 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     let path = before.path;
     let hit = closest_hit(path.ray, path.left, path.wall);
     let met = hit.primitive != NOTHING;
-    let shown = (ALPHA == 0u) | (path.depth > 0u);
-    state = with_radiance(state, path.throughput * environment.radiance, !met & shown, path.depth);
+    let shown = ((ALPHA == 0u) & ((SURROUNDINGS & UNSEEN_AROUND) == 0u)) | (path.depth > 0u);
+    var arriving = environment.radiance;
+    if (SURROUNDINGS & IMAGE_AROUND) != 0u {
+        if !met {
+            arriving = light_from_afar(path.ray.direction, state.pdf);
+        }
+    }
+    state = with_radiance(state, path.throughput * arriving, !met & shown, path.depth);
     if (IN_TREE != 0u) | (LOOKUPS != 0u) {
         if !met {
             state.ended = true;
@@ -42,16 +56,32 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     var surface = surface_of(spot, hit, path.ray);
     let at = arrival_of(spot, hit, surface, path.ray, path.differential);
     let look = appearance(spot, hit, material_of(spot), surface, at, LOOKUPS);
-    let material = bounded(look.material);
+    var material = bounded(look.material);
     if ABSORPTION != 0u {
-        let inside = (material.kind == GLASS) & (surface.side < 0.0);
+        // What may not be there says nothing of what is behind it.
+        let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
         let absorption = select(state.absorption, material.absorption, inside);
         state.path.throughput *= transmittance(absorption, hit.t);
+    }
+    if SEES_THROUGH != 0u {
+        if met & !is_there(material, pixel, state.sample, path.depth, ONWARD, hit, surface.side) {
+            return past(state, surface, at, hit.t);
+        }
     }
     if SHINES != 0u {
         state = with_emission(state, spot, hit, surface, material, met);
     }
     surface.shading_normal = shaded_normal(surface, material, look.normal);
+    state.way = 0.0;
+    var mixture = Mixture();
+    if (MATERIALS & (1u << PRINCIPLED)) != 0u {
+        if material.kind == PRINCIPLED {
+            let frame = facet_frame(surface, material);
+            surface.du = frame.u;
+            surface.dv = frame.v;
+            mixture = mixture_at(surface, material, look.coat_normal);
+        }
+    }
     if LAYERS != 0u {
         if met {
             state = described(state, surface, material);
@@ -65,8 +95,8 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
         choices = decision_set(other_key.zw, state.sample);
     }
     var specular = false;
-    if (MATERIALS & SPECULAR_KINDS) != 0u {
-        specular = is_specular(material);
+    if DELTA_KINDS != 0u {
+        specular = is_delta(material);
         if specular {
             state = scattered_specularly(state, surface, at, material, unit_float(choices.x));
         }
@@ -76,16 +106,28 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
             if (IN_TREE & (1u << INSTANCE)) != 0u {
                 surface.start += surface.bulge;
             }
+            if (MATERIALS & FACET_KINDS) != 0u {
+                if has_facets(material) {
+                    let frame = facet_frame(surface, material);
+                    surface.du = frame.u;
+                    surface.dv = frame.v;
+                    material = facets_of(surface, material);
+                }
+            }
             if EMITTERS != 0u {
                 var bits = vec2u(0u);
                 if EMITTERS > 1u {
                     bits = decision_set(other_key.xy, state.sample);
                 }
-                let emitter = chosen_emitter(bits);
+                var chosen = Chosen(chosen_emitter(bits), 0.0);
+                if LIGHT_TREE != 0u {
+                    let normal = lit_normal(surface, material);
+                    chosen = chosen_light(chosen.emitter, surface.start, normal, other_key.xy, state.sample);
+                }
                 let u = decision(key.xy, state.sample);
-                state = with_light(state, spot, surface, material, emitter, u, goes_on);
+                state = with_light(state, spot, surface, material, mixture, chosen, u, goes_on, pixel);
             }
-            state = scattered(state, spot, surface, material, decision(key.zw, state.sample), unit_float(choices.x));
+            state = scattered(state, spot, surface, material, mixture, decision(key.zw, state.sample), unit_float(choices.x));
         }
     }
     if RR_DEPTH < BOUNCES {
@@ -144,31 +186,36 @@ fn with_radiance(before: PathState, found: vec3f, taken: bool, bounces: u32) -> 
 fn with_emission(state: PathState, spot: Spot, hit: Hit, surface: Surface, material: Material, met: bool) -> PathState {
     let one_sided = material.kind == EMITTER;
     let shines = (material.density > 0.0) & (!one_sided | (surface.side > 0.0));
-    let weighed = power_heuristic(state.pdf, emitter_pdf(spot, hit, material, state.path.ray, surface.normal));
-    let weight = select(1.0, weighed, (state.pdf > 0.0) & (EMITTERS != 0u));
+    var ray = state.path.ray;
+    var seen = hit;
+    if SEES_THROUGH != 0u {
+        ray.origin -= ray.direction * state.way;
+        seen.t += state.way;
+    }
+    var weighs = (state.pdf > 0.0) & (EMITTERS != 0u);
+    var density = material.density;
+    if LIGHT_TREE != 0u {
+        density = met_density(hit, met & shines & weighs, state.start, state.start_normal);
+        weighs &= density > 0.0;
+    }
+    let weighed = power_heuristic(state.pdf, emitter_pdf(spot, seen, density, ray, surface.normal));
+    let weight = select(1.0, weighed, weighs);
     return with_radiance(state, state.path.throughput * material.emission * weight, met & shines, state.path.depth);
 }
 
-// The normal that light is reflected by: what a normal map makes of it, if that can be.
-fn shaded_normal(surface: Surface, material: Material, normal: vec3f) -> vec3f {
-    if is_specular(material) {
-        let usable = usable_normal(surface, normal);
-        return select(usable, surface.normal, (material.kind == GLASS) & !refracts_inwards(surface, material, usable));
+// The path beyond a surface that is not there for it.
+fn past(before: PathState, surface: Surface, at: Arrival, t: f32) -> PathState {
+    var state = before;
+    state.path = passed_path(before.path, surface, at);
+    if HIDDEN != 0u {
+        if before.path.depth == 0u {
+            state.path = seen_path(state.path);
+        }
     }
-    return normal;
-}
-
-// A material as its textures make it, none of which makes more light than there is.
-fn bounded(found: Material) -> Material {
-    var material = found;
-    if LOOKUPS != 0u {
-        let one = vec3f(1.0);
-        let above = (found.diffuse > one) & vec3<bool>(found.kind == DIFFUSE);
-        material.diffuse = select(found.diffuse, one, above);
-        material.tint = select(found.tint, one, found.tint > one);
-        material.roughness = min(found.roughness, 1.0);
-    }
-    return material;
+    state.way += t;
+    state.passed += 1u;
+    state.ended |= state.passed > MOST_PASSED;
+    return state;
 }
 
 // What layers tell of the first surface, and of the first that neither mirrors nor refracts.
@@ -178,20 +225,11 @@ fn described(before: PathState, surface: Surface, material: Material) -> PathSta
         state.layers.emission.w = 1.0;
         state.layers.normal = vec4f(surface.shading_normal * surface.side, 0.0);
     }
-    if !state.described & !is_specular(material) {
+    if !state.described & !is_delta(material) {
         state.layers.albedo = vec4f(state.path.throughput * albedo(material), 0.0);
         state.described = true;
     }
     return state;
-}
-
-// The share of light that a surface reflects, about.
-fn albedo(material: Material) -> vec3f {
-    if material.kind == PHONG {
-        let factors = phong_factors(material);
-        return factors.diffuse + factors.specular;
-    }
-    return select(vec3f(0.0), material.diffuse, material.kind == DIFFUSE);
 }
 
 // The path mirrored or refracted.
@@ -199,8 +237,22 @@ fn scattered_specularly(before: PathState, surface: Surface, at: Arrival, materi
     var state = before;
     state.pdf = 0.0;
     var path = mirrored_path(before.path, surface, at, material).onward;
-    if (MATERIALS & (1u << GLASS)) != 0u {
-        if material.kind == GLASS {
+    if (DELTA_KINDS & (1u << METAL)) != 0u {
+        if material.kind == METAL {
+            path.throughput = before.path.throughput * metal_fresnel(material, dot(surface.wo, surface.shading_normal));
+        }
+    }
+    if (DELTA_KINDS & (1u << THIN)) != 0u {
+        if material.kind == THIN {
+            let cosine = dot(surface.wo, surface.shading_normal);
+            path.throughput = before.path.throughput;
+            if random >= thin_reflectance(material.ior, cosine) {
+                path = refracted_path(before.path, surface, at, before.path.throughput * material.tint, 1.0, cosine, cosine);
+            }
+        }
+    }
+    if (DELTA_KINDS & ((1u << GLASS) | (1u << ROUGH_GLASS))) != 0u {
+        if (material.kind == GLASS) | (material.kind == ROUGH_GLASS) {
             let passage = dielectric_sample(before.path, surface, at, material, random);
             path = passage.path;
             state.eta2 = before.eta2 * passage.eta * passage.eta;
@@ -215,54 +267,40 @@ fn scattered_specularly(before: PathState, surface: Surface, at: Arrival, materi
     return state;
 }
 
-// How a surface reflects light from a direction, and how densely `sampled_direction` gives that.
-struct Reflection {
-    value: vec3f,          // the BRDF times the cosine of wi; 0 where no light passes
-    pdf: f32,              // per solid angle
-}
-
-fn reflection(spot: Spot, surface: Surface, material: Material, wi: vec3f) -> Reflection {
-    let angles = angles_at(surface.shading_normal, surface.wo, wi);
-    var result = Reflection(vec3f(0.0), 0.0);
-    if (MATERIALS & (1u << DIFFUSE)) != 0u {
-        result = Reflection(diffuse_eval(material, angles), diffuse_pdf(angles));
-        if ROUGH != 0u {
-            if material.roughness > 0.0 {
-                result.value = rough_diffuse_eval(material, angles);
-            }
-        }
-    }
-    if (MATERIALS & (1u << PHONG)) != 0u {
-        if material.kind == PHONG {
-            result = Reflection(modified_phong_eval(material, angles), modified_phong_pdf(material, angles));
-        }
-    }
-    var lit = is_lit(surface, wi);
-    if (IN_TREE & (1u << INSTANCE)) != 0u {
-        lit &= face_lets_pass(spot, surface, wi);
-    }
-    result.value = select(vec3f(0.0), result.value, lit);
-    return result;
-}
-
-// With the light of one sample of `emitter`, if that is `wanted`.
-fn with_light(state: PathState, spot: Spot, surface: Surface, material: Material, emitter: Emitter, u: vec2f,
-              wanted: bool) -> PathState {
-    let light = sample_emitter(emitter, surface.start, u);
-    let reflected = reflection(spot, surface, material, normalize(light.to));
+// With the light of one sample of what was chosen, if that is `wanted`.
+fn with_light(state: PathState, spot: Spot, surface: Surface, material: Material, mixture: Mixture, chosen: Chosen, u: vec2f,
+              wanted: bool, pixel: vec2u) -> PathState {
+    let light = sample_emitter(chosen, surface.start, u);
+    let reflected = reflection(spot, surface, material, mixture, normalize(light.to));
     var found = state.path.throughput * reflected.value * light.radiance * (1.0 / light.pdf);
+    var from_side = surface;
+    var to = light.to;
+    var absorption = state.absorption;
+    if ((MATERIALS & PASSING_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
+        if lets_through(material) & (dot(surface.normal, to) < 0.0) {
+            from_side = turned_over(surface);
+            to = light.to + select(vec3f(0.0), surface.start - from_side.start, light.reach < 2.0);
+            absorption = absorption_behind(absorption, surface, material);
+        }
+    }
     if ABSORPTION != 0u {
-        found *= transmittance(state.absorption, light.reach * sqrt(dot(light.to, light.to)));
+        found *= transmittance(absorption, light.reach * sqrt(dot(light.to, light.to)));
     }
     found *= select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta);
     let most = largest(found);
     let dark = !wanted | !(most > 0.0) | !(most < FAR);
-    let hidden = is_hidden(dark, surface, light.to, light.reach, light.primitive);
+    if SEES_THROUGH != 0u {
+        let bounce = state.path.depth + 1u;
+        let veiled = is_veiled(dark, from_side, to, light.reach, light.primitive, pixel, state.sample, bounce);
+        return with_radiance(state, found, !veiled, bounce);
+    }
+    let hidden = is_hidden(dark, from_side, to, light.reach, light.primitive);
     return with_radiance(state, found, !hidden, state.path.depth + 1u);
 }
 
 // The path in a direction that is chosen by how the surface reflects.
-fn scattered(before: PathState, spot: Spot, surface: Surface, material: Material, u: vec2f, random: f32) -> PathState {
+fn scattered(before: PathState, spot: Spot, surface: Surface, material: Material, mixture: Mixture, u: vec2f,
+             random: f32) -> PathState {
     var state = before;
     var wi = diffuse_sample(surface.shading_normal, u);
     if (MATERIALS & (1u << PHONG)) != 0u {
@@ -270,11 +308,47 @@ fn scattered(before: PathState, spot: Spot, surface: Surface, material: Material
             wi = modified_phong_sample(material, surface.shading_normal, surface.wo, u, random);
         }
     }
-    let reflected = reflection(spot, surface, material, wi);
+    let reflected = reflection(spot, surface, material, mixture, wi);
     let factor = reflected.value * select(0.0, 1.0 / reflected.pdf, reflected.pdf > 0.0);
     let throughput = before.path.throughput * factor;
     state.path = Path(Ray(surface.start, wi), Differential(), throughput, before.path.depth + 1u, 0u, surface.above, surface.below);
     state.pdf = reflected.pdf;
+    if (MATERIALS & FACET_KINDS) != 0u {
+        if has_facets(material) {
+            let wo = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, surface.wo);
+            state = scattered_by_lobe(before, spot, surface, material, facet_sample(material, wo, u, random));
+        }
+    }
+    if (MATERIALS & (1u << PRINCIPLED)) != 0u {
+        if material.kind == PRINCIPLED {
+            let found = principled_sample(mixture, local_wo(surface), u, random, LOBES);
+            state = scattered_by_lobe(before, spot, surface, material, found);
+        }
+    }
+    if LIGHT_TREE != 0u {
+        state.start = surface.start;
+        state.start_normal = lit_normal(surface, material);
+    }
+    return state;
+}
+
+// The same, by a lobe in the frame of the surface, perhaps through it.
+fn scattered_by_lobe(before: PathState, spot: Spot, surface: Surface, material: Material, found: LobeSample) -> PathState {
+    var state = before;
+    let frame = Tangents(surface.du, surface.dv);
+    let wi = normalize(vector_from_lobe(frame, surface.shading_normal, found.wi));
+    let weight = select(vec3f(0.0), found.weight, lets_light(spot, surface, material, wi));
+    var from_side = surface;
+    if ((MATERIALS & PASSING_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
+        if found.wi.z < 0.0 {
+            from_side = turned_over(surface);
+            state.eta2 = before.eta2 * found.eta * found.eta;
+            state.absorption = absorption_behind(before.absorption, surface, material);
+        }
+    }
+    state.path = Path(Ray(from_side.start, wi), Differential(), before.path.throughput * weight, before.path.depth + 1u, 0u,
+                      from_side.above, from_side.below);
+    state.pdf = found.pdf;
     return state;
 }
 

@@ -5,8 +5,11 @@
 // BOUNCES bounces is cut off: there it sees the background.
 fn radiance(ray: Ray, differential: Differential, pixel: vec2u, sample: u32) -> vec3f {
     var path = Path(ray, differential, vec3f(1.0), 0u, 0u, NOWHERE, NOWHERE);
+    if HIDDEN != 0u {
+        path = seen_path(path);
+    }
     if BOUNCES == 0u {
-        let hit = closest_hit(path.ray, NOWHERE, NOWHERE);
+        let hit = closest_hit(path.ray, path.left, path.wall);
         if hit.primitive == NOTHING {
             return environment.background;
         }
@@ -90,7 +93,12 @@ fn radiance_from(spot: Spot, hit: Hit, path: Path, pixel: vec2u, sample: u32) ->
     }
     if (LIGHTS & 2u) != 0u {
         for (var i = lights.x; i < lights.y; i++) {
-            let light = load_light(i);
+            var light = load_light(i);
+            if (LIGHTS & 4u) != 0u {
+                if light.kind == SPOT {
+                    light.color *= spot_falloff(light, light.center - surface.position);
+                }
+            }
             let lobes = lobes_of_light(spot, surface, material, light, GRID, 1u, 1u, pixel, sample);
             sum += phong_radiance(material, light, lobes, 1.0);
         }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 #[cfg(feature = "gpu")]
 use wgray::gpu::{Forms, check_kernels, compose::Shaders};
 use wgray::pack::pack;
-use wgray::scene::{CameraPath, Define, Overrides, Scene, SceneError};
+use wgray::scene::{CameraPath, Define, Overrides, Projection, Scene, SceneError};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = super::EXIT_CODES)]
@@ -91,8 +91,17 @@ fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &S
             bytes as f64 / f64::from(1 << 20),
         ),
     };
+    let camera = match (scene.camera.projection, scene.camera.lens) {
+        (Projection::Panorama, _) => "; a panorama".to_owned(),
+        (_, Some(lens)) => format!(
+            "; a lens {} wide, sharp at {}",
+            short(2.0 * lens.radius),
+            short(lens.focus)
+        ),
+        _ => String::new(),
+    };
     Ok(format!(
-        "good; {} x {} pixels, {} samples each, {} of light; shapes: {} of {} primitives{meshes}; lights: {}{frames}",
+        "good; {} x {} pixels, {} samples each, {} of light{camera}; shapes: {} of {} primitives{meshes}; lights: {}{frames}",
         scene.width,
         scene.height,
         packed.pixel_samples,
@@ -113,4 +122,9 @@ fn check_path(scene: &Scene) -> Result<String, SceneError> {
         scene.camera_at(first.ceil() + f64::from(i))?;
     }
     Ok(format!("; the camera moves from frame {first} to {last}"))
+}
+
+/// A length with four digits.
+fn short(x: f64) -> f64 {
+    format!("{x:.3e}").parse().unwrap_or(x)
 }

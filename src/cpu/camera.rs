@@ -51,6 +51,7 @@ pub fn image_plane_offset(camera: &Camera, at: Vec2) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
+    use bytemuck::Zeroable;
     use glam::Vec3;
 
     use super::*;
@@ -66,7 +67,7 @@ mod tests {
             up: Vec3::Z,
             height: 4,
             forward: Vec3::Y,
-            seed: 0,
+            ..Camera::zeroed()
         }
     }
 

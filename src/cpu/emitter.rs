@@ -2,8 +2,12 @@
 
 use glam::{UVec2, Vec2, Vec3};
 
+use super::alpha::presence_at;
+use super::environment::sample_environment;
 use super::footprint::Footprint;
 use super::geometry::{material_of, spot_of};
+use super::light::spot_falloff;
+use super::light_choice::Chosen;
 use super::light_sample::{ellipsoid_area, ellipsoid_pdf, ellipsoid_sample, solid_angle_pdf, whole_below};
 use super::math::{dot, normalize};
 use super::mesh::{Spot, face_uv};
@@ -13,7 +17,7 @@ use super::rng::unit_float;
 use super::texture::texture_color;
 use super::warp::{disk_sample, triangle_sample};
 use crate::pack::{
-    DISK, ELLIPSOID, Emitter, FOR_EMISSION, Light, Material, NOTHING, POINT, Packed, RECTANGLE, TEXTURE_NUMBER,
+    DISK, ELLIPSOID, ENVIRONMENT, Emitter, FOR_EMISSION, Light, Material, NOTHING, POINT, Packed, RECTANGLE, SPOT,
     TRIANGLE,
 };
 
@@ -40,11 +44,20 @@ pub fn chosen_emitter(scene: &Packed, bits: UVec2) -> Emitter {
     }
 }
 
-pub fn sample_emitter(scene: &Packed, emitter: Emitter, p: Vec3, u: Vec2) -> LightSample {
+pub fn sample_emitter(scene: &Packed, chosen: Chosen, p: Vec3, u: Vec2) -> LightSample {
+    let emitter = chosen.emitter;
     if emitter.instance != 0 {
-        return sample_face(scene, emitter, p, u);
+        return sample_face(scene, chosen, p, u);
     }
-    sample_light(scene, &scene.lights[emitter.index as usize], p, u)
+    let light = &scene.lights[emitter.index as usize];
+    if light.kind == ENVIRONMENT {
+        return sample_environment(scene, light, u);
+    }
+    if chosen.density > 0.0 {
+        let density = chosen.density;
+        return sample_light(scene, &Light { density, ..*light }, p, u);
+    }
+    sample_light(scene, light, p, u)
 }
 
 pub fn sample_light(scene: &Packed, light: &Light, p: Vec3, u: Vec2) -> LightSample {
@@ -62,6 +75,9 @@ pub fn sample_light(scene: &Packed, light: &Light, p: Vec3, u: Vec2) -> LightSam
     if light.kind == POINT {
         radiance = light.color / dot(to, to);
     }
+    if light.kind == SPOT {
+        radiance = light.color * (spot_falloff(light, to) / dot(to, to));
+    }
     if light.kind == ELLIPSOID {
         let q = &scene.primitives[light.primitive as usize];
         to = ellipsoid_sample(q, p, u);
@@ -75,6 +91,11 @@ pub fn sample_light(scene: &Packed, light: &Light, p: Vec3, u: Vec2) -> LightSam
         let uv = primitive_uv(q, point_to_local(q, p + to));
         radiance = emission_at(scene, &scene.materials[q.material as usize], uv);
     }
+    if scene.specialization.sees_through != 0 && !is_delta {
+        let q = &scene.primitives[light.primitive as usize];
+        let uv = primitive_uv(q, point_to_local(q, p + to));
+        radiance *= presence_at(scene, &scene.materials[q.material as usize], uv);
+    }
     LightSample {
         to,
         radiance: if behind { Vec3::ZERO } else { radiance },
@@ -85,7 +106,8 @@ pub fn sample_light(scene: &Packed, light: &Light, p: Vec3, u: Vec2) -> LightSam
     }
 }
 
-pub fn sample_face(scene: &Packed, emitter: Emitter, p: Vec3, u: Vec2) -> LightSample {
+pub fn sample_face(scene: &Packed, chosen: Chosen, p: Vec3, u: Vec2) -> LightSample {
+    let emitter = chosen.emitter;
     let b = triangle_sample(u);
     let hit = Hit {
         t: 0.0,
@@ -101,10 +123,18 @@ pub fn sample_face(scene: &Packed, emitter: Emitter, p: Vec3, u: Vec2) -> LightS
     if scene.specialization.emission_textures != 0 {
         radiance = emission_at(scene, material, face_uv(&face, b));
     }
+    if scene.specialization.sees_through != 0 {
+        radiance *= presence_at(scene, material, face_uv(&face, b));
+    }
+    let density = if scene.specialization.light_tree != 0 {
+        chosen.density
+    } else {
+        material.density
+    };
     LightSample {
         to,
         radiance,
-        pdf: solid_angle_pdf(material.density, to, face.primitive.z),
+        pdf: solid_angle_pdf(density, to, face.primitive.z),
         is_delta: false,
         reach: scene.environment.reach,
         primitive: NOTHING,
@@ -113,9 +143,10 @@ pub fn sample_face(scene: &Packed, emitter: Emitter, p: Vec3, u: Vec2) -> LightS
 
 pub fn emission_at(scene: &Packed, material: &Material, uv: Vec2) -> Vec3 {
     let mut emission = material.emission;
-    for lookup in material.lookups.to_array() {
-        if lookup & FOR_EMISSION != 0 {
-            let texture = &scene.textures[(lookup & TEXTURE_NUMBER) as usize];
+    for i in 0..material.lookups.y {
+        let lookup = &scene.lookups[(material.lookups.x + i) as usize];
+        if lookup.purposes & FOR_EMISSION != 0 {
+            let texture = &scene.textures[lookup.texture as usize];
             let footprint = Footprint {
                 uv,
                 dx: Vec2::ZERO,
@@ -127,10 +158,10 @@ pub fn emission_at(scene: &Packed, material: &Material, uv: Vec2) -> Vec3 {
     emission
 }
 
-pub fn emitter_pdf(spot: &Spot, hit: Hit, material: &Material, ray: Ray, normal: Vec3) -> f32 {
+pub fn emitter_pdf(spot: &Spot, hit: Hit, density: f32, ray: Ray, normal: Vec3) -> f32 {
     let q = &spot.primitive;
     if q.kind == ELLIPSOID {
-        return material.density * ellipsoid_area(q) * ellipsoid_pdf(q, ray.origin, ray.direction);
+        return density * ellipsoid_area(q) * ellipsoid_pdf(q, ray.origin, ray.direction);
     }
-    solid_angle_pdf(material.density, ray.direction * hit.t, normal)
+    solid_angle_pdf(density, ray.direction * hit.t, normal)
 }

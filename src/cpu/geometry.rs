@@ -3,20 +3,26 @@
 use bytemuck::Zeroable;
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4Swizzles as _};
 
+use super::alpha::first_seen;
 use super::camera::camera_ray;
 use super::differential::{Arrival, Differential, arrival};
 use super::footprint::{Footprint, surface_footprint};
+use super::math::dot;
 use super::mesh::{
     Spot, face_arrival, face_first_hit, face_footprint, face_primitive, face_surface, normal_from_mesh, spot_by_itself,
     vector_from_mesh,
 };
+use super::panorama::panorama_ray;
+use super::path::{Path, passed_path};
 use super::primitive::Tangents;
 use super::ray::{Hit, Ray, by_itself};
 use super::shadow::Block;
 use super::surface::{Surface, first_hit, surface_at, with_coordinates};
 use super::traverse::{closest_primitive, hidden_by_primitives, is_hidden_by_primitives};
 use super::tree::{closest_in_tree, hidden_by_tree, is_hidden_by_tree};
-use crate::pack::{FirstHit, Instance, Light, Material, NO_SHADOW, NOTHING, NOWHERE, Packed, SOME_SHADOWS};
+use crate::pack::{
+    FirstHit, Instance, Light, MOST_HIDDEN, Material, NO_SHADOW, NOTHING, NOWHERE, Packed, SOME_SHADOWS,
+};
 
 pub fn closest_hit(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
     if scene.specialization.in_tree == 0 {
@@ -124,7 +130,7 @@ pub fn surface_of(scene: &Packed, spot: &Spot, hit: Hit, ray: Ray) -> Surface {
     }
     let q = &spot.primitive;
     let surface = surface_at(q, hit.primitive, ray, hit.t, epsilon);
-    if s.lookups + s.specular_lookups == 0 {
+    if s.lookups + s.specular_lookups + s.anisotropic == 0 {
         return surface;
     }
     with_coordinates(surface, q)
@@ -158,9 +164,59 @@ pub fn footprint_of(spot: &Spot, hit: Hit, surface: Surface, at: Arrival) -> Foo
     surface_footprint(&spot.primitive, surface, at.x.position, at.y.position)
 }
 
+pub fn view_ray(scene: &Packed, place: Vec2) -> Ray {
+    if scene.specialization.panoramic != 0 {
+        return panorama_ray(&scene.camera, place);
+    }
+    camera_ray(&scene.camera, place)
+}
+
+pub fn seen_path(scene: &Packed, start: Path) -> Path {
+    let mut path = start;
+    for _ in 0..MOST_HIDDEN {
+        let hit = closest_hit(scene, path.ray, path.left, path.wall);
+        if hit.primitive == NOTHING {
+            break;
+        }
+        let spot = spot_of(scene, hit);
+        if material_of(scene, &spot).hidden == 0 {
+            break;
+        }
+        let surface = surface_of(scene, &spot, hit, path.ray);
+        let at = arrival_of(scene, &spot, hit, surface, path.ray, path.differential);
+        path = passed_path(path, surface, at);
+    }
+    path
+}
+
 pub fn pixel_first_hit(scene: &Packed, pixel: UVec2) -> FirstHit {
-    let ray = camera_ray(&scene.camera, pixel.as_vec2() + 0.5);
-    let hit = closest_hit(scene, ray, NOWHERE, NOWHERE);
+    let start = view_ray(scene, pixel.as_vec2() + 0.5);
+    let mut path = Path {
+        ray: start,
+        differential: Differential::default(),
+        throughput: Vec3::ONE,
+        depth: 0,
+        branch: 0,
+        left: NOWHERE,
+        wall: NOWHERE,
+    };
+    let is_hidden = scene.specialization.hidden != 0;
+    if is_hidden {
+        path = seen_path(scene, path);
+    }
+    let mut found = path_first_hit(scene, path);
+    if is_hidden && found.shape != NOTHING {
+        found.depth += dot(path.ray.origin - start.origin, start.direction);
+    }
+    found
+}
+
+pub fn path_first_hit(scene: &Packed, path: Path) -> FirstHit {
+    let ray = path.ray;
+    let mut hit = closest_hit(scene, ray, path.left, path.wall);
+    if scene.specialization.sees_through != 0 {
+        hit = first_seen(scene, ray, hit);
+    }
     if hit.primitive == NOTHING {
         return FirstHit {
             shape: NOTHING,

@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
+use super::math::{dot, max, min, normalize};
 use super::ray::vector_to_local;
 use crate::pack::{Light, Primitive};
 
@@ -30,4 +31,11 @@ pub fn segments_to_local(q: &Primitive, to: Segments) -> Segments {
 
 pub fn segment(to: Segments, at: Vec2) -> Vec3 {
     to.towards + to.u * (2.0 * at.x - 1.0) + to.v * (2.0 * at.y - 1.0)
+}
+
+pub fn spot_falloff(light: &Light, to: Vec3) -> f32 {
+    let away = normalize(to) + light.normal;
+    let ramp = (light.cone - 0.5 * dot(away, away)) * light.falloff;
+    let bounded = min(max(ramp, 0.0), 1.0);
+    bounded * bounded
 }

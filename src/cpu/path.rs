@@ -137,6 +137,23 @@ pub fn refracted_path(
     }
 }
 
+pub fn passed_path(path: Path, surface: Surface, at: Arrival) -> Path {
+    let below = surface.position - (surface.start - surface.position);
+    let ray = Ray {
+        origin: below,
+        direction: path.ray.direction,
+    };
+    Path {
+        ray,
+        differential: Differential { x: at.x, y: at.y },
+        throughput: path.throughput,
+        depth: path.depth,
+        branch: path.branch,
+        left: surface.below,
+        wall: surface.above,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

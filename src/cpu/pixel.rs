@@ -1,14 +1,19 @@
 //! Twin of `shaders/pixel.wgsl`: the samples of a pixel.
 
-use glam::{UVec2, Vec2, Vec3, Vec4};
+use glam::{UVec2, UVec4, Vec2, Vec3, Vec4, Vec4Swizzles};
 
-use super::camera::{camera_differential, camera_ray};
+use super::camera::camera_differential;
 use super::differential::Differential;
 use super::filter::{filter_bin, filter_offset};
+use super::geometry::view_ray;
 use super::integrators::{path, phong};
+use super::lens::{lens_ray, lens_sample};
+use super::panorama::panorama_differential;
 use super::ray::Ray;
-use super::sampling::{sample_key, sample_square};
-use crate::pack::Packed;
+use super::rng::hash4;
+use super::sampling::{random_sample, sample_key, sample_square};
+use super::sequence::sobol_sample;
+use crate::pack::{Packed, RANDOM};
 use crate::scene::Integrator;
 
 /// One sample of a pixel: its radiance times its weight, and its weight; and where layers are wanted its part of these.
@@ -43,11 +48,24 @@ pub fn camera_sample(scene: &Packed, pixel: UVec2, sample: u32) -> CameraSample 
     let u = sample_square(s.pixel_pattern, s.pixel_side, index, round, key);
     let at = filtered(scene, u);
     let place = pixel.as_vec2() + at.truncate();
+    let mut ray = view_ray(scene, place);
+    if s.lens != 0 {
+        ray = lens_ray(&scene.camera, place, lens_place(scene, pixel, sample));
+    }
     CameraSample {
-        ray: camera_ray(&scene.camera, place),
+        ray,
         differential: differential_at(scene, place),
         weight: at.z,
     }
+}
+
+pub fn lens_place(scene: &Packed, pixel: UVec2, sample: u32) -> Vec2 {
+    let key = hash4(UVec4::new(pixel.x, pixel.y, scene.camera.seed, 0)).zw();
+    let mut u = sobol_sample(sample, key);
+    if scene.specialization.pixel_pattern == RANDOM {
+        u = random_sample(sample, 0, key);
+    }
+    lens_sample(scene.camera.blades, u)
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -64,7 +82,11 @@ pub fn differential_at(scene: &Packed, place: Vec2) -> Differential {
     if s.differentials == 0 {
         return Differential::default();
     }
-    camera_differential(&scene.camera, place, 1.0 / (s.pixel_samples as f32).sqrt())
+    let spacing = 1.0 / (s.pixel_samples as f32).sqrt();
+    if s.panoramic != 0 {
+        return panorama_differential(&scene.camera, place, spacing);
+    }
+    camera_differential(&scene.camera, place, spacing)
 }
 
 pub fn filtered(scene: &Packed, u: Vec2) -> Vec3 {

@@ -14,8 +14,11 @@ use super::surface::Surface;
 
 use super::texel::{gaussian_weight, level_size, near_coordinate, unpacked_color, wrapped_index};
 use crate::pack::{
-    EWA, FLOAT, FOR_AMBIENT, FOR_DIFFUSE, FOR_EMISSION, FOR_NORMAL, FOR_ROUGHNESS, FOR_SPECULAR, FOR_TINT, LINES,
-    Material, NEAREST, Packed, TEXTURE_NUMBER, TRILINEAR, Texture,
+    ANISOTROPY_CHANNEL, COAT_CHANNEL, COAT_ROUGHNESS_CHANNEL, EWA, FLOAT, FOR_AMBIENT, FOR_ANISOTROPY, FOR_COAT,
+    FOR_COAT_NORMAL, FOR_COAT_ROUGHNESS, FOR_DIFFUSE, FOR_EMISSION, FOR_METALLIC, FOR_NORMAL, FOR_OPACITY,
+    FOR_ROUGHNESS, FOR_SHEEN, FOR_SHEEN_ROUGHNESS, FOR_SPECULAR, FOR_TINT, FOR_TRANSMISSION, FOR_WEIGHT, LINES, Lookup,
+    METALLIC_CHANNEL, Material, NEAREST, OPACITY_CHANNEL, PRINCIPLED, Packed, ROUGHNESS_CHANNEL,
+    SHEEN_ROUGHNESS_CHANNEL, TRANSMISSION_CHANNEL, TRILINEAR, Texture, WEIGHT_CHANNEL,
 };
 
 pub fn texture_color(scene: &Packed, t: &Texture, surface: Footprint) -> Vec3 {
@@ -171,10 +174,42 @@ pub fn ewa_level_color(scene: &Packed, t: &Texture, level: Level, uv: Vec2, dx: 
     base + sum * if total > 0.0 { 1.0 / total } else { 0.0 }
 }
 
+pub fn channel_of(color: Vec3, lookup: &Lookup, place: u32) -> f32 {
+    let channel = (lookup.channels >> (2 * place)) & 3;
+    match channel {
+        1 => color.y,
+        2 => color.z,
+        _ => color.x,
+    }
+}
+
+pub fn with_principled(before: Material, color: Vec3, lookup: &Lookup) -> Material {
+    let mut m = before;
+    if lookup.purposes & FOR_SHEEN != 0 {
+        m.sheen = color;
+    }
+    for (number, purpose, place) in [
+        (&mut m.metallic, FOR_METALLIC, METALLIC_CHANNEL),
+        (&mut m.anisotropy, FOR_ANISOTROPY, ANISOTROPY_CHANNEL),
+        (&mut m.specular_weight, FOR_WEIGHT, WEIGHT_CHANNEL),
+        (&mut m.transmission, FOR_TRANSMISSION, TRANSMISSION_CHANNEL),
+        (&mut m.clearcoat, FOR_COAT, COAT_CHANNEL),
+        (&mut m.clearcoat_roughness, FOR_COAT_ROUGHNESS, COAT_ROUGHNESS_CHANNEL),
+        (&mut m.sheen_roughness, FOR_SHEEN_ROUGHNESS, SHEEN_ROUGHNESS_CHANNEL),
+        (&mut m.opacity, FOR_OPACITY, OPACITY_CHANNEL),
+    ] {
+        if lookup.purposes & purpose != 0 {
+            *number = channel_of(color, lookup, place);
+        }
+    }
+    m
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Appearance {
     pub material: Material,
     pub normal: Vec3,
+    pub coat_normal: Vec3,
 }
 
 pub fn appearance(
@@ -189,35 +224,43 @@ pub fn appearance(
     let mut look = Appearance {
         material: *material,
         normal: surface.shading_normal,
+        coat_normal: surface.shading_normal,
     };
     if lookups == 0 {
         return look;
     }
     let footprint = footprint_of(spot, hit, surface, at);
-    for i in 0..lookups as usize {
-        let lookup = material.lookups[i];
-        if lookup != 0 {
-            let t = &scene.textures[(lookup & TEXTURE_NUMBER) as usize];
+    for i in 0..lookups {
+        if i < material.lookups.y {
+            let lookup = &scene.lookups[(material.lookups.x + i) as usize];
+            let t = &scene.textures[lookup.texture as usize];
             let color = texture_color(scene, t, footprint);
-            if lookup & FOR_AMBIENT != 0 {
+            let purposes = lookup.purposes;
+            if purposes & FOR_AMBIENT != 0 {
                 look.material.ambient = color;
             }
-            if lookup & FOR_DIFFUSE != 0 {
+            if purposes & FOR_DIFFUSE != 0 {
                 look.material.diffuse = color;
             }
-            if lookup & FOR_SPECULAR != 0 {
+            if purposes & FOR_SPECULAR != 0 {
                 look.material.specular = color;
             }
-            if lookup & FOR_TINT != 0 {
+            if purposes & FOR_TINT != 0 {
                 look.material.tint = color;
             }
-            if lookup & FOR_EMISSION != 0 {
+            if purposes & FOR_EMISSION != 0 {
                 look.material.emission = color;
             }
-            if lookup & FOR_ROUGHNESS != 0 {
-                look.material.roughness = color.x;
+            if purposes & FOR_ROUGHNESS != 0 {
+                look.material.roughness = channel_of(color, lookup, ROUGHNESS_CHANNEL);
             }
-            if lookup & FOR_NORMAL != 0 {
+            if look.material.kind == PRINCIPLED {
+                look.material = with_principled(look.material, color, lookup);
+                if purposes & FOR_COAT_NORMAL != 0 {
+                    look.coat_normal = mapped_normal(surface, t, color);
+                }
+            }
+            if purposes & FOR_NORMAL != 0 {
                 look.normal = mapped_normal(surface, t, color);
             }
         }

@@ -44,6 +44,12 @@ fn view(camera: &CameraDescription) -> View {
             up: c.up,
             span: c.height,
         },
+        CameraDescription::Panorama(c) => View {
+            position: c.position,
+            look_at: c.look_at,
+            up: c.up,
+            span: std::f64::consts::PI * c.position.distance(c.look_at),
+        },
     }
 }
 
@@ -81,6 +87,9 @@ pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
         CameraDescription::Perspective(c) => {
             (c.position, c.look_at) = (rounded(position, scale), rounded(look_at, scale));
         }
+        CameraDescription::Panorama(c) => {
+            (c.position, c.look_at) = (rounded(position, scale), rounded(look_at, scale));
+        }
         CameraDescription::Orthographic(c) => {
             if let Move::Dolly(by) = by {
                 c.height = round(c.height * (-by).exp(), c.height); // going nearer would change nothing
@@ -110,6 +119,9 @@ pub fn merged(
             take(&mut c.look_at, &old.look_at, &new.look_at);
             take(&mut c.up, &old.up, &new.up);
             take(&mut c.fov, &old.fov, &new.fov);
+            // A move changes nothing of the lens.
+            (c.focal_length, c.aperture, c.f_number) = (new.focal_length, new.aperture, new.f_number);
+            (c.focus_distance, c.blades, c.blade_rotation) = (new.focus_distance, new.blades, new.blade_rotation);
             c.path.clone_from(&new.path);
         }
         (
@@ -121,6 +133,12 @@ pub fn merged(
             take(&mut c.look_at, &old.look_at, &new.look_at);
             take(&mut c.up, &old.up, &new.up);
             take(&mut c.height, &old.height, &new.height);
+            c.path.clone_from(&new.path);
+        }
+        (CameraDescription::Panorama(c), CameraDescription::Panorama(old), CameraDescription::Panorama(new)) => {
+            take(&mut c.position, &old.position, &new.position);
+            take(&mut c.look_at, &old.look_at, &new.look_at);
+            take(&mut c.up, &old.up, &new.up);
             c.path.clone_from(&new.path);
         }
         _ => return None, // another kind of camera
@@ -160,7 +178,31 @@ pub fn entries(camera: &CameraDescription) -> Vec<(&'static str, Entry)> {
             ("up", Entry::Point(c.up)),
             ("height", Entry::Number(c.height)),
         ],
+        CameraDescription::Panorama(c) => vec![
+            ("position", Entry::Point(c.position)),
+            ("look_at", Entry::Point(c.look_at)),
+            ("up", Entry::Point(c.up)),
+        ],
     }
+}
+
+/// What else a camera's section says, which no move changes: of its lens, if it has one.
+fn settings(camera: &CameraDescription) -> Vec<(&'static str, f64)> {
+    let CameraDescription::Perspective(c) = camera else {
+        return Vec::new();
+    };
+    let written = [
+        ("focal_length", (c.focal_length != 1.0).then_some(c.focal_length)),
+        ("aperture", c.aperture),
+        ("f_number", c.f_number),
+        ("focus_distance", c.focus_distance),
+        ("blades", (c.blades != 0).then_some(c.blades.into())),
+        ("blade_rotation", (c.blade_rotation != 0.0).then_some(c.blade_rotation)),
+    ];
+    written
+        .into_iter()
+        .filter_map(|(key, value)| Some((key, value?)))
+        .collect()
 }
 
 /// The value of a key.
@@ -177,12 +219,14 @@ pub fn text(camera: &CameraDescription) -> String {
     let kind = match camera {
         CameraDescription::Perspective(_) => "",
         CameraDescription::Orthographic(_) => "type = \"orthographic\"\n",
+        CameraDescription::Panorama(_) => "type = \"panorama\"\n",
     };
     let entries = entries(camera).into_iter().map(|(key, entry)| match entry {
         Entry::Number(x) => format!("{key} = {x}\n"),
         Entry::Point(p) => format!("{key} = [{}, {}, {}]\n", p.x, p.y, p.z),
     });
-    format!("[camera]\n{kind}{}", entries.collect::<String>())
+    let settings = settings(camera).into_iter().map(|(key, x)| format!("{key} = {x}\n"));
+    format!("[camera]\n{kind}{}", entries.chain(settings).collect::<String>())
 }
 
 #[cfg(test)]
@@ -197,6 +241,18 @@ mod tests {
 
     fn perspective() -> CameraDescription {
         camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 45")
+    }
+
+    /// Those of a lens, told in both ways, and of a panorama.
+    fn others() -> [CameraDescription; 3] {
+        let view = "position = [0, -4, 1]\nlook_at = [0, 0, 1]\n";
+        [
+            camera(&format!(
+                "{view}fov = 45\naperture = 0.1\nfocus_distance = 3\nblades = 5\nblade_rotation = 12.5"
+            )),
+            camera(&format!("{view}fov = 45\nfocal_length = 0.05\nf_number = 1.4")),
+            camera(&format!("type = 'panorama'\n{view}")),
+        ]
     }
 
     fn orthographic() -> CameraDescription {
@@ -236,6 +292,24 @@ mod tests {
             panic!()
         };
         assert_eq!(near.height, 1.0);
+    }
+
+    #[test]
+    fn a_lens_and_a_panorama_move_and_stay_what_they_are() {
+        for file in others() {
+            for by in [Move::Orbit(0.3, 0.2), Move::Pan(0.1, 0.2), Move::Dolly(0.5)] {
+                let new = moved(&file, by);
+                assert_ne!(view(&new).position, view(&file).position, "{by:?}");
+                assert_eq!(std::mem::discriminant(&new), std::mem::discriminant(&file));
+                assert_eq!(settings(&new), settings(&file));
+                assert_eq!(merged(&new, &file, &file), Some(new));
+            }
+        }
+        let [wide, by_number, _] = others();
+        let turned = moved(&wide, Move::Orbit(0.3, 0.2));
+        let both = merged(&turned, &wide, &by_number).unwrap();
+        assert_eq!(settings(&both), settings(&by_number), "an edit changes the lens");
+        assert_eq!(view(&both).position, view(&turned).position);
     }
 
     #[test]
@@ -279,7 +353,7 @@ mod tests {
 
     #[test]
     fn its_text_reads_back_as_the_same_camera() {
-        for camera in [perspective(), orthographic()] {
+        for camera in [perspective(), orthographic()].into_iter().chain(others()) {
             let camera = moved(&camera, Move::Orbit(0.1, 0.2));
             let text = format!("image = {{ width = 4, height = 4 }}\n{}", text(&camera));
             assert_eq!(Description::parse(&text, "camera").unwrap().camera, camera);

@@ -7,7 +7,8 @@ use bytemuck::cast_slice;
 use glam::UVec4;
 
 use crate::pack::{
-    BLOCK, Emitter, Field as _, Instance, Item, Light, MOST_OUTSIDE, Material, Node, Packed, Record, Texture,
+    BLOCK, Emitter, Field as _, Instance, Item, Light, LightNode, Lookup, MOST_OUTSIDE, Material, Node, Packed, Record,
+    Texture,
 };
 
 /// Scenes of more materials, lights and textures are read from buffers: compiling grows with every one of them, faster than
@@ -16,7 +17,14 @@ pub const MOST_RECORDS: usize = 512;
 
 /// [`bake`], if the scene is small enough.
 pub fn bake_if_small(packed: &Packed) -> Option<String> {
-    let records = packed.materials.len() + packed.lights.len() + packed.textures.len() + packed.emitters.len();
+    // Lights that a tree chooses of are read from buffers.
+    let lights = if packed.light_nodes.is_empty() {
+        packed.lights.len()
+    } else {
+        0
+    };
+    let of_looks = packed.materials.len() + packed.lookups.len() + packed.textures.len();
+    let records = of_looks + lights + packed.emitters.len();
     (packed.primitives.len() <= MOST_OUTSIDE && records <= MOST_RECORDS).then(|| bake(packed))
 }
 
@@ -112,9 +120,13 @@ pub fn bake(packed: &Packed) -> String {
     let _ = writeln!(out, "fn light_counts() -> vec2u {{\n    return {lights};\n}}");
     write_table(&mut out, "load_primitive", &packed.primitives);
     write_table(&mut out, "load_material", &packed.materials);
-    write_table(&mut out, "load_light", &packed.lights);
+    match packed.light_nodes.is_empty() {
+        true => write_table(&mut out, "load_light", &packed.lights),
+        false => from_rows::<Light>(&mut out, "load_light", "records", "counts.tables.x"),
+    }
     write_table(&mut out, "load_texture", &packed.textures);
     write_table(&mut out, "load_emitter", &packed.emitters);
+    write_table(&mut out, "load_lookup", &packed.lookups);
     out
 }
 
@@ -125,28 +137,34 @@ pub fn tables() -> String {
     from_rows::<Light>(&mut out, "load_light", "records", "counts.tables.x");
     from_rows::<Texture>(&mut out, "load_texture", "records", "counts.tables.y");
     from_rows::<Emitter>(&mut out, "load_emitter", "records", "counts.emitters.x");
+    from_rows::<Lookup>(&mut out, "load_lookup", "records", "counts.lookups.x");
     out
 }
 
-/// The WGSL text of the functions that load records of trees and meshes.
+/// The WGSL text of the functions that load records of trees and meshes, which are in buffers always.
 pub fn tree_tables() -> String {
     let mut out = String::new();
     from_rows::<Item>(&mut out, "load_item", "nodes", "counts.tree.x");
     from_rows::<Instance>(&mut out, "load_instance", "nodes", "counts.tree.y");
+    from_rows::<LightNode>(&mut out, "load_light_node", "records", "counts.emitters.z");
     let _ = writeln!(out, "fn load_node(at: u32) -> Node {{");
     from_row::<Node>(&mut out, "nodes");
     out
 }
 
-/// The rows of a scene's materials, lights, textures and emitters.
+/// The rows of a scene's materials, lights, textures, emitters and lookups, of the tree over what shines and of the numbers of its leaves.
 pub fn rows(packed: &Packed) -> Vec<UVec4> {
     let bytes = [
         cast_slice(&packed.materials),
         cast_slice(&packed.lights),
         cast_slice::<_, u8>(&packed.textures),
         cast_slice(&packed.emitters),
+        cast_slice(&packed.lookups),
+        cast_slice(&packed.light_nodes),
     ];
-    bytemuck::pod_collect_to_vec(&bytes.concat())
+    let mut rows: Vec<UVec4> = bytemuck::pod_collect_to_vec(&bytes.concat());
+    rows.extend(in_rows(&packed.light_leaves));
+    rows
 }
 
 /// The rows of a scene's trees, of their items and of instances.

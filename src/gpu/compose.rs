@@ -34,8 +34,11 @@ pub static SHARED: &[File] = files![
     "disk.wgsl",
     "primitive.wgsl",
     "camera.wgsl",
+    "lens.wgsl",
+    "panorama.wgsl",
     "surface.wgsl",
     "light.wgsl",
+    "light_tree.wgsl",
     "shadow.wgsl",
     "phong.wgsl",
     "differential.wgsl",
@@ -43,8 +46,15 @@ pub static SHARED: &[File] = files![
     "path.wgsl",
     "diffuse.wgsl",
     "modified_phong.wgsl",
+    "principled.wgsl",
     "dielectric.wgsl",
+    "ggx.wgsl",
+    "lobe.wgsl",
+    "metal.wgsl",
+    "rough_dielectric.wgsl",
+    "thin.wgsl",
     "light_sample.wgsl",
+    "surroundings.wgsl",
     "footprint.wgsl",
     "procedural.wgsl",
     "texel.wgsl",
@@ -64,12 +74,20 @@ static KERNEL: &[File] = files![
     "traverse.wgsl",
     "meshes.wgsl",
     "tree.wgsl",
-    "geometry.wgsl"
+    "geometry.wgsl",
+    "texture.wgsl",
+    "alpha.wgsl",
 ];
 /// What takes samples of a pixel.
-static SAMPLES: &[File] = files!["texture.wgsl", "pixel.wgsl"];
+static SAMPLES: &[File] = files!["pixel.wgsl"];
 static PHONG: &[File] = files!["integrators/whole.wgsl", "integrators/phong.wgsl"];
-static PATH: &[File] = files!["emitter.wgsl", "integrators/path.wgsl"];
+static PATH: &[File] = files![
+    "environment.wgsl",
+    "light_choice.wgsl",
+    "emitter.wgsl",
+    "scattering.wgsl",
+    "integrators/path.wgsl"
+];
 /// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.
 static FROM_BUFFERS: &[File] = files!["buffers.wgsl"];
 /// The texels in one buffer.

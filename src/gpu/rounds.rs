@@ -16,6 +16,9 @@ const ROUNDS_OF_TREE: f64 = 150.0;
 /// 0.6 %.
 const LONGEST_ROULETTE: u32 = 100;
 
+/// Surfaces that a ray passes by their alpha before it meets one, about.
+const ROUNDS_OF_PASSING: f64 = 4.0;
+
 /// Rounds of a lookup in a texture, about.
 const ROUNDS_OF_LOOKUP: f64 = 8.0;
 
@@ -38,11 +41,17 @@ fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
     let (of_hit, of_lists) = if baked { (0.0, lists) } else { (all, lists + casters) };
     let in_tree = if s.in_tree == 0 { 0.0 } else { ROUNDS_OF_TREE };
     let of_hit = of_hit + in_tree;
+    // Behind what is hidden from the camera.
+    let of_start = 1.0 + f64::from(s.hidden) * (1.0 + of_hit) * 2.0;
     if packed.integrator == Integrator::Path {
         // Each bounce is a round, with a ray to go on, one to a light, and the loops of textures.
         let to_light = if baked { in_tree } else { casters + in_tree };
+        let passing = if s.sees_through == 0 { 1.0 } else { ROUNDS_OF_PASSING };
         let bounces = f64::from(s.bounces.min(s.rr_depth.saturating_add(LONGEST_ROULETTE)));
-        return 1.0 + (bounces + 1.0) * (1.0 + of_hit + to_light + f64::from(s.lookups) * ROUNDS_OF_LOOKUP);
+        // Down the tree over what shines, and up from what a ray has met.
+        let levels = 2.0 * f64::from(2 * packed.light_nodes.len().max(1).ilog2());
+        let of_bounce = 1.0 + of_hit + to_light + levels + f64::from(s.lookups) * ROUNDS_OF_LOOKUP;
+        return of_start + (bounces + 1.0) * passing * of_bounce;
     }
     let block = |samples: u32| {
         let shadows = CANDIDATES.min(casters) * (1.0 + f64::from(samples)) + in_tree * f64::from(samples);
@@ -54,7 +63,7 @@ fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
     let (area_lights, lights) = (f64::from(packed.counts.lights.x), f64::from(packed.counts.lights.y));
     let shading = area_lights * (1.0 + area_light) + (lights - area_lights) * (1.0 + block(1));
     let paths = if s.bounces == 0 { 1 } else { LEAVES };
-    1.0 + f64::from(paths) * (shading + (f64::from(s.bounces) + 1.0) * (1.0 + of_hit))
+    of_start + f64::from(paths) * (shading + (f64::from(s.bounces) + 1.0) * (1.0 + of_hit))
 }
 
 #[cfg(test)]

@@ -129,7 +129,10 @@ pub fn hash_of_scene(scene: &Packed) -> String {
         materials,
         lights,
         emitters,
+        light_nodes,
+        light_leaves,
         counts,
+        lookups,
         textures,
         texels,
         filter_table,
@@ -138,7 +141,7 @@ pub fn hash_of_scene(scene: &Packed) -> String {
         specialization,
     } = scene;
     let mut hasher = blake3::Hasher::new();
-    let records: [&[u8]; 16] = [
+    let records: [&[u8]; 19] = [
         bytes_of(camera),
         bytes_of(environment),
         bytes_of(counts),
@@ -151,6 +154,9 @@ pub fn hash_of_scene(scene: &Packed) -> String {
         cast_slice(materials),
         cast_slice(lights),
         cast_slice(emitters),
+        cast_slice(light_nodes),
+        cast_slice(light_leaves),
+        cast_slice(lookups),
         cast_slice(textures),
         cast_slice(texels),
         cast_slice(filter_table),

@@ -3,23 +3,23 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::{DVec3, UVec4, Vec3};
+use glam::{DVec3, UVec2, Vec3};
 
+use super::energy::energy_table;
 use super::pyramid::pyramid;
-use super::{
-    CHECKER, CLAMP, DIFFUSE, EWA, FLOAT, FOR_AMBIENT, FOR_DIFFUSE, FOR_EMISSION, FOR_NORMAL, FOR_ROUGHNESS,
-    FOR_SPECULAR, FOR_TINT, GLASS, LINEAR8, LINES, MIRROR, MIRRORED, Material, NEAREST, PHONG, REPEAT, SRGB8,
-    TRILINEAR, Texture,
-};
-use crate::pack::BILINEAR;
+use super::*;
+use crate::cpu::lobe::{facet_alpha, is_polished};
 use crate::scene::{
-    self, Color, Encoding, Image, Integrator, Reflection, Scene, Texels, TextureFilter, TextureKind, Value, Wrap,
+    self, AlphaMode, Channel, Color, Encoding, Facets, Image, Integrator, Reflection, Scene, Texels, TextureFilter,
+    TextureKind, Value, Wrap,
 };
 
 /// The records of a scene's materials and of the textures that they use.
 #[derive(Default)]
 pub struct Appearances {
     pub materials: Vec<Material>,
+    /// What materials look up; those of a material lie together.
+    pub lookups: Vec<Lookup>,
     pub textures: Vec<Texture>,
     pub texels: Vec<u32>,
     /// Where the pyramids of the scene's images are, by the images' addresses.
@@ -28,6 +28,37 @@ pub struct Appearances {
     levels: BTreeMap<usize, u32>,
     /// The records of the scene's textures, apart for each strength as a normal map.
     records: BTreeMap<(usize, Option<u64>), u32>,
+    /// The tables of rough glass, by its index and alpha where that is one.
+    energies: BTreeMap<(u32, Option<u32>), u32>,
+}
+
+/// A record of facets; `texture` gives the roughness of one.
+fn faceted(facets: &Facets, found: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3) -> Material {
+    Material {
+        roughness: of_value(&facets.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, found),
+        anisotropy: facets.anisotropy as f32,
+        rotation: (facets.rotation / 180.0) as f32,
+        energy: if facets.compensated { 0 } else { NOTHING },
+        ..bytemuck::Zeroable::zeroed()
+    }
+}
+
+/// A record of facets as one of a kind without them, where it is polished everywhere; so is glass that hardly refracts.
+fn simplest(record: Material, textured: bool) -> Material {
+    let polished = !textured && is_polished(&record);
+    let kind = match record.kind {
+        METAL if polished && record.eta == Vec3::ZERO => MIRROR,
+        ROUGH_GLASS if polished || (record.ior - 1.0).abs() < SMALLEST_ALPHA => GLASS,
+        _ => return record,
+    };
+    Material {
+        roughness: 0.0,
+        anisotropy: 0.0,
+        rotation: 0.0,
+        energy: 0,
+        kind,
+        ..record
+    }
 }
 
 impl Appearances {
@@ -53,8 +84,8 @@ impl Appearances {
                 .materials
                 .iter()
                 .filter(|m| specular == (m.kind == MIRROR || m.kind == GLASS));
-            let lookups = materials.map(|m| m.lookups.to_array().iter().filter(|lookup| **lookup != 0).count());
-            lookups.max().unwrap_or(0) as u32
+            let lookups = materials.map(|material| material.lookups.y);
+            lookups.max().unwrap_or(0)
         };
         let (others, specular) = (most(false), most(true));
         match integrator {
@@ -64,9 +95,19 @@ impl Appearances {
     }
 
     pub fn has_normal_maps(&self) -> bool {
-        self.materials
-            .iter()
-            .any(|m| m.lookups.to_array().iter().any(|lookup| lookup & FOR_NORMAL != 0))
+        self.have_lookup(FOR_NORMAL | FOR_COAT_NORMAL)
+    }
+
+    /// Whether any texture is looked up for any of these purposes.
+    pub fn have_lookup(&self, purposes: u32) -> bool {
+        self.lookups.iter().any(|lookup| lookup.purposes & purposes != 0)
+    }
+
+    /// Whether a material looks any texture up for any of these purposes.
+    pub fn has_lookup(&self, material: &Material, purposes: u32) -> bool {
+        let [first, count] = material.lookups.to_array().map(|x| x as usize);
+        let mut lookups = self.lookups.iter().skip(first).take(count);
+        lookups.any(|lookup| lookup.purposes & purposes != 0)
     }
 
     /// Bits of the textures' kinds.
@@ -87,12 +128,12 @@ impl Appearances {
 
     fn material(&mut self, scene: &Scene, material: &scene::Material) -> Material {
         let mut lookups = Lookups::default();
-        let mut color = |color: &Color, purpose: u32| match *color {
+        let mut found = |color: &Color, purpose: u32, channel: Option<(Channel, u32)>| match *color {
             Color::Plain(color) => color.as_vec3(),
             Color::Texture(i) => match scene.textures[i].kind {
                 TextureKind::Constant(color) => color.as_vec3(),
                 _ => {
-                    lookups.add(self.texture(scene, i, None), purpose);
+                    lookups.add(self.texture(scene, i, None), purpose, channel);
                     Vec3::ZERO
                 }
             },
@@ -106,56 +147,96 @@ impl Appearances {
             } => Material {
                 ambient: match scene.render.integrator {
                     Integrator::Path => Vec3::ZERO, // without effect
-                    _ => color(ambient, FOR_AMBIENT),
+                    _ => found(ambient, FOR_AMBIENT, None),
                 },
                 kind: PHONG,
-                diffuse: color(diffuse, FOR_DIFFUSE),
+                diffuse: found(diffuse, FOR_DIFFUSE, None),
                 shininess: *shininess as f32,
-                specular: color(specular, FOR_SPECULAR),
+                specular: found(specular, FOR_SPECULAR, None),
                 exponent: *shininess as u32,
                 ..bytemuck::Zeroable::zeroed()
             },
-            Reflection::Mirror { tint } | Reflection::Conductor { color: tint } => Material {
+            Reflection::Mirror { tint } => Material {
                 kind: MIRROR,
-                tint: color(tint, FOR_TINT),
+                tint: found(tint, FOR_TINT, None),
                 ..bytemuck::Zeroable::zeroed()
             },
             Reflection::Glass { ior, tint } => Material {
                 kind: GLASS,
-                tint: color(tint, FOR_TINT),
+                tint: found(tint, FOR_TINT, None),
                 ior: *ior as f32,
                 ..bytemuck::Zeroable::zeroed()
+            },
+            Reflection::Conductor {
+                color: tint,
+                index,
+                facets,
+            } => Material {
+                kind: METAL,
+                tint: found(tint, FOR_TINT, None),
+                eta: index.map_or(Vec3::ZERO, |index| index.eta.as_vec3()),
+                k: index.map_or(Vec3::ZERO, |index| index.k.as_vec3()),
+                ..faceted(facets, &mut found)
             },
             Reflection::Dielectric {
                 ior,
                 color: tint,
                 absorption,
+                thin,
+                facets,
             } => Material {
-                kind: GLASS,
-                tint: color(tint, FOR_TINT),
+                kind: if *thin { THIN } else { ROUGH_GLASS },
+                tint: found(tint, FOR_TINT, None),
                 ior: *ior as f32,
                 absorption: absorption.as_vec3(),
-                ..bytemuck::Zeroable::zeroed()
+                ..faceted(facets, &mut found)
             },
+            Reflection::Principled(principled) => self::principled(principled, &mut found),
             Reflection::Diffuse {
                 color: albedo,
                 roughness,
             } => Material {
                 kind: DIFFUSE,
-                diffuse: color(albedo, FOR_DIFFUSE),
-                roughness: match *roughness {
-                    Value::Plain(roughness) => roughness as f32,
-                    Value::Texture(i) => color(&Color::Texture(i), FOR_ROUGHNESS).x,
-                },
+                diffuse: found(albedo, FOR_DIFFUSE, None),
+                roughness: of_value(roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, &mut found),
                 ..bytemuck::Zeroable::zeroed()
             },
         };
-        record.emission = color(&material.emission, FOR_EMISSION);
-        if let Some(map) = material.normal_map {
-            lookups.add(self.texture(scene, map.texture, Some(map.strength)), FOR_NORMAL);
+        record.emission = found(&material.emission, FOR_EMISSION, None);
+        let textured = lookups.0.iter().any(|lookup| lookup.purposes & FOR_ROUGHNESS != 0);
+        let mut record = simplest(record, textured);
+        record.hidden = (!material.visible).into();
+        if record.kind == ROUGH_GLASS && record.energy != NOTHING {
+            record.energy = self.energy(&record, textured);
         }
-        record.lookups = lookups.0;
+        if let Some(map) = material.normal_map {
+            lookups.add(self.texture(scene, map.texture, Some(map.strength)), FOR_NORMAL, None);
+        }
+        if let Reflection::Principled(principled) = &material.reflection
+            && let Some(map) = principled.clearcoat_normal_map
+        {
+            lookups.add(
+                self.texture(scene, map.texture, Some(map.strength)),
+                FOR_COAT_NORMAL,
+                None,
+            );
+        }
+        record.lookups = UVec2::new(self.lookups.len() as u32, lookups.0.len() as u32);
+        self.lookups.extend(lookups.0);
         record
+    }
+
+    /// Where the table of what rough glass reflects and lets pass at once starts; a new one where there is none such.
+    fn energy(&mut self, record: &Material, textured: bool) -> u32 {
+        let square = 0.5 * facet_alpha(record).length_squared();
+        let alpha = if textured { None } else { Some(square.sqrt()) };
+        let key = (record.ior.to_bits(), alpha.map(f32::to_bits));
+        let texels = &mut self.texels;
+        *self.energies.entry(key).or_insert_with(|| {
+            let start = texels.len() as u32;
+            texels.extend(energy_table(record.ior, alpha).iter().map(|x| x.to_bits()));
+            start
+        })
     }
 
     /// The record of a texture that gives a colour, or a normal if it has a strength.
@@ -260,14 +341,87 @@ fn levels_of(image: &Image, filter: TextureFilter) -> u32 {
 
 /// The lookups of a material: each texture once, with all its purposes.
 #[derive(Default)]
-struct Lookups(UVec4);
+struct Lookups(Vec<Lookup>);
 
 impl Lookups {
-    fn add(&mut self, texture: u32, purpose: u32) {
-        let same = |lookup: u32| lookup == 0 || lookup & super::TEXTURE_NUMBER == texture;
-        // No material has more than four, so that there is always a place.
-        if let Some(i) = (0..4).find(|i| same(self.0[*i])) {
-            self.0[i] |= texture | purpose;
+    /// A number has a place for its channel.
+    fn add(&mut self, texture: u32, purpose: u32, channel: Option<(Channel, u32)>) {
+        let known = self.0.iter().position(|lookup| lookup.texture == texture);
+        let place = known.unwrap_or_else(|| {
+            self.0.push(Lookup {
+                texture,
+                ..bytemuck::Zeroable::zeroed()
+            });
+            self.0.len() - 1
+        });
+        let lookup = &mut self.0[place];
+        lookup.purposes |= purpose;
+        if let Some((channel, place)) = channel {
+            lookup.channels |= number_of(channel) << (2 * place);
         }
+    }
+}
+
+/// The record of a principled material, but for what all have.
+fn principled(p: &scene::Principled, found: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3) -> Material {
+    let sees_through = p.alpha_mode != AlphaMode::Opaque;
+    Material {
+        kind: PRINCIPLED,
+        diffuse: found(&p.base_color, FOR_DIFFUSE, None),
+        specular: found(&p.specular_color, FOR_SPECULAR, None),
+        ior: p.ior as f32,
+        absorption: p.absorption.as_vec3(),
+        roughness: of_value(&p.roughness, FOR_ROUGHNESS, ROUGHNESS_CHANNEL, found),
+        anisotropy: of_value(&p.anisotropy, FOR_ANISOTROPY, ANISOTROPY_CHANNEL, found),
+        rotation: (p.anisotropy_rotation / std::f64::consts::PI) as f32,
+        thin: p.thin.into(),
+        sheen: found(&p.sheen_color, FOR_SHEEN, None),
+        sheen_roughness: of_value(&p.sheen_roughness, FOR_SHEEN_ROUGHNESS, SHEEN_ROUGHNESS_CHANNEL, found),
+        metallic: of_value(&p.metallic, FOR_METALLIC, METALLIC_CHANNEL, found),
+        transmission: of_value(&p.transmission, FOR_TRANSMISSION, TRANSMISSION_CHANNEL, found),
+        clearcoat: of_value(&p.clearcoat, FOR_COAT, COAT_CHANNEL, found),
+        clearcoat_roughness: of_value(
+            &p.clearcoat_roughness,
+            FOR_COAT_ROUGHNESS,
+            COAT_ROUGHNESS_CHANNEL,
+            found,
+        ),
+        specular_weight: of_value(&p.specular, FOR_WEIGHT, WEIGHT_CHANNEL, found),
+        opacity: match sees_through {
+            true => of_value(&p.alpha, FOR_OPACITY, OPACITY_CHANNEL, found),
+            false => 1.0,
+        },
+        cutoff: p.alpha_cutoff as f32,
+        alpha_mode: match p.alpha_mode {
+            AlphaMode::Opaque => OPAQUE,
+            AlphaMode::Mask => MASK,
+            AlphaMode::Blend => BLEND,
+        },
+        ..bytemuck::Zeroable::zeroed()
+    }
+}
+
+/// Asks `found` for a colour, or notes a lookup of it, and takes a number of it.
+fn of_value(
+    value: &Value,
+    purpose: u32,
+    place: u32,
+    found: &mut impl FnMut(&Color, u32, Option<(Channel, u32)>) -> Vec3,
+) -> f32 {
+    match *value {
+        Value::Plain(number) => number as f32,
+        Value::Texture(i, channel) => {
+            let color = found(&Color::Texture(i), purpose, Some((channel, place)));
+            color[number_of(channel) as usize]
+        }
+    }
+}
+
+/// Which value of a texture's colour it is.
+fn number_of(channel: Channel) -> u32 {
+    match channel {
+        Channel::R | Channel::A => 0,
+        Channel::G => 1,
+        Channel::B => 2,
     }
 }

@@ -36,6 +36,8 @@ struct Things<'a> {
     places: ExtentTree,
     /// Of the shapes and lights that are infinitely far away, by the same numbers.
     directions: ExtentTree,
+    /// Whether light comes from all directions: everything is then on both sides of what it may light.
+    all_around: bool,
 }
 
 impl<'a> Things<'a> {
@@ -53,11 +55,15 @@ impl<'a> Things<'a> {
             scene,
             places: ExtentTree::new(places, &Places(scene)),
             directions: ExtentTree::new(directions, &Directions(scene)),
+            all_around: scene
+                .environment
+                .as_ref()
+                .is_some_and(|environment| environment.image.is_some()),
         }
     }
 
     fn blocks(&self, primitive: &Primitive, most_nodes: u32) -> bool {
-        if primitive.kind == ELLIPSOID {
+        if primitive.kind == ELLIPSOID || self.all_around {
             return true;
         }
         let mut range = Range {
@@ -180,7 +186,7 @@ fn each_place(scene: &Scene, i: usize, normal: DVec3, mut point: impl FnMut(DVec
         Some(Geometry::Plane { point: p, .. }) => point(*p),
         None => match &scene.lights[i - scene.shapes.len()] {
             Light::Rectangle { rectangle, .. } => parallelogram(rectangle),
-            Light::Point { position, .. } => point(*position),
+            Light::Point { position, .. } | Light::Spot { position, .. } => point(*position),
             Light::Directional { .. } => {}
         },
     }

@@ -1,7 +1,7 @@
 //! Constants of both sides.
 
 #[cfg(doc)]
-use super::{Camera, Instance, Item, Material, Primitive, Texture};
+use super::{Camera, Instance, Item, Lookup, Material, Primitive, Texture};
 #[cfg(doc)]
 use crate::scene::Pattern;
 
@@ -14,6 +14,8 @@ constants! {
     pub const PERSPECTIVE: u32 = 0;
     /// [`Camera::projection`] of a camera whose rays are parallel.
     pub const ORTHOGRAPHIC: u32 = 1;
+    /// [`Camera::projection`] of a camera that sees in all directions.
+    pub const PANORAMA: u32 = 2;
 
     /// [`Primitive::kind`]: |x| <= 1, |y| <= 1, z = 0 in local space.
     pub const RECTANGLE: u32 = 0;
@@ -52,6 +54,44 @@ constants! {
     pub const GLASS: u32 = 3;
     /// [`Material::kind`]: a diffuse surface.
     pub const DIFFUSE: u32 = 4;
+    /// [`Material::kind`]: metal that is rough, or has an index of refraction.
+    pub const METAL: u32 = 5;
+    /// [`Material::kind`]: clear glass that is rough.
+    pub const ROUGH_GLASS: u32 = 6;
+    /// [`Material::kind`]: a sheet of clear glass, rough or not.
+    pub const THIN: u32 = 7;
+    /// The bits of the kinds of materials that have facets.
+    pub const FACET_KINDS: u32 = 1 << METAL | 1 << ROUGH_GLASS | 1 << THIN;
+    /// The bits of those of them that let light through.
+    pub const PASSING_KINDS: u32 = 1 << ROUGH_GLASS | 1 << THIN;
+    /// Rows and columns of a table of [`Material::energy`], for each side.
+    pub const ENERGY_SIZE: u32 = 32;
+    /// A microfacet lobe whose alpha are all below this is a delta; each of any other is at least this.
+    pub const SMALLEST_ALPHA: f32 = 1e-3;
+    /// [`Material::kind`]: glTF's material.
+    pub const PRINCIPLED: u32 = 8;
+    /// A lobe of [`PRINCIPLED`] materials: what dielectrics and metals mirror.
+    pub const LOBE_SPECULAR: u32 = 1;
+    /// A lobe of [`PRINCIPLED`] materials: what passes.
+    pub const LOBE_TRANSMISSION: u32 = 2;
+    /// A lobe of [`PRINCIPLED`] materials: that of a clear coat.
+    pub const LOBE_COAT: u32 = 4;
+    /// A lobe of [`PRINCIPLED`] materials: sheen.
+    pub const LOBE_SHEEN: u32 = 8;
+    /// With the lobes of [`PRINCIPLED`] materials: any is anisotropic.
+    pub const LOBE_ANISOTROPY: u32 = 16;
+    /// What a clear coat reflects head-on: its index of refraction is 1.5.
+    pub const COAT_F0: f32 = 0.04;
+    /// The smallest roughness of sheen: a smoother one stands for it.
+    pub const LEAST_SHEEN: f32 = 0.15;
+    /// [`Material::alpha_mode`]: all of the surface is there.
+    pub const OPAQUE: u32 = 0;
+    /// [`Material::alpha_mode`]: it is there where its alpha is not below the cutoff.
+    pub const MASK: u32 = 1;
+    /// [`Material::alpha_mode`]: it is there for that share of the rays.
+    pub const BLEND: u32 = 2;
+    /// The most surfaces that a ray passes by their alpha.
+    pub const MOST_PASSED: u32 = 64;
     /// The bits of the kinds of materials that mirror or refract, and do nothing else.
     pub const SPECULAR_KINDS: u32 = 1 << MIRROR | 1 << GLASS;
 
@@ -59,6 +99,17 @@ constants! {
     pub const POINT: u32 = 6;
     /// [`Light::kind`](super::Light::kind): light from infinitely far away.
     pub const DIRECTIONAL: u32 = 7;
+    /// [`Light::kind`](super::Light::kind): the image that surrounds the scene.
+    pub const ENVIRONMENT: u32 = 8;
+
+    /// In [`Specialization::surroundings`](super::Specialization::surroundings): an image surrounds the scene.
+    pub const IMAGE_AROUND: u32 = 1;
+    /// In [`Specialization::surroundings`](super::Specialization::surroundings): the camera does not see what surrounds the scene.
+    pub const UNSEEN_AROUND: u32 = 2;
+    /// [`Light::kind`](super::Light::kind): a cone of light from one point.
+    pub const SPOT: u32 = 9;
+    /// The camera's rays go through so many surfaces that are hidden from it, at most; they see the next one.
+    pub const MOST_HIDDEN: u32 = 64;
 
     /// Glass splits a path at the first so many bounces.
     pub const SPLITS: u32 = 2;
@@ -92,22 +143,58 @@ constants! {
     /// [`Texture::wrap`]: the image again and again, every other one mirrored.
     pub const MIRRORED: u32 = 2;
 
-    /// The bits of [`Material::lookups`] that are the texture's number.
-    pub const TEXTURE_NUMBER: u32 = 0xff_ffff;
-    /// In [`Material::lookups`]: gives [`Material::ambient`].
-    pub const FOR_AMBIENT: u32 = 0x100_0000;
-    /// In [`Material::lookups`]: gives [`Material::diffuse`].
-    pub const FOR_DIFFUSE: u32 = 0x200_0000;
-    /// In [`Material::lookups`]: gives [`Material::specular`].
-    pub const FOR_SPECULAR: u32 = 0x400_0000;
-    /// In [`Material::lookups`]: gives [`Material::tint`].
-    pub const FOR_TINT: u32 = 0x800_0000;
-    /// In [`Material::lookups`]: gives the normal.
-    pub const FOR_NORMAL: u32 = 0x1000_0000;
-    /// In [`Material::lookups`]: gives [`Material::emission`].
-    pub const FOR_EMISSION: u32 = 0x2000_0000;
-    /// In [`Material::lookups`]: its red gives [`Material::roughness`].
-    pub const FOR_ROUGHNESS: u32 = 0x4000_0000;
+    /// In [`Lookup::purposes`]: gives [`Material::ambient`].
+    pub const FOR_AMBIENT: u32 = 0x1;
+    /// In [`Lookup::purposes`]: gives [`Material::diffuse`].
+    pub const FOR_DIFFUSE: u32 = 0x2;
+    /// In [`Lookup::purposes`]: gives [`Material::specular`].
+    pub const FOR_SPECULAR: u32 = 0x4;
+    /// In [`Lookup::purposes`]: gives [`Material::tint`].
+    pub const FOR_TINT: u32 = 0x8;
+    /// In [`Lookup::purposes`]: gives the normal.
+    pub const FOR_NORMAL: u32 = 0x10;
+    /// In [`Lookup::purposes`]: gives [`Material::emission`].
+    pub const FOR_EMISSION: u32 = 0x20;
+    /// In [`Lookup::purposes`]: gives [`Material::roughness`].
+    pub const FOR_ROUGHNESS: u32 = 0x40;
+    /// In [`Lookup::purposes`]: gives [`Material::sheen`].
+    pub const FOR_SHEEN: u32 = 0x80;
+    /// In [`Lookup::purposes`]: gives the normal of the coat.
+    pub const FOR_COAT_NORMAL: u32 = 0x100;
+    /// In [`Lookup::purposes`]: gives [`Material::metallic`].
+    pub const FOR_METALLIC: u32 = 0x200;
+    /// In [`Lookup::purposes`]: gives [`Material::anisotropy`].
+    pub const FOR_ANISOTROPY: u32 = 0x400;
+    /// In [`Lookup::purposes`]: gives [`Material::specular_weight`].
+    pub const FOR_WEIGHT: u32 = 0x800;
+    /// In [`Lookup::purposes`]: gives [`Material::transmission`].
+    pub const FOR_TRANSMISSION: u32 = 0x1000;
+    /// In [`Lookup::purposes`]: gives [`Material::clearcoat`].
+    pub const FOR_COAT: u32 = 0x2000;
+    /// In [`Lookup::purposes`]: gives [`Material::clearcoat_roughness`].
+    pub const FOR_COAT_ROUGHNESS: u32 = 0x4000;
+    /// In [`Lookup::purposes`]: gives [`Material::sheen_roughness`].
+    pub const FOR_SHEEN_ROUGHNESS: u32 = 0x8000;
+    /// In [`Lookup::purposes`]: gives [`Material::opacity`].
+    pub const FOR_OPACITY: u32 = 0x10000;
+    /// Where the two bits of [`Lookup::channels`] are that say which value gives [`Material::roughness`].
+    pub const ROUGHNESS_CHANNEL: u32 = 0;
+    /// Those of [`Material::metallic`], and so on.
+    pub const METALLIC_CHANNEL: u32 = 1;
+    /// Of [`Material::anisotropy`].
+    pub const ANISOTROPY_CHANNEL: u32 = 2;
+    /// Of [`Material::specular_weight`].
+    pub const WEIGHT_CHANNEL: u32 = 3;
+    /// Of [`Material::transmission`].
+    pub const TRANSMISSION_CHANNEL: u32 = 4;
+    /// Of [`Material::clearcoat`].
+    pub const COAT_CHANNEL: u32 = 5;
+    /// Of [`Material::clearcoat_roughness`].
+    pub const COAT_ROUGHNESS_CHANNEL: u32 = 6;
+    /// Of [`Material::sheen_roughness`].
+    pub const SHEEN_ROUGHNESS_CHANNEL: u32 = 7;
+    /// Of [`Material::opacity`].
+    pub const OPACITY_CHANNEL: u32 = 8;
 
     /// [`Pattern::Grid`].
     pub const GRID: u32 = 0;

@@ -11,7 +11,7 @@ records! {
     pub struct Camera {
         /// The start of perspective rays, the middle of the orthographic image plane.
         pub position: Vec3,
-        /// [`PERSPECTIVE`] or [`ORTHOGRAPHIC`].
+        /// [`PERSPECTIVE`], [`ORTHOGRAPHIC`] or [`PANORAMA`], where `right` and `up` are unit vectors.
         pub projection: u32,
         /// Half the image plane's width.
         pub right: Vec3,
@@ -25,6 +25,14 @@ records! {
         pub forward: Vec3,
         /// Seed of all random patterns.
         pub seed: u32,
+        /// From the middle of the lens to its edge, or its first corner; 0 without a lens.
+        pub lens_u: Vec3,
+        /// Corners of the lens, 0 if it is round.
+        pub blades: u32,
+        /// From the middle of the lens to its edge, at right angles to the other way.
+        pub lens_v: Vec3,
+        /// 1 / (distance of what is sharp); 0 without a lens.
+        pub inverse_focus: f32,
     }
 
     /// What belongs to the scene as a whole.
@@ -41,6 +49,25 @@ records! {
         pub radiance: Vec3,
         /// Where shadow rays to a point of a surface end, as a multiple of the way.
         pub reach: f32,
+        /// Of the image that surrounds the scene, as all below and 0 where there is none: the image's direction to its middle.
+        pub x: Vec3,
+        /// Where its texels start among the scene's: three floats each, row by row from the upper edge, between rows of the poles' means.
+        pub texels: u32,
+        /// The direction to what is a quarter left of its middle.
+        pub y: Vec3,
+        /// Texels in a row.
+        pub width: u32,
+        /// The direction to its upper edge.
+        pub z: Vec3,
+        /// Rows, without those of the poles.
+        pub height: u32,
+        /// Where the table by which cells are chosen starts among the texels: two words each, of how many 2^32nd a cell is chosen itself,
+        /// and which is else.
+        pub cells: u32,
+        /// How densely samples of light lie in a cell, per solid angle, for each unit of the sum of its corners' colours.
+        pub density: f32,
+        /// 0.
+        pub unused: UVec2,
     }
 
     /// Any primitive: local = (x, y, z) (p - anchor) - middle, by the rows of the inverse linear map.
@@ -79,7 +106,7 @@ records! {
     pub struct Material {
         /// [`PHONG`]: factor of the ambient light.
         pub ambient: Vec3,
-        /// [`PHONG`], [`EMITTER`], [`MIRROR`], [`GLASS`] or [`DIFFUSE`].
+        /// [`PHONG`], [`EMITTER`], [`MIRROR`], [`GLASS`], [`DIFFUSE`], [`METAL`], [`ROUGH_GLASS`], [`THIN`] or [`PRINCIPLED`].
         pub kind: u32,
         /// [`PHONG`]: factor of the diffuse term. [`DIFFUSE`]: the share of light that is reflected.
         pub diffuse: Vec3,
@@ -89,21 +116,72 @@ records! {
         pub specular: Vec3,
         /// [`PHONG`]: the exponent, where it is a whole number.
         pub exponent: u32,
-        /// [`MIRROR`]: factor of the reflected light. [`GLASS`]: of the light that passes the surface.
+        /// [`MIRROR`], [`METAL`]: factor of the reflected light. [`GLASS`], [`ROUGH_GLASS`], [`THIN`]: of the light that passes the surface.
         pub tint: Vec3,
-        /// [`GLASS`]: index of refraction of what is behind the surface, relative to what is before it.
+        /// [`GLASS`], [`ROUGH_GLASS`]: index of refraction of what is behind the surface, relative to what is before it. [`THIN`]: of the sheet.
         pub ior: f32,
         /// [`EMITTER`]: the light's colour. Under the integrator `path`, of any kind: the radiance that it sends out.
         pub emission: Vec3,
         /// Under `path`, of what shines: how densely samples of light lie on it, per area, or on an ellipsoid how likely they are on
-        /// it, by its area as `ellipsoid_area` gives that. Else 0.
+        /// it, by its area as `ellipsoid_area` gives that; 1 where a tree chooses what shines, and knows that. Else 0.
         pub density: f32,
-        /// [`GLASS`]: how strongly light is absorbed behind the surface, per length.
+        /// [`GLASS`], [`ROUGH_GLASS`]: how strongly light is absorbed behind the surface, per length.
         pub absorption: Vec3,
-        /// [`DIFFUSE`]: 0 to 1.
+        /// [`DIFFUSE`], [`METAL`], [`ROUGH_GLASS`], [`THIN`]: 0 to 1.
         pub roughness: f32,
-        /// Lookups in textures: a texture's number and the bits of what it is for, 0 for none.
-        pub lookups: UVec4,
+        /// Its lookups in textures: the first, x, and how many there are, y.
+        pub lookups: UVec2,
+        /// [`ROUGH_GLASS`]: the texel where the table of what it lets pass and reflects at once starts. Of [`METAL`] and [`THIN`], too, [`NOTHING`]
+        /// where light that bounces between facets is lost.
+        pub energy: u32,
+        /// 0 here; of a surface that was met what facets lose at once, as a multiple of what they do not.
+        pub loss: f32,
+        /// [`METAL`]: the real part of the index of refraction; 0 where it has none.
+        pub eta: Vec3,
+        /// [`METAL`], [`ROUGH_GLASS`], [`THIN`], [`PRINCIPLED`]: how much rougher they are along their first axis, 0 to 1.
+        pub anisotropy: f32,
+        /// [`METAL`]: the imaginary part of the index of refraction.
+        pub k: Vec3,
+        /// How far the first axis is turned from the texture's u towards its v, in half turns.
+        pub rotation: f32,
+        /// [`PRINCIPLED`], as all below: the colour of its sheen. Its base is `diffuse`, what it reflects head-on has the factor `specular`.
+        pub sheen: Vec3,
+        /// How rough that is.
+        pub sheen_roughness: f32,
+        /// How much of it is metal.
+        pub metallic: f32,
+        /// How much of a dielectric's light passes.
+        pub transmission: f32,
+        /// How much there is of a coat.
+        pub clearcoat: f32,
+        /// How rough that is.
+        pub clearcoat_roughness: f32,
+        /// Factor of what a dielectric reflects.
+        pub specular_weight: f32,
+        /// How much of the surface there is.
+        pub opacity: f32,
+        /// The least of that which counts under [`MASK`].
+        pub cutoff: f32,
+        /// [`OPAQUE`], [`MASK`] or [`BLEND`].
+        pub alpha_mode: u32,
+        /// 1 where it is a thin sheet, else 0.
+        pub thin: u32,
+        /// Of any kind: 1 where the camera's rays go through it, else 0.
+        pub hidden: u32,
+        /// 0.
+        pub unused: UVec2,
+    }
+
+    /// A lookup in a texture, whatever a material wants it for.
+    pub struct Lookup {
+        /// The texture's number.
+        pub texture: u32,
+        /// What it gives: bits such as [`FOR_DIFFUSE`].
+        pub purposes: u32,
+        /// For each number that it gives, in two bits, which of the colour's values: 0 red, 1 green, 2 blue.
+        pub channels: u32,
+        /// 0.
+        pub unused: u32,
     }
 
     /// A texture: first + (second - first) x, where x is what the pattern or the image gives.
@@ -153,16 +231,19 @@ records! {
         pub color: Vec3,
         /// Its number in the scene file.
         pub number: u32,
-        /// Unit normal of a flat one, on the side that shines.
+        /// Unit normal of a flat one, on the side that shines; of a [`SPOT`] the unit vector in which the middle of its light travels.
         pub normal: Vec3,
-        /// Under `path` the primitive's kind, [`POINT`] or [`DIRECTIONAL`].
+        /// Under `path` the primitive's kind, [`POINT`], [`DIRECTIONAL`], [`SPOT`] or [`ENVIRONMENT`].
         pub kind: u32,
-        /// Under `path`: [`Material::density`] of what shines; of a light without extent how likely its samples are.
+        /// Under `path`: [`Material::density`] of what shines; of a light without extent and of the environment how likely its
+        /// samples are. 0 where a tree chooses it.
         pub density: f32,
         /// 1 where the normal's side shines alone, else 2.
         pub sides: u32,
-        /// 0.
-        pub unused: UVec2,
+        /// Of a [`SPOT`]: 1 minus the cosine of the angle between its middle and its edge.
+        pub cone: f32,
+        /// Of a [`SPOT`]: 1 / (the difference of that number at its edge and where its light begins to fall off).
+        pub falloff: f32,
     }
 
     /// A thing that shines, in the table by which one is chosen: it stands for itself up to the threshold, for another one above.
@@ -171,6 +252,35 @@ records! {
         pub threshold: f32,
         /// The number of the other one.
         pub other: u32,
+        /// 0 for a light, else one more than the number of a mesh's instance.
+        pub instance: u32,
+        /// The number of the light, or where the triangle is in its mesh; [`NOTHING`] for the tree over what shines.
+        pub index: u32,
+    }
+
+    /// A node of the tree over much that shines (`light_tree.rs`).
+    pub struct LightNode {
+        /// The middle of a sphere around what is in it.
+        pub center: Vec3,
+        /// The sphere's radius.
+        pub radius: f32,
+        /// The axis of a cone around the normals of what is in it; unit length.
+        pub axis: Vec3,
+        /// The cosine of the angle between the axis and any of these normals.
+        pub cosine: f32,
+        /// The share of all nodes' light that it sends in its brightest direction, 0 to 1.
+        pub intensity: f32,
+        /// The cosine of the angle to a normal beyond which there is no light.
+        pub edge: f32,
+        /// 1, or 2 where the opposite directions get light too.
+        pub sides: u32,
+        /// The node that it is a child of, [`NOTHING`] for the first one of all.
+        pub parent: u32,
+        /// The first of its two children, which lie together; [`NOTHING`] for one thing that shines. What follows is of such.
+        pub children: u32,
+        /// How densely samples of light lie on it once it is chosen, per area; 1 for what has no extent. Of these samples those of the tree
+        /// alone, whose share it is multiplied by.
+        pub density: f32,
         /// 0 for a light, else one more than the number of a mesh's instance.
         pub instance: u32,
         /// The number of the light, or where the triangle is in its mesh.
@@ -188,8 +298,11 @@ records! {
         pub tables: UVec2,
         /// The rows, behind the nodes of the scene's tree, where its items, x, instances, y, and groups' words, z, start.
         pub tree: UVec4,
-        /// The row where the table of emitters starts, x, and how many there are, y.
+        /// The row where the table of emitters starts, x, and how many there are, y; the rows where the nodes of the tree over what shines, z,
+        /// and the numbers of its leaves, w, start.
         pub emitters: UVec4,
+        /// The row where the table of lookups starts, x.
+        pub lookups: UVec4,
         /// How much larger items' boxes count, relative to the coordinates, x; and the largest coordinate of any, y.
         pub room: Vec4,
     }
@@ -276,8 +389,9 @@ records! {
         pub mesh: u32,
         /// The first of the two rows of its mesh's first vertex's tangents, [`NOTHING`] if there are none.
         pub tangents: u32,
-        /// 0.
-        pub unused: u32,
+        /// Where the numbers of its triangles' leaves start in the list of what shines, [`NOTHING`] if none of them shines; 0 where there
+        /// is no tree over what shines.
+        pub leaves: u32,
     }
 
     /// What the ray through a pixel's centre meets first; depth 0 and shape [`NOTHING`] where that is nothing.

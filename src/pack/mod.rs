@@ -5,18 +5,22 @@ mod blocking;
 mod bounds;
 mod constants;
 mod emitters;
+mod energy;
 mod extent_tree;
 pub mod filter;
 mod geometry;
 mod layout;
+pub mod light_tree;
 mod mesh;
 mod origin;
 mod pyramid;
 mod record;
 mod specialization;
+mod surroundings;
 pub mod tree;
 
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -31,6 +35,8 @@ pub use self::layout::*;
 pub use self::mesh::PackedMesh;
 pub use self::record::{Field, Record};
 pub use self::specialization::Specialization;
+use self::surroundings::Surroundings;
+use crate::cpu::lobe::is_polished;
 use crate::film::Form;
 use crate::scene::{
     self, Geometry, Integrator, Parallelogram, Pattern, PixelFilter, PixelFilterKind, Projection, Reflection, Samples,
@@ -46,6 +52,9 @@ const LEAST_EPSILON: f64 = 32.0 / 16_777_216.0;
 
 /// Shadow rays end at least so far before a light's sample, as a part of the way: a light may lie on a surface.
 const BEFORE_LIGHT: f64 = 1e-5;
+
+/// A spot's light falls off over at least so much of the cosine.
+const LEAST_FALLOFF: f64 = 1e-12;
 
 /// A scene as both backends read it.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,8 +89,14 @@ pub struct Packed {
     pub lights: Vec<Light>,
     /// Under the integrator `path`, what light is sampled of: the table by which one is chosen.
     pub emitters: Vec<Emitter>,
+    /// The tree over what shines where that is much, which is then one of the emitters.
+    pub light_nodes: Vec<LightNode>,
+    /// Of each primitive, and of each triangle of the instances of meshes that shine, the number of its node in that tree, else [`NOTHING`].
+    pub light_leaves: Vec<u32>,
     /// How many there are of all these, and where.
     pub counts: Counts,
+    /// What materials look up in textures.
+    pub lookups: Vec<Lookup>,
     /// The textures that materials look up.
     pub textures: Vec<Texture>,
     /// Their images: tables of places, and texels.
@@ -150,7 +165,10 @@ impl Packed {
             materials,
             lights,
             emitters,
+            light_nodes,
+            light_leaves,
             counts,
+            lookups,
             textures,
             texels,
             filter_table,
@@ -172,7 +190,9 @@ impl Packed {
                     &other.lights,
                     &other.emitters,
                 )
-            && (textures, texels, filter_table) == (&other.textures, &other.texels, &other.filter_table)
+            && (light_nodes, light_leaves) == (&other.light_nodes, &other.light_leaves)
+            && (lookups, textures, texels, filter_table)
+                == (&other.lookups, &other.textures, &other.texels, &other.filter_table)
             && (integrator, pixel_samples, adaptive) == (&other.integrator, &other.pixel_samples, &other.adaptive)
             && (nodes, items, instances, group_words)
                 == (&other.nodes, &other.items, &other.instances, &other.group_words)
@@ -198,19 +218,26 @@ impl Packed {
 pub fn pack(scene: &Scene) -> Packed {
     let origin = origin::origin(&scene.camera);
     let scene = &*origin::seen_from(scene, origin);
-    let appearances = Appearances::of(scene);
+    let mut appearances = Appearances::of(scene);
+    let around = Surroundings::of(scene, &mut appearances.texels);
     let mut materials = appearances.materials.clone();
     let exponent_bits = exponent_bits(&scene.materials, &materials);
     let mut primitives = pack_shapes(scene);
     let mut lights = Vec::new();
     for (number, light) in scene.lights.iter().enumerate() {
         let number = number as u32;
-        if let scene::Light::Rectangle { rectangle, color } = light {
+        if let scene::Light::Rectangle {
+            rectangle,
+            color,
+            visible,
+        } = light
+        {
             let shape = scene.shapes.len() as u32 + number;
             primitives.push(parallelogram(RECTANGLE, rectangle, materials.len() as u32, shape));
             materials.push(Material {
                 kind: EMITTER,
                 emission: color.as_vec3(),
+                hidden: (!visible).into(),
                 ..Material::zeroed()
             });
         }
@@ -230,14 +257,24 @@ pub fn pack(scene: &Scene) -> Packed {
         .zip(&order[outside..])
         .map(|(i, (p, casts))| (i, p, *casts))
         .collect();
-    let trees = geometry::trees(scene, &in_tree, |material| blocking::casts_shadow(scene, material));
+    let mut trees = geometry::trees(scene, &in_tree, |material| blocking::casts_shadow(scene, material));
     let is_path = scene.render.integrator == Integrator::Path;
-    let shining = match is_path {
-        true => emitters::emitters(scene, &mut materials, &lights[area_lights..], &order, &trees),
+    let mut shining = match is_path {
+        true => emitters::emitters(
+            scene,
+            &mut materials,
+            &lights[area_lights..],
+            &order,
+            &trees,
+            around.sum(),
+        ),
         false => Shining::default(),
     };
+    for (instance, leaves) in trees.instances.iter_mut().zip(&shining.of_instances) {
+        instance.leaves = *leaves;
+    }
     let (area_lights, lights) = match is_path {
-        true => (0, shining.lights),
+        true => (0, std::mem::take(&mut shining.lights)),
         false => (area_lights, lights),
     };
     let kinds_in_tree = trees.items.iter().fold(0, |bits, item| bits | 1 << (item.kind & 0xff));
@@ -250,7 +287,7 @@ pub fn pack(scene: &Scene) -> Packed {
             lights.len(),
             materials.len(),
             &appearances,
-            shining.emitters.len(),
+            (shining.emitters.len(), shining.nodes.len()),
         )
     };
     let kinds = |end: fn(UVec4) -> u32| {
@@ -267,7 +304,12 @@ pub fn pack(scene: &Scene) -> Packed {
         primitives: kinds(|range| range.z),
         shadow_casters: kinds(|range| range.y),
         in_tree: kinds_in_tree,
-        lights: u32::from(area_lights > 0) | u32::from(lights.len() > area_lights) << 1,
+        lights: u32::from(area_lights > 0)
+            | u32::from(lights.len() > area_lights) << 1
+            | u32::from(lights.iter().any(|light| light.kind == SPOT)) << 2,
+        lens: scene.camera.lens.is_some().into(),
+        panoramic: (scene.camera.projection == Projection::Panorama).into(),
+        hidden: materials.iter().any(|material| material.hidden != 0).into(),
         pixel_pattern: pattern(pixels),
         pixel_side: side(pixels),
         pixel_samples: pixels.count,
@@ -294,7 +336,10 @@ pub fn pack(scene: &Scene) -> Packed {
         texture_kinds: appearances.kinds(),
         texel_formats: appearances.formats(),
         ..match is_path {
-            true => of_paths(scene, &materials, &shining.emitters, &lights),
+            true => Specialization {
+                surroundings: around.bits(scene),
+                ..of_paths(scene, &materials, &appearances, &shining, &lights)
+            },
             false => Specialization::default(),
         }
     };
@@ -313,6 +358,7 @@ pub fn pack(scene: &Scene) -> Packed {
                 .as_ref()
                 .map_or(Vec3::ZERO, |environment| environment.color.as_vec3()),
             reach: reach(scene.render.shadow_epsilon),
+            ..around.record(shining.environment)
         },
         bounds: primitives.iter().map(bounds::sphere).collect(),
         primitives,
@@ -324,7 +370,10 @@ pub fn pack(scene: &Scene) -> Packed {
         materials,
         lights,
         emitters: shining.emitters,
+        light_nodes: shining.nodes,
+        light_leaves: shining.leaves,
         counts,
+        lookups: appearances.lookups,
         textures: appearances.textures,
         texels: appearances.texels,
         filter_table,
@@ -342,7 +391,7 @@ fn counts(
     lights: usize,
     materials: usize,
     appearances: &Appearances,
-    emitters: usize,
+    (emitters, light_nodes): (usize, usize),
 ) -> Counts {
     let mut first = 0;
     let primitives = std::array::from_fn(|kind| {
@@ -360,11 +409,15 @@ fn counts(
     let of_lights = rows(materials, size_of::<Material>());
     let of_textures = of_lights + rows(lights, size_of::<Light>());
     let of_emitters = of_textures + rows(appearances.textures.len(), size_of::<Texture>());
+    let of_lookups = of_emitters + rows(emitters, size_of::<Emitter>());
+    let of_light_nodes = of_lookups + rows(appearances.lookups.len(), size_of::<Lookup>());
+    let of_leaves = of_light_nodes + rows(light_nodes, size_of::<LightNode>());
     Counts {
         primitives,
         lights: UVec2::new(area_lights as u32, lights as u32),
         tables: UVec2::new(of_lights, of_textures),
-        emitters: UVec4::new(of_emitters, emitters as u32, 0, 0),
+        emitters: UVec4::new(of_emitters, emitters as u32, of_light_nodes, of_leaves),
+        lookups: UVec4::new(of_lookups, 0, 0, 0),
         ..Counts::zeroed()
     }
 }
@@ -420,11 +473,21 @@ fn side(samples: Samples) -> u32 {
 
 /// A camera for a picture of `width` x `height` pixels, by coordinates from `origin`.
 pub fn pack_camera(camera: &scene::Camera, origin: DVec3, width: u32, height: u32, seed: u32) -> Camera {
-    let aspect = f64::from(width) / f64::from(height);
+    let aspect = match camera.projection {
+        Projection::Panorama => 1.0, // right and up are unit vectors
+        _ => f64::from(width) / f64::from(height),
+    };
     let (projection, half_height) = match camera.projection {
         Projection::Perspective { fov } => (PERSPECTIVE, (fov / 2.0).tan()),
         Projection::Orthographic { height } => (ORTHOGRAPHIC, height / 2.0),
+        Projection::Panorama => (PANORAMA, 1.0),
     };
+    let lens = camera.lens;
+    // A polygon's first corner is at its top.
+    let (sin, cos) = lens
+        .filter(|lens| lens.blades > 0)
+        .map_or((0.0, 1.0), |lens| (FRAC_PI_2 + lens.rotation).sin_cos());
+    let radius = lens.map_or(0.0, |lens| lens.radius);
     Camera {
         position: (camera.position - origin).as_vec3(),
         projection,
@@ -434,6 +497,10 @@ pub fn pack_camera(camera: &scene::Camera, origin: DVec3, width: u32, height: u3
         height,
         forward: camera.forward.as_vec3(),
         seed,
+        lens_u: ((camera.right * cos + camera.up * sin) * radius).as_vec3(),
+        blades: lens.map_or(0, |lens| lens.blades),
+        lens_v: ((camera.up * cos - camera.right * sin) * radius).as_vec3(),
+        inverse_focus: lens.map_or(0.0, |lens| 1.0 / lens.focus) as f32,
     }
 }
 
@@ -442,6 +509,7 @@ fn is_specular(material: &scene::Material) -> bool {
         Reflection::Phong { .. } | Reflection::Diffuse { .. } => false,
         Reflection::Mirror { .. } | Reflection::Glass { .. } => true,
         Reflection::Conductor { .. } | Reflection::Dielectric { .. } => true,
+        Reflection::Principled(_) => false,
     }
 }
 
@@ -457,20 +525,43 @@ fn exponent_bits(described: &[scene::Material], packed: &[Material]) -> u32 {
     if whole { u32::BITS - largest.leading_zeros() } else { 0 }
 }
 
-/// What the integrator `path` takes as constants, of itself.
-fn of_paths(scene: &Scene, materials: &[Material], emitters: &[Emitter], lights: &[Light]) -> Specialization {
-    let any = |test: fn(&Material) -> bool| u32::from(materials.iter().any(test));
-    let has_lookup = |purpose: u32| {
-        let mut lookups = materials.iter().flat_map(|material| material.lookups.to_array());
-        u32::from(lookups.any(|lookup| lookup & purpose != 0))
+/// Bits of the kinds of materials that may mirror or refract alone.
+fn delta_kinds(materials: &[Material], appearances: &Appearances) -> u32 {
+    let may = |material: &&Material| {
+        let textured = appearances.has_lookup(material, FOR_ROUGHNESS);
+        let faceted = FACET_KINDS >> material.kind & 1 != 0;
+        SPECULAR_KINDS >> material.kind & 1 != 0 || faceted && (textured || is_polished(material))
     };
-    let meshes_shine = emitters.iter().any(|emitter| emitter.instance != 0);
+    materials
+        .iter()
+        .filter(may)
+        .fold(0, |bits, material| bits | 1 << material.kind)
+}
+
+/// What the integrator `path` takes as constants, of itself.
+fn of_paths(
+    scene: &Scene,
+    materials: &[Material],
+    appearances: &Appearances,
+    shining: &Shining,
+    lights: &[Light],
+) -> Specialization {
+    let any = |test: fn(&Material) -> bool| u32::from(materials.iter().any(test));
+    let has_lookup = |purpose: u32| u32::from(appearances.have_lookup(purpose));
+    let emitters = &shining.emitters;
+    let meshes_shine =
+        emitters.iter().any(|emitter| emitter.instance != 0) || shining.nodes.iter().any(|node| node.instance != 0);
     Specialization {
         materials: materials.iter().fold(0, |bits, material| bits | 1 << material.kind),
-        rough: any(|material| material.roughness > 0.0) | has_lookup(FOR_ROUGHNESS),
+        rough: any(|material| material.kind == DIFFUSE && material.roughness > 0.0) | has_lookup(FOR_ROUGHNESS),
+        delta_kinds: delta_kinds(materials, appearances),
+        anisotropic: any(|material| material.anisotropy > 0.0) | has_lookup(FOR_ANISOTROPY),
+        lobes: lobes(materials, appearances),
+        sees_through: any(|material| material.alpha_mode != OPAQUE),
         absorption: any(|material| material.absorption != Vec3::ZERO),
         shines: any(|material| material.density > 0.0),
         emitters: emitters.len().min(2) as u32,
+        light_tree: (!shining.nodes.is_empty()).into(),
         emitter_kinds: lights.iter().fold(u32::from(meshes_shine) << INSTANCE, |bits, light| {
             bits | 1 << light.kind
         }),
@@ -481,6 +572,21 @@ fn of_paths(scene: &Scene, materials: &[Material], emitters: &[Emitter], lights:
         layers: scene.render.alpha.into(),
         ..Specialization::default()
     }
+}
+
+/// The lobes that any principled material has.
+fn lobes(materials: &[Material], appearances: &Appearances) -> u32 {
+    let principled = || materials.iter().filter(|material| material.kind == PRINCIPLED);
+    let lobe = |lobe: u32, textured: u32, has: fn(&Material) -> bool| {
+        let there = principled().any(has) || principled().next().is_some() && appearances.have_lookup(textured);
+        if there { lobe } else { 0 }
+    };
+    lobe(LOBE_SPECULAR, FOR_METALLIC | FOR_WEIGHT, |m| {
+        m.metallic > 0.0 || m.specular_weight > 0.0
+    }) | lobe(LOBE_TRANSMISSION, FOR_TRANSMISSION, |m| m.transmission > 0.0)
+        | lobe(LOBE_COAT, FOR_COAT, |m| m.clearcoat > 0.0)
+        | lobe(LOBE_SHEEN, FOR_SHEEN, |m| m.sheen != Vec3::ZERO)
+        | lobe(LOBE_ANISOTROPY, FOR_ANISOTROPY, |m| m.anisotropy > 0.0)
 }
 
 /// Where shadow rays to a point of a light end, as a multiple of the way.
@@ -498,7 +604,7 @@ fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
         ..Light::zeroed()
     };
     match light {
-        scene::Light::Rectangle { rectangle, color } => Light {
+        scene::Light::Rectangle { rectangle, color, .. } => Light {
             center: rectangle.center.as_vec3(),
             u: rectangle.u.as_vec3(),
             v: rectangle.v.as_vec3(),
@@ -519,7 +625,27 @@ fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
             kind: DIRECTIONAL,
             ..unit
         },
+        scene::Light::Spot {
+            position,
+            direction,
+            color,
+            cone,
+            inner,
+        } => Light {
+            center: position.as_vec3(),
+            color: color.as_vec3(),
+            normal: direction.as_vec3(),
+            kind: SPOT,
+            cone: below_one(*cone) as f32,
+            falloff: (1.0 / (below_one(*cone) - below_one(*inner)).max(LEAST_FALLOFF)) as f32,
+            ..unit
+        },
     }
+}
+
+/// 1 minus the cosine of an angle, without what that loses of small ones.
+pub(crate) fn below_one(angle: f64) -> f64 {
+    2.0 * (angle / 2.0).sin().powi(2)
 }
 
 fn pack_shapes(scene: &Scene) -> Vec<Primitive> {

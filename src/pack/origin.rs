@@ -23,7 +23,7 @@ pub fn seen_from(scene: &Scene, origin: DVec3) -> Cow<'_, Scene> {
     for light in &mut scene.lights {
         match light {
             Light::Rectangle { rectangle, .. } => rectangle.center -= origin,
-            Light::Point { position, .. } => *position -= origin,
+            Light::Point { position, .. } | Light::Spot { position, .. } => *position -= origin,
             Light::Directional { .. } => {}
         }
     }

@@ -54,6 +54,12 @@ struct Level {
 /// The texels of the finest level, row by row from the bottom.
 fn finest(image: &Image) -> impl Fn(usize) -> DVec3 {
     let (width, height) = (image.width as usize, image.height as usize);
+    let texel = linear(image);
+    move |i| texel((height - 1 - i / width) * width + i % width)
+}
+
+/// The texels of an image in linear light, in its own order.
+pub fn linear(image: &Image) -> impl Fn(usize) -> DVec3 {
     let texel: Box<dyn Fn(usize) -> DVec3> = match &image.texels {
         Texels::Bytes(encoding, bytes) => {
             let decode = |value: u32| match encoding {
@@ -65,7 +71,7 @@ fn finest(image: &Image) -> impl Fn(usize) -> DVec3 {
         }
         Texels::Floats(floats) => Box::new(|i| DVec3::from_array(floats[i].map(f64::from))),
     };
-    move |i| texel((height - 1 - i / width) * width + i % width)
+    texel
 }
 
 /// The level after one: each texel the mean over the part of that level that it covers.

@@ -29,8 +29,14 @@ specialization! {
     /// Bit i is set if primitives of kind i are in the scene's tree, the bit of [`INSTANCE`](super::INSTANCE) if instances of
     /// meshes are.
     in_tree = "IN_TREE",
-    /// Bit 0 is set if there are lights with an area, bit 1 if there are others.
+    /// Bit 0 is set if there are lights with an area, bit 1 if there are others, bit 2 if there are spots among these.
     lights = "LIGHTS",
+    /// 1 if the camera has a lens, else 0.
+    lens = "LENS",
+    /// 1 if the camera sees in all directions, else 0.
+    panoramic = "PANORAMIC",
+    /// 1 if anything is hidden from the camera, else 0.
+    hidden = "HIDDEN",
     /// How the samples of a pixel are laid out.
     pixel_pattern = "PIXEL_PATTERN",
     /// Side of their grid of cells; how many there are in patterns without cells.
@@ -69,16 +75,28 @@ specialization! {
     materials = "MATERIALS",
     /// 1 if any diffuse material is rough, else 0.
     rough = "ROUGH",
+    /// Bit i is set if a material of kind i may mirror or refract alone.
+    delta_kinds = "DELTA_KINDS",
+    /// 1 if any material with facets is rougher along one axis, else 0.
+    anisotropic = "ANISOTROPIC",
+    /// The lobes that [`PRINCIPLED`](super::PRINCIPLED) materials have, such as [`LOBE_COAT`](super::LOBE_COAT).
+    lobes = "LOBES",
+    /// 1 if rays pass any surface by its alpha, else 0.
+    sees_through = "SEES_THROUGH",
     /// 1 if anything absorbs light that passes through it, else 0.
     absorption = "ABSORPTION",
     /// 1 if any surface shines, else 0.
     shines = "SHINES",
     /// 0 where no light can be sampled, 1 where there is one emitter, else 2.
     emitters = "EMITTERS",
+    /// 1 where a tree is over what shines, else 0.
+    light_tree = "LIGHT_TREE",
     /// Bit i is set if there are lights of kind i, that of [`INSTANCE`](super::INSTANCE) if meshes shine.
     emitter_kinds = "EMITTER_KINDS",
     /// 1 if a texture says how anything shines, else 0.
     emission_textures = "EMISSION_TEXTURES",
+    /// [`IMAGE_AROUND`](super::IMAGE_AROUND), [`UNSEEN_AROUND`](super::UNSEEN_AROUND), both, or 0.
+    surroundings = "SURROUNDINGS",
     /// From which bounce on paths end at random.
     rr_depth = "RR_DEPTH",
     /// The bits, as an f32, of the largest component of a sample of indirect light; 0 for no such limit.

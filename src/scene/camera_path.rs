@@ -17,6 +17,8 @@ pub struct CameraPath {
     up: Vec<Key<DVec3>>,
     /// Field of view in degrees, or the height that is seen.
     extent: Vec<Key<f64>>,
+    aperture: Vec<Key<f64>>,
+    focus_distance: Vec<Key<f64>>,
     frames: (f64, f64),
     /// The file and the line that it is in, if it is in one.
     place: Option<(String, usize)>,
@@ -30,6 +32,7 @@ impl CameraPath {
         let extent = |key: &CameraKeyDescription| match camera {
             CameraDescription::Perspective(_) => key.fov,
             CameraDescription::Orthographic(_) => key.height,
+            CameraDescription::Panorama(_) => None,
         };
         Some(CameraPath {
             still: camera.clone().with_path(None),
@@ -38,6 +41,8 @@ impl CameraPath {
             look_at: keys(&path.keys, |key| key.look_at),
             up: keys(&path.keys, |key| key.up),
             extent: keys(&path.keys, extent),
+            aperture: keys(&path.keys, |key| key.aperture),
+            focus_distance: keys(&path.keys, |key| key.focus_distance),
             frames: (first.frame, last.frame),
             place: None,
         })
@@ -56,14 +61,25 @@ impl CameraPath {
     /// The camera at a frame, not checked.
     fn description(&self, frame: f64) -> CameraDescription {
         let mut camera = self.still.clone();
-        let (position, look_at, up, extent) = match &mut camera {
-            CameraDescription::Perspective(c) => (&mut c.position, &mut c.look_at, &mut c.up, &mut c.fov),
-            CameraDescription::Orthographic(c) => (&mut c.position, &mut c.look_at, &mut c.up, &mut c.height),
+        let at = |keys: &[Key<f64>]| value(keys, frame, self.interpolation);
+        let (position, look_at, up) = match &mut camera {
+            CameraDescription::Perspective(c) => {
+                c.fov = at(&self.extent).unwrap_or(c.fov);
+                if let Some(aperture) = at(&self.aperture) {
+                    (c.aperture, c.f_number) = (Some(aperture), None); // whichever says how wide the lens is
+                }
+                c.focus_distance = at(&self.focus_distance).or(c.focus_distance);
+                (&mut c.position, &mut c.look_at, &mut c.up)
+            }
+            CameraDescription::Orthographic(c) => {
+                c.height = at(&self.extent).unwrap_or(c.height);
+                (&mut c.position, &mut c.look_at, &mut c.up)
+            }
+            CameraDescription::Panorama(c) => (&mut c.position, &mut c.look_at, &mut c.up),
         };
         for (target, keys) in [(position, &self.position), (look_at, &self.look_at), (up, &self.up)] {
             *target = value(keys, frame, self.interpolation).unwrap_or(*target);
         }
-        *extent = value(&self.extent, frame, self.interpolation).unwrap_or(*extent);
         camera
     }
 

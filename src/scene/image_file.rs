@@ -13,7 +13,7 @@ use super::decode::{Header, LONGEST_SIDE, Refused, decode};
 use super::texture::{Encoding, Image, Texels};
 
 /// The largest file, in bytes.
-const LARGEST_FILE: u64 = 256 << 20;
+const LARGEST_FILE: u64 = 512 << 20;
 /// The largest texel, as of any colour.
 const BRIGHTEST: f32 = 1e6;
 
@@ -94,6 +94,7 @@ impl Assets {
             format: None,
             default,
             encoding: default,
+            is_alpha: false,
         })
     }
 
@@ -103,10 +104,14 @@ impl Assets {
         &self,
         file: &str,
         place: &Place,
-        encoding: Option<Encoding>,
+        part: Part,
         fits: impl Fn(Header) -> Result<(), String>,
     ) -> Result<File, String> {
+        let encoding = part.encoding();
         let Place::File(path) = place else {
+            if part == Part::Alpha {
+                return Err(format!("{file:?} is an image in memory, which has no alpha channel"));
+            }
             return self.image_in_memory(file, encoding, fits);
         };
         let bytes = read(file, path)?;
@@ -130,7 +135,10 @@ impl Assets {
         let (width, height) = (decoded.width(), decoded.height());
         has_texels(file, width, height)?;
         let default = if is_float { Encoding::Linear } else { Encoding::Srgb };
-        let texels = texels(decoded, is_float, encoding.unwrap_or(default));
+        let texels = match part {
+            Part::Colors(_) => texels(decoded, is_float, encoding.unwrap_or(default)),
+            Part::Alpha => alpha(decoded).ok_or_else(|| format!("{file:?} must have an alpha channel"))?,
+        };
         let image = Image { width, height, texels };
         in_range(file, &image)?;
         Ok(File {
@@ -138,6 +146,7 @@ impl Assets {
             format: Some(format),
             default,
             encoding: encoding.unwrap_or(default),
+            is_alpha: part == Part::Alpha,
         })
     }
 
@@ -201,12 +210,31 @@ pub(super) struct File {
     format: Option<ImageFormat>,
     default: Encoding,
     encoding: Encoding,
+    is_alpha: bool,
+}
+
+/// What is taken of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    /// Its colours, with what their values mean if that is said.
+    Colors(Option<Encoding>),
+    /// Its alpha, as gray.
+    Alpha,
+}
+
+impl Part {
+    fn encoding(self) -> Option<Encoding> {
+        match self {
+            Part::Colors(encoding) => encoding,
+            Part::Alpha => Some(Encoding::Linear),
+        }
+    }
 }
 
 impl File {
-    /// Whether it is what another texture names, by another name perhaps, with this encoding.
-    pub fn is(&self, encoding: Option<Encoding>) -> bool {
-        encoding.unwrap_or(self.default) == self.encoding
+    /// Whether it is this part of what another texture names, by another name perhaps.
+    pub fn is(&self, part: Part) -> bool {
+        self.is_alpha == (part == Part::Alpha) && part.encoding().unwrap_or(self.default) == self.encoding
     }
 
     /// Refuses a name that says another format.
@@ -291,6 +319,19 @@ fn texels(image: DynamicImage, is_float: bool, encoding: Encoding) -> Texels {
         colors => colors.into_rgb8().pixels().map(|texel| texel.0).collect(),
     };
     Texels::Bytes(encoding, bytes)
+}
+
+/// The alpha of an image that has it, as gray.
+fn alpha(image: DynamicImage) -> Option<Texels> {
+    if !image.color().has_alpha() {
+        return None;
+    }
+    let bytes = |alpha: Vec<u8>| Texels::Bytes(Encoding::Linear, alpha.into_iter().map(|a| [a; 3]).collect());
+    Some(match image {
+        DynamicImage::ImageLumaA8(gray) => bytes(gray.pixels().map(|texel| texel.0[1]).collect()),
+        DynamicImage::ImageRgba8(colors) => bytes(colors.pixels().map(|texel| texel.0[3]).collect()),
+        deep => Texels::Floats(deep.into_rgba32f().pixels().map(|texel| [texel.0[3]; 3]).collect()),
+    })
 }
 
 /// The linear value of one by the sRGB curve: IEC 61966-2-1.

@@ -13,8 +13,11 @@ mod gray_exr;
 pub(crate) mod image_file;
 mod load;
 mod mesh_file;
+mod metals;
 mod parse;
+mod sky;
 mod spline;
+mod studio;
 pub(crate) mod texture;
 mod validate;
 mod view;
@@ -22,7 +25,7 @@ mod view;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::Mesh;
@@ -35,7 +38,10 @@ pub use description::*;
 pub use error::{KeyPath, Problem, SceneError};
 pub use image_file::Assets;
 pub use load::Overrides;
-pub use texture::{Color, Encoding, Image, NormalMap, Texels, Texture, TextureFilter, TextureKind, Value, Wrap};
+pub use metals::MetalIndex;
+pub use texture::{
+    Channel, Color, Encoding, Image, NormalMap, Texels, Texture, TextureFilter, TextureKind, Value, Wrap,
+};
 pub use view::{ViewSettings, ViewTransform};
 
 /// A checked scene. Lengths have no unit; colours are linear RGB; angles are radians.
@@ -94,6 +100,22 @@ pub struct Camera {
     pub forward: DVec3,
     /// How points are projected.
     pub projection: Projection,
+    /// Its lens, if it has one: perspective cameras alone do.
+    pub lens: Option<Lens>,
+}
+
+/// A thin lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Lens {
+    /// Radius of the opening, that of its corners if it has any, in scene units.
+    pub radius: f64,
+    /// Distance of the plane that is sharp, along the view, in scene units.
+    pub focus: f64,
+    /// Corners of the opening, 3 to 16; 0 if it is round.
+    pub blades: u32,
+    /// In radians, how far the corners are turned to the left, as seen in the picture; at 0 one is at the top.
+    pub rotation: f64,
 }
 
 /// How a camera projects.
@@ -109,6 +131,8 @@ pub enum Projection {
         /// Height of the seen rectangle in scene units.
         height: f64,
     },
+    /// The picture shows all directions: longitude from left to right, latitude from the top down.
+    Panorama,
 }
 
 /// The settings of a render.
@@ -218,8 +242,25 @@ pub struct PixelFilter {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Environment {
-    /// The radiance that comes from everywhere.
+    /// The radiance that comes from everywhere; black beside an image.
     pub color: DVec3,
+    /// What shines from each direction, if it is not the same from everywhere.
+    pub image: Option<EnvironmentImage>,
+    /// Whether the camera sees it. What mirrors or refracts shows it in either case.
+    pub visible: bool,
+}
+
+/// An equirectangular image around a scene: without a turn its middle is towards +x, its left and right edges towards -x, its
+/// upper edge towards +z.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct EnvironmentImage {
+    /// The texels; radiance is bilinear between their centres.
+    pub image: Arc<Image>,
+    /// Factor of the radiance.
+    pub scale: f64,
+    /// How it is turned.
+    pub to_world: DMat3,
 }
 
 /// A surface's appearance.
@@ -232,6 +273,8 @@ pub struct Material {
     pub emission: Color,
     /// What bends its normals.
     pub normal_map: Option<NormalMap>,
+    /// Whether the camera sees it. Its rays go through what it does not see; all other rays do not.
+    pub visible: bool,
 }
 
 /// What a surface does to light that arrives.
@@ -268,10 +311,14 @@ pub enum Reflection {
         /// How rough it is, 0 to 1.
         roughness: Value,
     },
-    /// Polished metal.
+    /// Metal.
     Conductor {
-        /// The share of the light that it reflects, 0 to 1.
+        /// The share of the light that it reflects, 0 to 1; white where it has an index of refraction.
         color: Color,
+        /// Its complex index of refraction; without one it reflects the same share at every angle.
+        index: Option<MetalIndex>,
+        /// How rough it is.
+        facets: Facets,
     },
     /// Clear glass or liquid, by Fresnel's equations.
     Dielectric {
@@ -282,7 +329,105 @@ pub enum Reflection {
         /// How much light it swallows on the way through it, for each unit of length: of every component x, exp(-x) is left
         /// after a length of 1.
         absorption: DVec3,
+        /// Whether it is a thin sheet, behind which all is as before it.
+        thin: bool,
+        /// How rough it is.
+        facets: Facets,
     },
+    /// glTF's metallic-roughness material with its extensions.
+    Principled(Box<Principled>),
+}
+
+/// The material `principled`: of every number the range is 0 to 1, if nothing else is said.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Principled {
+    /// The share of light that a dielectric's ground spreads, or a metal reflects head-on; 0 to 1.
+    pub base_color: Color,
+    /// How much of it is metal.
+    pub metallic: Value,
+    /// How rough it is: the square root of GGX's alpha.
+    pub roughness: Value,
+    /// How much rougher it is along the tangent.
+    pub anisotropy: Value,
+    /// The tangent's angle, counter-clockwise in radians.
+    pub anisotropy_rotation: f64,
+    /// Index of refraction of the dielectric, 1 to 100.
+    pub ior: f64,
+    /// Factor of what the dielectric reflects.
+    pub specular: Value,
+    /// Factor of what it reflects head-on.
+    pub specular_color: Color,
+    /// How much of the dielectric's light passes the surface.
+    pub transmission: Value,
+    /// Whether the surface is a thin sheet, which bends no light.
+    pub thin: bool,
+    /// How much light is swallowed behind a surface that is not thin, for each unit of length: 0 to 1e6.
+    pub absorption: DVec3,
+    /// How much there is of a clear coat.
+    pub clearcoat: Value,
+    /// How rough that is.
+    pub clearcoat_roughness: Value,
+    /// What bends the coat's normals.
+    pub clearcoat_normal_map: Option<NormalMap>,
+    /// The colour of the sheen of cloth, 0 to 1.
+    pub sheen_color: Color,
+    /// How rough the sheen is.
+    pub sheen_roughness: Value,
+    /// How much of the surface there is.
+    pub alpha: Value,
+    /// What `alpha` does.
+    pub alpha_mode: AlphaMode,
+    /// The least alpha of what is there, under [`AlphaMode::Mask`].
+    pub alpha_cutoff: f64,
+}
+
+impl Principled {
+    /// The colours.
+    pub(crate) fn colors(&self) -> [&Color; 3] {
+        [&self.base_color, &self.specular_color, &self.sheen_color]
+    }
+
+    /// The numbers that may come from textures.
+    pub(crate) fn values(&self) -> [&Value; 9] {
+        [
+            &self.metallic,
+            &self.roughness,
+            &self.anisotropy,
+            &self.specular,
+            &self.transmission,
+            &self.clearcoat,
+            &self.clearcoat_roughness,
+            &self.sheen_roughness,
+            &self.alpha,
+        ]
+    }
+}
+
+/// How rough a surface of small facets is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Facets {
+    /// 0 to 1; the facets' alpha is its square.
+    pub roughness: Value,
+    /// How much rougher the surface is along its first axis, 0 to 1.
+    pub anisotropy: f64,
+    /// How far that axis is turned from the direction of the texture's u towards that of its v, in degrees.
+    pub rotation: f64,
+    /// Whether light that bounces between facets is given back.
+    pub compensated: bool,
+}
+
+impl Default for Facets {
+    /// None: polished.
+    fn default() -> Self {
+        Facets {
+            roughness: Value::Plain(0.0),
+            anisotropy: 0.0,
+            rotation: 0.0,
+            compensated: true,
+        }
+    }
 }
 
 /// A source of light.
@@ -296,6 +441,8 @@ pub enum Light {
         rectangle: Parallelogram,
         /// Its colour: under [`Integrator::Path`] its radiance.
         color: DVec3,
+        /// Whether the camera sees it; mirrors do.
+        visible: bool,
     },
     /// A point, not seen by the camera.
     Point {
@@ -311,6 +458,19 @@ pub enum Light {
         direction: DVec3,
         /// Its colour: under [`Integrator::Path`] the irradiance of a surface that faces it.
         color: DVec3,
+    },
+    /// A cone of light from one point, not seen by the camera.
+    Spot {
+        /// Where it is.
+        position: DVec3,
+        /// Unit vector in which the middle of its light travels.
+        direction: DVec3,
+        /// Its colour in the middle, as that of a point.
+        color: DVec3,
+        /// The angle between the middle and the edge in radians, greater than 0, to pi.
+        cone: f64,
+        /// The angle up to which it is as bright as in the middle, 0 to `cone`.
+        inner: f64,
     },
 }
 

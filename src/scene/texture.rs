@@ -24,8 +24,24 @@ impl Color {
 pub enum Value {
     /// One number for all of the surface.
     Plain(f64),
-    /// The red of a texture: index into [`Scene::textures`](super::Scene::textures).
-    Texture(usize),
+    /// One of the values of a texture: index into [`Scene::textures`](super::Scene::textures). [`Channel::A`] is the red of a
+    /// texture of its own, which has the file's alpha as its colour.
+    Texture(usize, Channel),
+}
+
+/// One of the values of a texture. In a file the names are in lower case: `"g"`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Channel {
+    /// Red.
+    #[default]
+    R,
+    /// Green.
+    G,
+    /// Blue.
+    B,
+    /// The alpha channel of the image's file: how opaque it is, never by a curve.
+    A,
 }
 
 /// A texture in tangent space that gives normals.
@@ -163,4 +179,10 @@ pub(crate) fn words(width: u32, height: u32, levels: u32, is_float: bool) -> u64
     let texel = if is_float { 3 } else { 1 };
     let sizes = (0..levels).map(|i| u64::from((width >> i).max(1)) * u64::from((height >> i).max(1)));
     u64::from(levels) + texel * sizes.sum::<u64>()
+}
+
+/// 32-bit words that an image around the scene takes: three a texel, in two rows more than it has, and two for each cell between texels.
+pub(crate) fn words_around(width: u32, height: u32) -> u64 {
+    let (width, height) = (u64::from(width), u64::from(height));
+    3 * width * (height + 2) + 2 * width * (height + 1)
 }

@@ -12,7 +12,7 @@ use wgray::cpu::normal_map::mapped_normal;
 use wgray::cpu::primitive::Tangents;
 use wgray::cpu::ray::{Hit, Ray};
 use wgray::cpu::texture::appearance;
-use wgray::pack::{NOTHING, Packed, TEXTURE_NUMBER};
+use wgray::pack::{NOTHING, Packed};
 
 use super::forms::{HEAD, Sheet, scene};
 use crate::pictures::reference;
@@ -154,7 +154,7 @@ fn normals(packed: &Packed, slot: usize, b: Vec2) -> [Vec3; 2] {
         dv: v,
         ..surface
     };
-    let texture = &packed.textures[(material.lookups.x & TEXTURE_NUMBER) as usize];
+    let texture = &packed.textures[packed.lookups[material.lookups.x as usize].texture as usize];
     [found, mapped_normal(by_triangle, texture, LEAN)]
 }
 

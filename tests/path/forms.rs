@@ -32,6 +32,14 @@ fn a_convex_body_in_a_furnace_has_its_albedo() {
         ("type = 'mirror', tint = [0.8, 0.5, 1]", [0.8, 0.5, 1.0], 1e-5),
         ("type = 'dielectric', ior = 1.5", [1.0; 3], 2e-3),
         ("type = 'glass', ior = 0.7", [1.0; 3], 2e-3),
+        ("type = 'conductor', roughness = 0.7", [1.0; 3], 1e-2),
+        ("type = 'dielectric', ior = 1.5, roughness = 0.5", [1.0; 3], 1e-2),
+        ("type = 'dielectric', ior = 1.5, thin = true", [1.0; 3], 1e-5),
+        (
+            "type = 'dielectric', ior = 1.5, thin = true, roughness = 0.6",
+            [1.0; 3],
+            1e-2,
+        ),
         (
             "type = 'phong', diffuse = [0.8, 0.5, 1], specular = [0, 0, 0], ambient = [0, 0, 0]",
             [0.8, 0.5, 1.0],

@@ -1,4 +1,4 @@
-//! Lights among lights: each is chosen as often as its power says, whatever shines, and what is hidden lights nothing.
+//! Lights among lights: each is chosen as often as its power says and chance, whatever shines, and what is hidden lights nothing.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use wgray::cpu::emitter::chosen_emitter;
 use wgray::cpu::rng::hash4;
 
 use super::{mean, scene};
-use crate::pictures::{both, means, render};
+use crate::pictures::{both, means, reference, render};
 
 const CAMERA: &str = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.3], fov = 50 }\n\
                       materials.m = { type = 'diffuse', color = [0.7, 0.7, 0.7] }\n";
@@ -15,17 +15,17 @@ const FLOOR: &str =
     "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
 
 #[test]
-fn lights_are_chosen_by_their_power() {
-    // Points of power 1 to 40, and one that is dark.
+fn lights_are_chosen_by_their_power_and_a_quarter_of_the_samples_by_chance() {
+    // Points of power 1 to 16, and one that is dark: more of them are in a tree.
     let mut text = format!("{CAMERA}{FLOOR}");
-    for i in 0..=40 {
+    for i in 0..=16 {
         let _ = write!(
             text,
             "[[lights]]\ntype = 'point'\nposition = [{i}, 0, 1]\ncolor = [{i}, {i}, {i}]\n"
         );
     }
     let packed = scene(1, 1, &text);
-    assert_eq!(packed.emitters.len(), 40, "the dark one is none");
+    assert_eq!(packed.emitters.len(), 16, "the dark one is none");
     let mut counts = vec![0.0; packed.lights.len()];
     let calls = 400_000;
     for i in 0..calls {
@@ -33,10 +33,10 @@ fn lights_are_chosen_by_their_power() {
         let emitter = chosen_emitter(&packed, UVec2::new(bits.x, bits.y));
         counts[emitter.index as usize] += 1.0;
     }
-    let total = f64::from(40 * 41 / 2);
+    let total = f64::from(16 * 17 / 2);
     let chi_square: f64 = (packed.lights.iter().zip(&counts))
         .map(|(light, count)| {
-            let share = f64::from(light.color.x) / total;
+            let share = 0.75 * f64::from(light.color.x) / total + 0.25 / 16.0;
             assert!(
                 (f64::from(light.density) - share).abs() < 1e-6,
                 "its density is its share"
@@ -45,7 +45,22 @@ fn lights_are_chosen_by_their_power() {
             (count - expected) * (count - expected) / expected
         })
         .sum();
-    assert!(chi_square < 39.0 + 6.0 * (2.0_f64 * 39.0).sqrt(), "{chi_square}");
+    assert!(chi_square < 15.0 + 6.0 * (2.0_f64 * 15.0).sqrt(), "{chi_square}");
+}
+
+/// A lamp in a landscape with a weak sun, and beside a spot a million times as strong that shines away: neither hides it.
+#[test]
+fn what_lights_nothing_here_hides_no_lamp() {
+    let lamp = "[[lights]]\ntype = 'point'\nposition = [0, 0, 1]\ncolor = [1, 1, 1]\n";
+    let pebble = "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [1e5, 0, 0]\nradius = 1\n";
+    let sun = "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -1]\ncolor = [1e-6, 1e-6, 1e-6]\n";
+    let spot = "[[lights]]\ntype = 'spot'\nposition = [0, 0, 1]\ndirection = [0, 0, 1]\ncone_angle = 40\ncolor = [1e6, 1e6, 1e6]\n";
+    let brightness = |rest: &str| mean(&reference(&scene(256, 1, &format!("{CAMERA}{FLOOR}{lamp}{rest}"))))[1];
+    let alone = brightness("");
+    for rest in [format!("{pebble}{sun}"), spot.to_owned()] {
+        let found = brightness(&rest);
+        assert!((found / alone - 1.0).abs() < 0.05, "{found} {alone} with {rest}");
+    }
 }
 
 #[test]

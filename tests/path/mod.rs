@@ -1,10 +1,17 @@
 //! The integrator `path`: materials by their own laws, scenes whose light mathematics knows, and that every way to sample
 //! light finds the same.
 
+mod alpha;
 mod ends;
+mod environment;
+mod environment_files;
 mod forms;
+mod hidden;
 mod lights;
+mod many_lights;
 mod materials;
+mod principled;
+mod spots;
 mod strategies;
 
 use wgray::pack::Packed;

@@ -18,14 +18,42 @@ fn path_with(changes: &[(&str, &str)]) -> Shaders {
     sources::shaders_with(FILE, &text)
 }
 
+/// Lamps of every kind around a place, so many that a tree chooses among them.
+fn many_lamps() -> String {
+    let lamp = |i: u32| {
+        let [x, y, z] = [
+            f64::from(i % 6) * 0.45 - 1.1,
+            f64::from(i / 6) * 0.45 - 0.7,
+            0.7 + f64::from(i % 4) * 0.05,
+        ];
+        match i % 4 {
+            0 => format!("[[shapes]]\ntype = 'sphere'\nmaterial = 'shine'\ncenter = [{x}, {y}, {z}]\nradius = 0.15\n"),
+            1 => format!(
+                "[[shapes]]\ntype = 'disk'\nmaterial = 'dim'\ncenter = [{x}, {y}, {z}]\nradius = 0.2\nnormal = [{x}, 0.3, -1]\n"
+            ),
+            2 => format!(
+                "[[shapes]]\ntype = 'tetrahedron'\nmaterial = 'shine'\n\
+                 vertices = [[{x}, {y}, {z}], [{}, {y}, {z}], [{x}, {}, {z}], [{x}, {y}, {}]]\n",
+                x + 0.25,
+                y + 0.25,
+                z + 0.25
+            ),
+            _ => format!(
+                "[[lights]]\ntype = 'rectangle'\ncenter = [{x}, {y}, {z}]\nsize = [0.3, 0.2]\nnormal = [{x}, {y}, -3]\n\
+                 tangent = [0, 1, 0.1]\ncolor = [4, 3, 2]\n"
+            ),
+        }
+    };
+    (0..24).map(lamp).collect()
+}
+
 #[test]
 fn light_alone_and_materials_alone_find_the_same() {
     if adapter::device().is_none() {
         return;
     }
     const OF_LIGHT: &str = "select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta)";
-    const OF_MATERIAL: &str =
-        "power_heuristic(state.pdf, emitter_pdf(spot, hit, material, state.path.ray, surface.normal));";
+    const OF_MATERIAL: &str = "power_heuristic(state.pdf, emitter_pdf(spot, seen, density, ray, surface.normal));";
     let light_alone = path_with(&[(OF_LIGHT, "1.0"), (OF_MATERIAL, "0.0;")]);
     let material_alone = path_with(&[(OF_LIGHT, "0.0"), (OF_MATERIAL, "1.0;")]);
     let wrong = path_with(&[(
@@ -48,20 +76,29 @@ fn light_alone_and_materials_alone_find_the_same() {
          [[shapes]]\ntype = 'triangle'\nmaterial = 'dim'\nvertices = [[-1, 1, 0.1], [1, 1, 0.1], [0, 1, 1.5]]\n\
          [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.2, 1.3]\nsize = [1, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [2, 3, 4]\n",
     ];
-    for (i, shape) in shapes.into_iter().enumerate() {
+    let many = many_lamps();
+    let shapes = shapes.into_iter().chain([many.as_str()]);
+    for (i, shape) in shapes.enumerate() {
         let materials = [
             "type = 'diffuse', color = [0.7, 0.6, 0.5]",
             "type = 'diffuse', color = [0.7, 0.6, 0.5], roughness = 0.8",
             "type = 'phong', diffuse = [0.4, 0.4, 0.4], specular = [0.5, 0.5, 0.5], shininess = 12, ambient = [0, 0, 0]",
+            "type = 'conductor', metal = 'copper', roughness = 0.6, anisotropy = 0.5",
+            "type = 'principled', base_color = [0.7, 0.6, 0.5], metallic = 0.3, roughness = 0.6, clearcoat = 0.5, clearcoat_roughness = 0.5, sheen_color = [0.2, 0.3, 0.4], sheen_roughness = 0.5",
         ];
         // Each with one of them, the last with all.
         for material in materials
             .iter()
-            .skip(if i < 5 { i % 3 } else { 0 })
-            .take(if i < 5 { 1 } else { 3 })
+            .skip(if i < 5 { i } else { 0 })
+            .take(if i < 5 { 1 } else { 5 })
         {
             let text = format!("materials.m = {{ {material} }}\n{camera}{shape}");
             let packed = scene(4096, 2, &text);
+            assert_eq!(
+                packed.specialization.light_tree != 0,
+                i == 6,
+                "a tree is over many lamps"
+            );
             // What is seen to shine is left out.
             let seen = mean(&render_with(&scene(4096, 0, &text), Way::Baked, sources::shaders()));
             let reflected = |shaders: &Shaders| {

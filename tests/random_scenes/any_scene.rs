@@ -15,6 +15,7 @@ use wgray::scene::*;
 use crate::meshes::forms::Form;
 use crate::patterns;
 use crate::random::Random;
+use crate::textures::write_exr;
 
 /// Mesh files, and whether they have texture coordinates and normals. They are beside the scenes that failing tests write.
 const MESHES: &[(&str, bool, bool)] = &[
@@ -46,6 +47,12 @@ pub fn folder() -> &'static Path {
             let draft = folder.join(format!("{name}.{}", std::process::id()));
             fs::write(&draft, text).expect("a place for a mesh");
             fs::rename(&draft, folder.join(name)).expect("a place for a mesh");
+        }
+        for (name, width, height) in AROUND {
+            let draft = folder.join(format!("{}.{name}", std::process::id()));
+            let value = || random.pick(&[0.0, 0.1, 0.5, 1.0, 30.0]);
+            write_exr(&draft, *width, *height, |_, _| [value(), value(), value()]);
+            fs::rename(&draft, folder.join(name)).expect("a place for an image");
         }
         folder
     })
@@ -141,23 +148,27 @@ fn textures() -> impl Strategy<Value = BTreeMap<String, TextureDescription>> {
 fn material() -> BoxedStrategy<MaterialDescription> {
     let shininess =
         prop_oneof![3 => select(&[16.0, 1.0, 2.0, 50.0, 4096.0][..]), 1 => select(&[2.5, 0.5, 1e5, 1e-3][..])];
-    let phong = (paint(), paint(), paint(), shininess).prop_map(|(ambient, diffuse, specular, shininess)| {
-        MaterialDescription::Phong(PhongDescription {
-            color: None,
-            ambient: Some(ambient),
-            diffuse: Some(diffuse),
-            specular: Some(specular),
-            shininess,
-            normal_map: None,
-            emission: None,
-        })
-    });
+    let visible = prop_oneof![9 => Just(None), 1 => Just(Some(false))];
+    let phong =
+        (paint(), paint(), paint(), shininess, visible).prop_map(|(ambient, diffuse, specular, shininess, visible)| {
+            MaterialDescription::Phong(PhongDescription {
+                color: None,
+                ambient: Some(ambient),
+                diffuse: Some(diffuse),
+                specular: Some(specular),
+                shininess,
+                normal_map: None,
+                emission: None,
+                visible,
+            })
+        });
     let mirror = color(1.0).prop_map(|tint| {
         let tint = ColorDescription::Plain(tint);
         MaterialDescription::Mirror(MirrorDescription {
             tint,
             normal_map: None,
             emission: None,
+            visible: None,
         })
     });
     let glass = (color(1.0), select(&[1.5, 1.0, 0.7, 2.4][..])).prop_map(|(tint, ior)| {
@@ -167,6 +178,7 @@ fn material() -> BoxedStrategy<MaterialDescription> {
             tint,
             normal_map: None,
             emission: None,
+            visible: None,
         })
     });
     prop_oneof![6 => phong, 1 => mirror, 1 => glass].boxed()
@@ -182,27 +194,99 @@ fn emission() -> impl Strategy<Value = Option<ColorDescription>> {
     ]
 }
 
+/// A number from 0 to 1, often an end, or one of a texture's.
+fn share() -> impl Strategy<Value = ValueDescription> {
+    let texture = (
+        select(&["checker", "lines"][..]).prop_map(str::to_string),
+        select(&[Channel::R, Channel::G, Channel::B][..]),
+    );
+    prop_oneof![
+        3 => Just(ValueDescription::Plain(0.0)),
+        2 => Just(ValueDescription::Plain(1.0)),
+        3 => (0.0..=1.0).prop_map(ValueDescription::Plain),
+        1 => texture.prop_map(|(texture, channel)| ValueDescription::channel(texture, channel)),
+    ]
+}
+
+/// A principled material with some of its lobes.
+fn principled() -> impl Strategy<Value = MaterialDescription> {
+    let shares = proptest::collection::vec(share(), 8);
+    let volume = (select(&[0.0, 1.0][..]), color(1.0), select(&[1.0, 1.3, 1.5, 2.4][..]));
+    let alpha = (
+        select(&[AlphaMode::Opaque, AlphaMode::Opaque, AlphaMode::Blend, AlphaMode::Mask][..]),
+        share(),
+    );
+    (paint(), shares, volume, alpha, -360.0..360.0).prop_map(
+        |(base, shares, (thickness, color, ior), (alpha_mode, alpha), anisotropy_rotation)| {
+            let mut shares = shares.into_iter();
+            let mut next = || shares.next().unwrap();
+            let mut m = PrincipledDescription::default();
+            (m.base_color, m.metallic, m.roughness) = (base, next(), next());
+            (m.anisotropy, m.anisotropy_rotation) = (next(), anisotropy_rotation);
+            (m.specular, m.transmission, m.ior) = (next(), next(), ior);
+            if thickness > 0.0 {
+                (m.thickness, m.attenuation_color, m.attenuation_distance) = (thickness, color, Some(0.7));
+            }
+            (m.clearcoat, m.clearcoat_roughness, m.sheen_roughness) = (next(), next(), next());
+            m.sheen_color = [0.0, 0.5, color.x].into();
+            (m.alpha_mode, m.alpha) = (alpha_mode, alpha);
+            MaterialDescription::Principled(m)
+        },
+    )
+}
+
 /// A material of any kind, for paths.
 fn material_of_paths() -> BoxedStrategy<MaterialDescription> {
     let texture = select(&["checker", "lines"][..]).prop_map(str::to_string);
     let roughness = prop_oneof![
         2 => Just(ValueDescription::Plain(0.0)),
         1 => (0.0..=1.0).prop_map(ValueDescription::Plain),
-        1 => texture.prop_map(|texture| ValueDescription::Texture(TextureReference { texture })),
+        1 => texture.prop_map(ValueDescription::texture),
     ];
-    let diffuse = (paint(), roughness).prop_map(|(color, roughness)| {
+    let diffuse = (paint(), roughness.clone()).prop_map(|(color, roughness)| {
         let mut diffuse = DiffuseDescription::new(color);
         diffuse.roughness = roughness;
         MaterialDescription::Diffuse(diffuse)
     });
-    let conductor = paint().prop_map(|color| MaterialDescription::Conductor(ConductorDescription::new(color)));
+    let facets = (
+        prop_oneof![1 => Just(ValueDescription::default()), 3 => roughness],
+        prop_oneof![3 => Just(0.0), 1 => 0.0..=1.0],
+        -360.0..=360.0,
+        any::<bool>(),
+    );
+    let metal = prop_oneof![
+        2 => paint().prop_map(ConductorDescription::new),
+        1 => Just(ConductorDescription { metal: Some("gold".to_owned()), ..ConductorDescription::default() }),
+        1 => (color(3.0), color(3.0)).prop_map(|(eta, k)| ConductorDescription {
+            eta: Some(eta + 0.01),
+            k: Some(k),
+            ..ConductorDescription::default()
+        }),
+    ];
+    let conductor = (metal, facets.clone()).prop_map(|(mut conductor, facets)| {
+        (
+            conductor.roughness,
+            conductor.anisotropy,
+            conductor.anisotropy_rotation,
+            conductor.energy_compensation,
+        ) = facets;
+        MaterialDescription::Conductor(conductor)
+    });
     let absorption = prop_oneof![Just(DVec3::ZERO), color(3.0)];
-    let dielectric = (select(&[1.5, 1.0, 0.7, 2.4][..]), paint(), absorption).prop_map(|(ior, color, absorption)| {
+    let clear = (select(&[1.5, 1.0, 0.7, 2.4][..]), paint(), absorption, any::<bool>());
+    let dielectric = (clear, facets).prop_map(|((ior, color, absorption, thin), facets)| {
         let mut dielectric = DielectricDescription::new(ior);
-        (dielectric.color, dielectric.absorption) = (color, absorption);
+        (dielectric.color, dielectric.thin) = (color, thin);
+        dielectric.absorption = if thin { DVec3::ZERO } else { absorption };
+        (
+            dielectric.roughness,
+            dielectric.anisotropy,
+            dielectric.anisotropy_rotation,
+            dielectric.energy_compensation,
+        ) = facets;
         MaterialDescription::Dielectric(dielectric)
     });
-    let any = prop_oneof![4 => diffuse, 1 => conductor, 1 => dielectric, 3 => material()];
+    let any = prop_oneof![4 => diffuse, 1 => conductor, 1 => dielectric, 2 => principled(), 3 => material()];
     (any, emission())
         .prop_map(|(mut material, emission)| {
             let own = match &mut material {
@@ -212,6 +296,7 @@ fn material_of_paths() -> BoxedStrategy<MaterialDescription> {
                 MaterialDescription::Diffuse(m) => &mut m.emission,
                 MaterialDescription::Conductor(m) => &mut m.emission,
                 MaterialDescription::Dielectric(m) => &mut m.emission,
+                MaterialDescription::Principled(m) => &mut m.emission,
                 other => panic!("no random scene has the material {other:?}"),
             };
             *own = emission;
@@ -224,16 +309,36 @@ fn material_of_paths() -> BoxedStrategy<MaterialDescription> {
 #[derive(Clone, Debug)]
 struct OfPaths {
     materials: [MaterialDescription; 3],
-    environment: Option<DVec3>,
+    environment: Option<EnvironmentDescription>,
     max_depth: u32,
     rr_depth: Option<u32>,
     clamp: Option<f64>,
     alpha: bool,
 }
 
+/// Images around scenes, beside their meshes: their sizes.
+const AROUND: &[(&str, u32, u32)] = &[("dot.exr", 1, 1), ("odd.exr", 5, 3), ("wide.exr", 64, 32)];
+
+fn surroundings() -> BoxedStrategy<EnvironmentDescription> {
+    let image = (
+        select(AROUND),
+        select(&[1.0, 0.3, 0.0][..]),
+        prop::option::of(-180.0..180.0),
+        any::<bool>(),
+    );
+    let image = image.prop_map(|((file, ..), scale, turn, visible)| {
+        let mut environment = EnvironmentDescription::image(file);
+        environment.scale = scale;
+        environment.rotate = turn.map(|turn| EnvironmentRotation::Any(Rotation::Angles(DVec3::new(turn, 20.0, -turn))));
+        environment.visible = visible;
+        environment
+    });
+    prop_oneof![1 => color(1.0).prop_map(EnvironmentDescription::new), 1 => image].boxed()
+}
+
 fn of_paths() -> BoxedStrategy<OfPaths> {
     let materials = [material_of_paths(), material_of_paths(), material_of_paths()];
-    let environment = prop::option::of(color(1.0));
+    let environment = prop::option::of(surroundings());
     let depths = (
         select(&[0, 1, 2, 5, 12][..]),
         prop::option::of(select(&[0, 1, 3, 1024][..])),
@@ -254,9 +359,16 @@ fn of_paths() -> BoxedStrategy<OfPaths> {
 }
 
 fn light() -> impl Strategy<Value = LightDescription> {
-    let rectangle =
-        (point(), frame(), [length(), length()], color(2.0)).prop_map(|(center, [normal, tangent], size, color)| {
+    let rectangle = (
+        point(),
+        frame(),
+        [length(), length()],
+        color(2.0),
+        prop::bool::weighted(0.8),
+    )
+        .prop_map(|(center, [normal, tangent], size, color, visible)| {
             LightDescription::Rectangle(RectangleLightDescription {
+                visible,
                 center,
                 size,
                 normal,
@@ -268,7 +380,19 @@ fn light() -> impl Strategy<Value = LightDescription> {
         .prop_map(|(position, color)| LightDescription::Point(PointLightDescription { position, color }));
     let directional = (direction(), color(1.0))
         .prop_map(|(direction, color)| LightDescription::Directional(DirectionalLightDescription { direction, color }));
-    prop_oneof![2 => rectangle, 1 => delta, 1 => directional]
+    let angles = (select(&[180.0, 90.0, 40.0, 15.0][..]), select(&[0.0, 0.5, 1.0][..]));
+    let spot =
+        (point(), direction(), color(1.0), angles).prop_map(|(position, direction, color, (cone_angle, share))| {
+            LightDescription::Spot(SpotLightDescription {
+                position,
+                direction: Some(direction),
+                look_at: None,
+                color,
+                cone_angle,
+                inner_angle: share * cone_angle,
+            })
+        });
+    prop_oneof![4 => rectangle, 2 => delta, 2 => directional, 1 => spot]
 }
 
 fn shape() -> impl Strategy<Value = ShapeDescription> {
@@ -439,13 +563,28 @@ fn shapes() -> impl Strategy<Value = Vec<ShapeDescription>> {
 fn camera() -> impl Strategy<Value = CameraDescription> {
     let position = prop_oneof![2 => point().prop_map(|p| p * 3.0 + DVec3::new(0.01, -0.02, 0.03)), 1 => point()];
     let look_at = point().prop_map(|p| p * 0.5);
-    (position, look_at, 20.0..120.0, 0.5..6.0, any::<bool>()).prop_map(|(position, look_at, fov, height, parallel)| {
+    // Pinholes, lenses and, where one draws a number of blades beyond the most, panoramas.
+    let lens = (
+        prop_oneof![2 => Just(None), 1 => (0.0..1.0).prop_map(Some)],
+        prop::option::of(0.1..8.0),
+        0u32..18,
+    );
+    let sizes = (20.0..120.0, 0.5..6.0);
+    (position, look_at, sizes, any::<bool>(), lens).prop_map(|(position, look_at, (fov, height), parallel, lens)| {
+        let (aperture, focus_distance, blades) = lens;
         let up = if (look_at - position).cross(DVec3::Z).length() > 0.1 {
             DVec3::Z
         } else {
             DVec3::new(0.3, 1.0, 0.1)
         };
-        if parallel {
+        if blades > 16 {
+            CameraDescription::Panorama(PanoramaDescription {
+                position,
+                look_at,
+                up,
+                path: None,
+            })
+        } else if parallel {
             CameraDescription::Orthographic(OrthographicDescription {
                 position,
                 look_at,
@@ -454,14 +593,13 @@ fn camera() -> impl Strategy<Value = CameraDescription> {
                 path: None,
             })
         } else {
-            let focal_length = 1.0;
             CameraDescription::Perspective(PerspectiveDescription {
-                position,
-                look_at,
                 up,
-                fov,
-                focal_length,
-                path: None,
+                aperture,
+                focus_distance,
+                blades: if blades < 3 { 0 } else { blades },
+                blade_rotation: fov,
+                ..PerspectiveDescription::new(position, look_at, fov)
             })
         }
     })
@@ -543,7 +681,9 @@ fn described(
     shapes: impl Strategy<Value = Shapes>,
     paths: impl Strategy<Value = Option<OfPaths>> + 'static,
 ) -> impl Strategy<Value = Description> {
-    let lights = prop::collection::vec(light(), 0..4);
+    // Sometimes so many that a tree chooses among them.
+    let few = prop::collection::vec(light(), 0..4);
+    let lights = prop_oneof![9 => few, 1 => prop::collection::vec(light(), 17..40)];
     let materials = [material(), material(), material()];
     let size = (1u32..25, 1u32..25);
     let place = (select(&[1.0, 1.0, 0.001, 1000.0][..]), select(&[0.0, 0.0, 100.0][..]));
@@ -576,9 +716,9 @@ fn described(
                 if let Some(paths) = paths {
                     let names = ["a", "b", "c"].map(str::to_string);
                     d.materials = names.into_iter().zip(paths.materials).collect();
-                    if let Some(color) = paths.environment {
+                    if let Some(environment) = paths.environment {
                         d.render.background = DVec3::ZERO;
-                        d.environment = Some(EnvironmentDescription::new(color));
+                        d.environment = Some(environment);
                     }
                     d.render.integrator = Integrator::Path;
                     d.render.max_depth = paths.max_depth;
@@ -597,7 +737,13 @@ fn described(
 fn moved(d: &mut Description, scale: f64, offset: DVec3) {
     let point = |p: &mut DVec3| *p = *p * scale + offset;
     match &mut d.camera {
-        CameraDescription::Perspective(c) => [&mut c.position, &mut c.look_at].map(point),
+        CameraDescription::Perspective(c) => {
+            for length in [&mut c.aperture, &mut c.focus_distance].into_iter().flatten() {
+                *length *= scale;
+            }
+            [&mut c.position, &mut c.look_at].map(point)
+        }
+        CameraDescription::Panorama(c) => [&mut c.position, &mut c.look_at].map(point),
         CameraDescription::Orthographic(c) => {
             c.height *= scale;
             [&mut c.position, &mut c.look_at].map(point)
@@ -611,6 +757,7 @@ fn moved(d: &mut Description, scale: f64, offset: DVec3) {
                 l.size = l.size.map(|side| side * scale);
             }
             LightDescription::Point(l) => point(&mut l.position),
+            LightDescription::Spot(l) => point(&mut l.position),
             _ => {}
         }
     }

@@ -2,24 +2,38 @@
 
 use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 
-use crate::cpu::dielectric::{dielectric_sample, refracts_inwards, transmittance};
+use crate::cpu::alpha::{ONWARD, is_there, is_veiled};
+use crate::cpu::dielectric::{dielectric_sample, transmittance};
 use crate::cpu::differential::{Arrival, Differential};
-use crate::cpu::diffuse::{angles_at, diffuse_eval, diffuse_pdf, diffuse_sample, rough_diffuse_eval};
+use crate::cpu::diffuse::diffuse_sample;
 use crate::cpu::emitter::{chosen_emitter, emitter_pdf, sample_emitter};
-use crate::cpu::geometry::{arrival_of, closest_hit, is_hidden, material_of, spot_of, surface_of};
+use crate::cpu::environment::light_from_afar;
+use crate::cpu::geometry::{arrival_of, closest_hit, is_hidden, material_of, seen_path, spot_of, surface_of};
+use crate::cpu::light_choice::{Chosen, chosen_light, met_density};
 use crate::cpu::light_sample::power_heuristic;
+use crate::cpu::lobe::{LobeSample, vector_from_lobe, vector_to_lobe};
 use crate::cpu::math::{dot, max, min, normalize};
-use crate::cpu::mesh::{Spot, face_lets_pass};
-use crate::cpu::modified_phong::{modified_phong_eval, modified_phong_pdf, modified_phong_sample, phong_factors};
-use crate::cpu::path::{Path, is_specular, mirrored_path, usable_normal};
-use crate::cpu::phong::is_lit;
+use crate::cpu::mesh::Spot;
+use crate::cpu::metal::metal_fresnel;
+use crate::cpu::modified_phong::modified_phong_sample;
+use crate::cpu::path::{Path, mirrored_path, passed_path, reflected_path, refracted_path};
 use crate::cpu::pixel::{Layers, camera_sample};
+use crate::cpu::primitive::Tangents;
+use crate::cpu::principled::{Mixture, principled_sample};
 use crate::cpu::ray::{Hit, Ray};
 use crate::cpu::rng::{hash4, unit_float};
+use crate::cpu::scattering::{
+    NO_MIXTURE, absorption_behind, albedo, bounded, facet_frame, facet_sample, facets_of, has_facets, has_inside,
+    is_delta, lets_light, lets_through, lit_normal, local_wo, mixture_at, reflection, shaded_normal, turned_over,
+};
 use crate::cpu::sequence::sobol_bits;
 use crate::cpu::surface::{Surface, largest};
 use crate::cpu::texture::appearance;
-use crate::pack::{DIFFUSE, EMITTER, Emitter, FAR, GLASS, INSTANCE, Material, NOTHING, NOWHERE, PHONG, Packed, RANDOM};
+use crate::cpu::thin::thin_reflectance;
+use crate::pack::{
+    DIFFUSE, EMITTER, FAR, GLASS, IMAGE_AROUND, INSTANCE, METAL, MOST_PASSED, Material, NOTHING, NOWHERE, OPAQUE,
+    PHONG, PRINCIPLED, Packed, RANDOM, ROUGH_GLASS, THIN, UNSEEN_AROUND,
+};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathState {
@@ -33,21 +47,29 @@ pub struct PathState {
     pub ended: bool,
     pub layers: Layers,
     pub described: bool,
+    pub start: Vec3,
+    pub start_normal: Vec3,
+    pub way: f32,
+    pub passed: u32,
 }
 
 #[inline(always)]
 pub fn begin_path(scene: &Packed, pixel: UVec2, sample: u32) -> PathState {
     let start = camera_sample(scene, pixel, sample);
+    let mut path = Path {
+        ray: start.ray,
+        differential: start.differential,
+        throughput: Vec3::ONE,
+        depth: 0,
+        branch: 0,
+        left: NOWHERE,
+        wall: NOWHERE,
+    };
+    if scene.specialization.hidden != 0 {
+        path = seen_path(scene, path);
+    }
     PathState {
-        path: Path {
-            ray: start.ray,
-            differential: start.differential,
-            throughput: Vec3::ONE,
-            depth: 0,
-            branch: 0,
-            left: NOWHERE,
-            wall: NOWHERE,
-        },
+        path,
         radiance: Vec3::ZERO,
         pdf: 0.0,
         eta2: 1.0,
@@ -57,6 +79,10 @@ pub fn begin_path(scene: &Packed, pixel: UVec2, sample: u32) -> PathState {
         ended: false,
         layers: Layers::default(),
         described: false,
+        start: Vec3::ZERO,
+        start_normal: Vec3::ZERO,
+        way: 0.0,
+        passed: 0,
     }
 }
 
@@ -68,30 +94,62 @@ pub fn advance(scene: &Packed, before: PathState, pixel: UVec2) -> PathState {
     let hit = closest_hit(scene, path.ray, path.left, path.wall);
     if hit.primitive == NOTHING {
         state.ended = true;
-        let shown = (s.alpha == 0) | (path.depth > 0);
-        let found = path.throughput * scene.environment.radiance;
+        let shown = ((s.alpha == 0) & (s.surroundings & UNSEEN_AROUND == 0)) | (path.depth > 0);
+        let arriving = if s.surroundings & IMAGE_AROUND != 0 {
+            light_from_afar(scene, path.ray.direction, state.pdf)
+        } else {
+            scene.environment.radiance
+        };
+        let found = path.throughput * arriving;
         return with_radiance(scene, state, found, shown, path.depth);
     }
     let spot = spot_of(scene, hit);
     let mut surface = surface_of(scene, &spot, hit, path.ray);
     let at = arrival_of(scene, &spot, hit, surface, path.ray, path.differential);
     let looked;
-    let (material, normal) = if s.lookups == 0 {
-        (material_of(scene, &spot), surface.shading_normal)
+    let faceted;
+    let (mut material, normal, coat_normal) = if s.lookups == 0 {
+        let normal = surface.shading_normal;
+        (material_of(scene, &spot), normal, normal)
     } else {
         let look = appearance(scene, &spot, hit, material_of(scene, &spot), surface, at, s.lookups);
         looked = bounded(look.material);
-        (&looked, look.normal)
+        (&looked, look.normal, look.coat_normal)
     };
     if s.absorption != 0 {
-        let inside = (material.kind == GLASS) & (surface.side < 0.0);
+        let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
         let absorption = if inside { material.absorption } else { state.absorption };
         state.path.throughput *= transmittance(absorption, hit.t);
+    }
+    if s.sees_through != 0
+        && !is_there(
+            scene,
+            material,
+            pixel,
+            state.sample,
+            path.depth,
+            ONWARD,
+            hit,
+            surface.side,
+        )
+    {
+        return past(scene, state, surface, at, hit.t);
     }
     if s.shines != 0 {
         state = with_emission(scene, state, &spot, hit, surface, material, true);
     }
     surface.shading_normal = shaded_normal(surface, material, normal);
+    state.way = 0.0;
+    let mixed;
+    let mixture = if material.kind == PRINCIPLED {
+        let frame = facet_frame(scene, surface, material);
+        surface.du = frame.u;
+        surface.dv = frame.v;
+        mixed = mixture_at(scene, &surface, material, coat_normal);
+        &mixed
+    } else {
+        &NO_MIXTURE
+    };
     if s.layers != 0 {
         state = described(state, surface, material);
     }
@@ -106,31 +164,47 @@ pub fn advance(scene: &Packed, before: PathState, pixel: UVec2) -> PathState {
     if (s.materials & !(1 << DIFFUSE | 1 << EMITTER) != 0) | (s.rr_depth < s.bounces) {
         choices = decision_set(scene, UVec2::new(other_key.z, other_key.w), state.sample);
     }
-    if is_specular(material) {
+    if is_delta(material) {
         state = scattered_specularly(scene, state, surface, at, material, unit_float(choices.x));
     } else {
         if s.in_tree & (1 << INSTANCE) != 0 {
             surface.start += surface.bulge;
+        }
+        if has_facets(material) {
+            let frame = facet_frame(scene, surface, material);
+            surface.du = frame.u;
+            surface.dv = frame.v;
+            faceted = facets_of(scene, &surface, *material);
+            material = &faceted;
         }
         if s.emitters != 0 {
             let mut bits = UVec2::ZERO;
             if s.emitters > 1 {
                 bits = decision_set(scene, UVec2::new(other_key.x, other_key.y), state.sample);
             }
+            let mut chosen = Chosen {
+                emitter: chosen_emitter(scene, bits),
+                density: 0.0,
+            };
+            if s.light_tree != 0 {
+                let normal = lit_normal(&surface, material);
+                let level_key = UVec2::new(other_key.x, other_key.y);
+                chosen = chosen_light(scene, chosen.emitter, surface.start, normal, level_key, state.sample);
+            }
             let u = decision(scene, UVec2::new(key.x, key.y), state.sample);
-            state = with_light(
-                scene,
-                state,
-                &spot,
-                &surface,
-                material,
-                chosen_emitter(scene, bits),
-                u,
-                true,
-            );
+            state = with_light(scene, state, &spot, &surface, material, mixture, chosen, u, true, pixel);
         }
         let u = decision(scene, UVec2::new(key.z, key.w), state.sample);
-        state = scattered(scene, state, &spot, &surface, material, u, unit_float(choices.x));
+        state = scattered(
+            scene,
+            state,
+            &spot,
+            &surface,
+            material,
+            mixture,
+            u,
+            unit_float(choices.x),
+        );
     }
     if s.rr_depth < s.bounces {
         state = with_roulette(scene, state, unit_float(choices.y));
@@ -209,35 +283,36 @@ pub fn with_emission(
         return state;
     }
     let mut weight = 1.0;
-    if (state.pdf > 0.0) & (scene.specialization.emitters != 0) {
-        let other = emitter_pdf(spot, hit, material, state.path.ray, surface.normal);
+    let mut weighs = (state.pdf > 0.0) & (scene.specialization.emitters != 0);
+    let mut density = material.density;
+    if scene.specialization.light_tree != 0 {
+        density = met_density(scene, hit, weighs, state.start, state.start_normal);
+        weighs &= density > 0.0;
+    }
+    if weighs {
+        let mut ray = state.path.ray;
+        let mut seen = hit;
+        if scene.specialization.sees_through != 0 {
+            ray.origin -= ray.direction * state.way;
+            seen.t += state.way;
+        }
+        let other = emitter_pdf(spot, seen, density, ray, surface.normal);
         weight = power_heuristic(state.pdf, other);
     }
     let found = state.path.throughput * material.emission * weight;
     with_radiance(scene, state, found, true, state.path.depth)
 }
 
-#[inline(always)]
-pub fn shaded_normal(surface: Surface, material: &Material, normal: Vec3) -> Vec3 {
-    if is_specular(material) {
-        let usable = usable_normal(surface, normal);
-        if (material.kind == GLASS) && !refracts_inwards(&surface, material, usable) {
-            return surface.normal;
-        }
-        return usable;
+pub fn past(scene: &Packed, before: PathState, surface: Surface, at: Arrival, t: f32) -> PathState {
+    let mut state = before;
+    state.path = passed_path(before.path, surface, at);
+    if scene.specialization.hidden != 0 && before.path.depth == 0 {
+        state.path = seen_path(scene, state.path);
     }
-    normal
-}
-
-pub fn bounded(found: Material) -> Material {
-    let mut material = found;
-    let bounded = |color: Vec3| color.map(|x| if x > 1.0 { 1.0 } else { x });
-    if found.kind == DIFFUSE {
-        material.diffuse = bounded(found.diffuse);
-    }
-    material.tint = bounded(found.tint);
-    material.roughness = min(found.roughness, 1.0);
-    material
+    state.way += t;
+    state.passed += 1;
+    state.ended |= state.passed > MOST_PASSED;
+    state
 }
 
 #[inline(always)]
@@ -247,23 +322,11 @@ pub fn described(before: PathState, surface: Surface, material: &Material) -> Pa
         state.layers.emission.w = 1.0;
         state.layers.normal = (surface.shading_normal * surface.side).extend(0.0);
     }
-    if !state.described & !is_specular(material) {
+    if !state.described & !is_delta(material) {
         state.layers.albedo = (state.path.throughput * albedo(material)).extend(0.0);
         state.described = true;
     }
     state
-}
-
-pub fn albedo(material: &Material) -> Vec3 {
-    if material.kind == PHONG {
-        let factors = phong_factors(material);
-        return factors.diffuse + factors.specular;
-    }
-    if material.kind == DIFFUSE {
-        material.diffuse
-    } else {
-        Vec3::ZERO
-    }
 }
 
 #[inline(always)]
@@ -277,7 +340,7 @@ pub fn scattered_specularly(
 ) -> PathState {
     let mut state = before;
     state.pdf = 0.0;
-    let mut path = if material.kind == GLASS {
+    let mut path = if (material.kind == GLASS) | (material.kind == ROUGH_GLASS) {
         let passage = dielectric_sample(before.path, surface, at, material, random);
         state.eta2 = before.eta2 * passage.eta * passage.eta;
         if scene.specialization.absorption != 0 && passage.passes {
@@ -288,41 +351,25 @@ pub fn scattered_specularly(
             };
         }
         passage.path
+    } else if material.kind == THIN {
+        let cosine = dot(surface.wo, surface.shading_normal);
+        if random >= thin_reflectance(material.ior, cosine) {
+            let throughput = before.path.throughput * material.tint;
+            refracted_path(before.path, surface, at, throughput, 1.0, cosine, cosine)
+        } else {
+            reflected_path(before.path, surface, at, before.path.throughput)
+        }
     } else {
-        mirrored_path(before.path, surface, at, material).onward
+        let mut onward = mirrored_path(before.path, surface, at, material).onward;
+        if material.kind == METAL {
+            let cosine = dot(surface.wo, surface.shading_normal);
+            onward.throughput = before.path.throughput * metal_fresnel(material, cosine);
+        }
+        onward
     };
     path.ray.direction = normalize(path.ray.direction);
     state.path = path;
     state
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reflection {
-    pub value: Vec3,
-    pub pdf: f32,
-}
-
-#[inline(always)]
-pub fn reflection(scene: &Packed, spot: &Spot, surface: &Surface, material: &Material, wi: Vec3) -> Reflection {
-    let angles = angles_at(surface.shading_normal, surface.wo, wi);
-    let (value, pdf) = if material.kind == PHONG {
-        (
-            modified_phong_eval(material, angles),
-            modified_phong_pdf(material, angles),
-        )
-    } else if material.roughness > 0.0 {
-        (rough_diffuse_eval(material, angles), diffuse_pdf(angles))
-    } else {
-        (diffuse_eval(material, angles), diffuse_pdf(angles))
-    };
-    let mut lit = is_lit(surface, wi);
-    if scene.specialization.in_tree & (1 << INSTANCE) != 0 {
-        lit &= face_lets_pass(spot, surface, wi);
-    }
-    Reflection {
-        value: if lit { value } else { Vec3::ZERO },
-        pdf,
-    }
 }
 
 #[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
@@ -333,15 +380,30 @@ pub fn with_light(
     spot: &Spot,
     surface: &Surface,
     material: &Material,
-    emitter: Emitter,
+    mixture: &Mixture,
+    chosen: Chosen,
     u: Vec2,
     wanted: bool,
+    pixel: UVec2,
 ) -> PathState {
-    let light = sample_emitter(scene, emitter, surface.start, u);
-    let reflected = reflection(scene, spot, surface, material, normalize(light.to));
+    let light = sample_emitter(scene, chosen, surface.start, u);
+    let reflected = reflection(scene, spot, surface, material, mixture, normalize(light.to));
     let mut found = state.path.throughput * reflected.value * light.radiance * (1.0 / light.pdf);
+    let mut from_side = *surface;
+    let mut to = light.to;
+    let mut absorption = state.absorption;
+    if lets_through(material) & (dot(surface.normal, to) < 0.0) {
+        from_side = turned_over(scene, surface);
+        to = light.to
+            + if light.reach < 2.0 {
+                surface.start - from_side.start
+            } else {
+                Vec3::ZERO
+            };
+        absorption = absorption_behind(absorption, surface, material);
+    }
     if scene.specialization.absorption != 0 {
-        found *= transmittance(state.absorption, light.reach * dot(light.to, light.to).sqrt());
+        found *= transmittance(absorption, light.reach * dot(light.to, light.to).sqrt());
     }
     found *= if light.is_delta {
         1.0
@@ -350,10 +412,17 @@ pub fn with_light(
     };
     let most = largest(found);
     let dark = !(wanted && most > 0.0 && most < FAR);
-    let hidden = is_hidden(scene, dark, surface, light.to, light.reach, light.primitive);
+    if scene.specialization.sees_through != 0 {
+        let bounce = state.path.depth + 1;
+        let (reach, goal) = (light.reach, light.primitive);
+        let veiled = is_veiled(scene, dark, &from_side, to, reach, goal, pixel, state.sample, bounce);
+        return with_radiance(scene, state, found, !veiled, bounce);
+    }
+    let hidden = is_hidden(scene, dark, &from_side, to, light.reach, light.primitive);
     with_radiance(scene, state, found, !hidden, state.path.depth + 1)
 }
 
+#[expect(clippy::too_many_arguments, reason = "the twin of a WGSL function has its arguments")]
 #[inline(always)]
 pub fn scattered(
     scene: &Packed,
@@ -361,30 +430,90 @@ pub fn scattered(
     spot: &Spot,
     surface: &Surface,
     material: &Material,
+    mixture: &Mixture,
     u: Vec2,
     random: f32,
 ) -> PathState {
-    let mut state = before;
-    let wi = if material.kind == PHONG {
-        modified_phong_sample(material, surface.shading_normal, surface.wo, u, random)
+    let mut state = if has_facets(material) {
+        let frame = Tangents {
+            u: surface.du,
+            v: surface.dv,
+        };
+        let wo = vector_to_lobe(frame, surface.shading_normal, surface.wo);
+        let found = facet_sample(material, wo, u, random);
+        scattered_by_lobe(scene, before, spot, surface, material, found)
+    } else if material.kind == PRINCIPLED {
+        let found = principled_sample(mixture, local_wo(surface), u, random, scene.specialization.lobes);
+        scattered_by_lobe(scene, before, spot, surface, material, found)
     } else {
-        diffuse_sample(surface.shading_normal, u)
+        let wi = if material.kind == PHONG {
+            modified_phong_sample(material, surface.shading_normal, surface.wo, u, random)
+        } else {
+            diffuse_sample(surface.shading_normal, u)
+        };
+        let reflected = reflection(scene, spot, surface, material, mixture, wi);
+        let factor = reflected.value * if reflected.pdf > 0.0 { 1.0 / reflected.pdf } else { 0.0 };
+        let path = Path {
+            ray: Ray {
+                origin: surface.start,
+                direction: wi,
+            },
+            differential: Differential::default(),
+            throughput: before.path.throughput * factor,
+            depth: before.path.depth + 1,
+            branch: 0,
+            left: surface.above,
+            wall: surface.below,
+        };
+        PathState {
+            path,
+            pdf: reflected.pdf,
+            ..before
+        }
     };
-    let reflected = reflection(scene, spot, surface, material, wi);
-    let factor = reflected.value * if reflected.pdf > 0.0 { 1.0 / reflected.pdf } else { 0.0 };
+    if scene.specialization.light_tree != 0 {
+        state.start = surface.start;
+        state.start_normal = lit_normal(surface, material);
+    }
+    state
+}
+
+#[inline(always)]
+pub fn scattered_by_lobe(
+    scene: &Packed,
+    before: PathState,
+    spot: &Spot,
+    surface: &Surface,
+    material: &Material,
+    found: LobeSample,
+) -> PathState {
+    let mut state = before;
+    let frame = Tangents {
+        u: surface.du,
+        v: surface.dv,
+    };
+    let wi = normalize(vector_from_lobe(frame, surface.shading_normal, found.wi));
+    let lit = lets_light(scene, spot, surface, material, wi);
+    let weight = if lit { found.weight } else { Vec3::ZERO };
+    let mut from_side = *surface;
+    if found.wi.z < 0.0 {
+        from_side = turned_over(scene, surface);
+        state.eta2 = before.eta2 * found.eta * found.eta;
+        state.absorption = absorption_behind(before.absorption, surface, material);
+    }
     state.path = Path {
         ray: Ray {
-            origin: surface.start,
+            origin: from_side.start,
             direction: wi,
         },
         differential: Differential::default(),
-        throughput: before.path.throughput * factor,
+        throughput: before.path.throughput * weight,
         depth: before.path.depth + 1,
         branch: 0,
-        left: surface.above,
-        wall: surface.below,
+        left: from_side.above,
+        wall: from_side.below,
     };
-    state.pdf = reflected.pdf;
+    state.pdf = found.pdf;
     state
 }
 

@@ -3,8 +3,8 @@
 use glam::{UVec2, Vec3};
 
 use crate::cpu::differential::Differential;
-use crate::cpu::geometry::{arrival_of, closest_hit, hidden_samples, material_of, spot_of, surface_of};
-use crate::cpu::light::segments_to_light;
+use crate::cpu::geometry::{arrival_of, closest_hit, hidden_samples, material_of, seen_path, spot_of, surface_of};
+use crate::cpu::light::{segments_to_light, spot_falloff};
 use crate::cpu::mesh::Spot;
 use crate::cpu::path::{Path, Scattered, glass_path, is_specular, mirrored_path, usable_normal};
 use crate::cpu::phong::{Lobes, phong_block, unlit_samples};
@@ -14,7 +14,7 @@ use crate::cpu::sampling::{decision_bits, sample_key};
 use crate::cpu::shadow::Block;
 use crate::cpu::surface::Surface;
 use crate::cpu::texture::appearance;
-use crate::pack::{BLOCK, EMITTER, GRID, LEAVES, Light, MIRROR, Material, NOTHING, NOWHERE, Packed, SPLITS};
+use crate::pack::{BLOCK, EMITTER, GRID, LEAVES, Light, MIRROR, Material, NOTHING, NOWHERE, Packed, SPLITS, SPOT};
 
 pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVec2, sample: u32) -> Vec3 {
     let bounces = scene.specialization.bounces;
@@ -27,8 +27,11 @@ pub fn radiance(scene: &Packed, ray: Ray, differential: Differential, pixel: UVe
         left: NOWHERE,
         wall: NOWHERE,
     };
+    if scene.specialization.hidden != 0 {
+        path = seen_path(scene, path);
+    }
     if bounces == 0 {
-        let hit = closest_hit(scene, path.ray, NOWHERE, NOWHERE);
+        let hit = closest_hit(scene, path.ray, path.left, path.wall);
         if hit.primitive == NOTHING {
             return scene.environment.background;
         }
@@ -108,8 +111,12 @@ pub fn radiance_from(scene: &Packed, spot: &Spot, hit: Hit, path: Path, pixel: U
         sum += phong_radiance(material, light, lobes, scene.environment.light_weight);
     }
     for light in delta_lights {
-        let lobes = lobes_of_light(scene, spot, &surface, material, light, GRID, 1, 1, pixel, sample);
-        sum += phong_radiance(material, light, lobes, 1.0);
+        let mut light = *light;
+        if light.kind == SPOT {
+            light.color *= spot_falloff(&light, light.center - surface.position);
+        }
+        let lobes = lobes_of_light(scene, spot, &surface, material, &light, GRID, 1, 1, pixel, sample);
+        sum += phong_radiance(material, &light, lobes, 1.0);
     }
     sum
 }

@@ -6,7 +6,8 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::scene::{
-    Color, Geometry, Light, Material, Overrides, Parallelogram, Pattern, Projection, Reflection, Samples, Scene, Value,
+    Color, Facets, Geometry, Light, Material, Overrides, Parallelogram, Pattern, Projection, Reflection, Samples,
+    Scene, Value,
 };
 
 /// A file of the course, one key a line.
@@ -121,7 +122,7 @@ fn a_file_of_the_course_is_a_scene_with_z_up() {
     assert_eq!(scene.render.max_depth, 10);
     assert_eq!((scene.render.background, &scene.environment), (DVec3::ZERO, &None));
 
-    let [Light::Rectangle { rectangle, color }] = &scene.lights[..] else {
+    let [Light::Rectangle { rectangle, color, .. }] = &scene.lights[..] else {
         panic!("{:?}", scene.lights);
     };
     let Parallelogram { center, u, v } = rectangle;
@@ -135,10 +136,13 @@ fn a_file_of_the_course_is_a_scene_with_z_up() {
     let plain_of = |reflection| Material {
         reflection,
         emission: Color::BLACK,
+        visible: true,
         normal_map: None,
     };
     let mirror = Reflection::Conductor {
         color: plain(1.0, 0.9, 0.8),
+        index: None,
+        facets: Facets::default(),
     };
     let red = Reflection::Diffuse {
         color: plain(0.63, 0.065, 0.05),

@@ -14,10 +14,12 @@ tagged! {
         "perspective" => Perspective(PerspectiveDescription),
         /// All rays are parallel.
         "orthographic" => Orthographic(OrthographicDescription),
+        /// Rays go from the camera's position in all directions.
+        "panorama" => Panorama(PanoramaDescription),
     }
 }
 
-/// A pinhole camera.
+/// A pinhole camera, or one with a thin lens.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PerspectiveDescription {
@@ -30,9 +32,24 @@ pub struct PerspectiveDescription {
     pub up: DVec3,
     /// Vertical field of view in degrees.
     pub fov: f64,
-    /// Distance of the image plane, without effect in a pinhole camera.
+    /// Focal length of the lens in scene units, of which `f_number` is told; without effect otherwise.
     #[serde(default = "one")]
     pub focal_length: f64,
+    /// Diameter of the lens in scene units; 0 for a pinhole camera, which it is if nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub aperture: Option<f64>,
+    /// The focal length over the diameter, in place of `aperture`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub f_number: Option<f64>,
+    /// Distance of the plane that is sharp, along the view; that of `look_at` if nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub focus_distance: Option<f64>,
+    /// Corners of the lens, 3 to 16; 0 if it is round.
+    #[serde(default)]
+    pub blades: u32,
+    /// In degrees, how far the corners are turned to the left, as seen in the picture; at 0 one is at the top.
+    #[serde(default)]
+    pub blade_rotation: f64,
     /// How it moves from frame to frame, if it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<CameraPathDescription>,
@@ -47,6 +64,11 @@ impl PerspectiveDescription {
             up: z_up(),
             fov,
             focal_length: one(),
+            aperture: None,
+            f_number: None,
+            focus_distance: None,
+            blades: 0,
+            blade_rotation: 0.0,
             path: None,
         }
     }
@@ -83,12 +105,41 @@ impl OrthographicDescription {
     }
 }
 
+/// A camera that sees in all directions.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct PanoramaDescription {
+    /// Where all rays start.
+    pub position: DVec3,
+    /// The point in the middle of the picture.
+    pub look_at: DVec3,
+    /// Which way is up.
+    #[serde(default = "z_up")]
+    pub up: DVec3,
+    /// How it moves from frame to frame, if it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path: Option<CameraPathDescription>,
+}
+
+impl PanoramaDescription {
+    /// A camera with z upwards.
+    pub fn new(position: impl Into<DVec3>, look_at: impl Into<DVec3>) -> Self {
+        Self {
+            position: position.into(),
+            look_at: look_at.into(),
+            up: z_up(),
+            path: None,
+        }
+    }
+}
+
 impl CameraDescription {
     /// How it moves from frame to frame, if it does.
     pub fn path(&self) -> Option<&CameraPathDescription> {
         match self {
             CameraDescription::Perspective(camera) => camera.path.as_ref(),
             CameraDescription::Orthographic(camera) => camera.path.as_ref(),
+            CameraDescription::Panorama(camera) => camera.path.as_ref(),
         }
     }
 
@@ -97,6 +148,7 @@ impl CameraDescription {
         match &mut self {
             CameraDescription::Perspective(camera) => camera.path = path.into(),
             CameraDescription::Orthographic(camera) => camera.path = path.into(),
+            CameraDescription::Panorama(camera) => camera.path = path.into(),
         }
         self
     }

@@ -58,6 +58,12 @@ pub struct CameraKeyDescription {
     /// Height of the seen rectangle in scene units, of orthographic cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height: Option<f64>,
+    /// Diameter of the lens in scene units, of perspective cameras.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub aperture: Option<f64>,
+    /// Distance of the plane that is sharp, of perspective cameras.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub focus_distance: Option<f64>,
 }
 
 impl CameraKeyDescription {
@@ -70,6 +76,8 @@ impl CameraKeyDescription {
             up: None,
             fov: None,
             height: None,
+            aperture: None,
+            focus_distance: None,
         }
     }
 

@@ -15,6 +15,8 @@ tagged! {
         "point" => Point(PointLightDescription),
         /// Light from infinitely far away.
         "directional" => Directional(DirectionalLightDescription),
+        /// A cone of light from one point.
+        "spot" => Spot(SpotLightDescription),
     }
 }
 
@@ -32,6 +34,13 @@ pub struct RectangleLightDescription {
     pub tangent: DVec3,
     /// Linear RGB.
     pub color: DVec3,
+    /// Whether the camera sees it.
+    #[serde(default = "yes")]
+    pub visible: bool,
+}
+
+fn yes() -> bool {
+    true
 }
 
 impl RectangleLightDescription {
@@ -49,6 +58,7 @@ impl RectangleLightDescription {
             normal: normal.into(),
             tangent: tangent.into(),
             color: color.into(),
+            visible: yes(),
         }
     }
 }
@@ -89,6 +99,46 @@ impl DirectionalLightDescription {
         Self {
             direction: direction.into(),
             color: color.into(),
+        }
+    }
+}
+
+/// A cone of light from one point, without falloff with the distance. It has a direction or looks at a point.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpotLightDescription {
+    /// Where it is.
+    pub position: DVec3,
+    /// In which the middle of its light travels; any length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction: Option<DVec3>,
+    /// The point that the middle of its light goes to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub look_at: Option<DVec3>,
+    /// Linear RGB in the middle.
+    pub color: DVec3,
+    /// From the middle to where its light ends, in degrees.
+    pub cone_angle: f64,
+    /// From the middle to where its light begins to fall off, in degrees.
+    #[serde(default)]
+    pub inner_angle: f64,
+}
+
+impl SpotLightDescription {
+    /// A light at this position that shines towards a point, of linear RGB and this angle in degrees between its middle and its edge.
+    pub fn new(
+        position: impl Into<DVec3>,
+        look_at: impl Into<DVec3>,
+        color: impl Into<DVec3>,
+        cone_angle: f64,
+    ) -> Self {
+        Self {
+            position: position.into(),
+            direction: None,
+            look_at: Some(look_at.into()),
+            color: color.into(),
+            cone_angle,
+            inner_angle: 0.0,
         }
     }
 }

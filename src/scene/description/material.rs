@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::tagged::{ReadError, Tagged, tagged};
-use super::{ColorDescription, NormalMapDescription, ValueDescription};
+use super::{ColorDescription, NormalMapDescription, PrincipledDescription, ValueDescription};
 
 tagged! {
     /// `[materials.NAME]`
@@ -18,10 +18,33 @@ tagged! {
         "glass" => Glass(GlassDescription),
         /// Matt, for `integrator = "path"`.
         "diffuse" => Diffuse(DiffuseDescription),
-        /// Polished metal, for `integrator = "path"`.
+        /// Metal, for `integrator = "path"`.
         "conductor" => Conductor(ConductorDescription),
         /// Clear glass or liquid, for `integrator = "path"`.
         "dielectric" => Dielectric(DielectricDescription),
+        /// glTF's material, for `integrator = "path"`.
+        "principled" => Principled(PrincipledDescription),
+    }
+}
+
+impl MaterialDescription {
+    /// The numbers that may come from textures.
+    pub(in crate::scene) fn values(&self) -> Vec<&ValueDescription> {
+        match self {
+            Self::Diffuse(diffuse) => vec![&diffuse.roughness],
+            Self::Principled(principled) => vec![
+                &principled.metallic,
+                &principled.roughness,
+                &principled.anisotropy,
+                &principled.specular,
+                &principled.transmission,
+                &principled.clearcoat,
+                &principled.clearcoat_roughness,
+                &principled.sheen_roughness,
+                &principled.alpha,
+            ],
+            _ => Vec::new(),
+        }
     }
 }
 
@@ -44,6 +67,8 @@ pub struct PhongDescription {
     pub normal_map: Option<NormalMapDescription>,
     /// Radiance that it sends out, for `integrator = "path"`; black if absent.
     pub emission: Option<ColorDescription>,
+    /// Whether the camera sees it; yes if absent.
+    pub visible: Option<bool>,
 }
 
 impl PhongDescription {
@@ -57,6 +82,7 @@ impl PhongDescription {
             shininess: sixteen(),
             normal_map: None,
             emission: None,
+            visible: None,
         }
     }
 }
@@ -72,6 +98,8 @@ pub struct MirrorDescription {
     pub normal_map: Option<NormalMapDescription>,
     /// Radiance that it sends out, for `integrator = "path"`; black if absent.
     pub emission: Option<ColorDescription>,
+    /// Whether the camera sees it; yes if absent.
+    pub visible: Option<bool>,
 }
 
 /// Clear glass.
@@ -87,6 +115,8 @@ pub struct GlassDescription {
     pub normal_map: Option<NormalMapDescription>,
     /// Radiance that it sends out, for `integrator = "path"`; black if absent.
     pub emission: Option<ColorDescription>,
+    /// Whether the camera sees it; yes if absent.
+    pub visible: Option<bool>,
 }
 
 impl GlassDescription {
@@ -97,6 +127,7 @@ impl GlassDescription {
             tint: ColorDescription::default(),
             normal_map: None,
             emission: None,
+            visible: None,
         }
     }
 }
@@ -114,6 +145,8 @@ pub struct DiffuseDescription {
     pub normal_map: Option<NormalMapDescription>,
     /// Radiance that it sends out; black if absent.
     pub emission: Option<ColorDescription>,
+    /// Whether the camera sees it; yes if absent.
+    pub visible: Option<bool>,
 }
 
 impl DiffuseDescription {
@@ -124,63 +157,122 @@ impl DiffuseDescription {
             roughness: ValueDescription::default(),
             normal_map: None,
             emission: None,
+            visible: None,
         }
     }
 }
 
-/// Polished metal.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct ConductorDescription {
-    /// The share of the light that it reflects.
-    #[serde(default)]
-    pub color: ColorDescription,
-    /// What bends its normals.
-    pub normal_map: Option<NormalMapDescription>,
-    /// Radiance that it sends out; black if absent.
-    pub emission: Option<ColorDescription>,
+/// How rough a surface of facets is.
+macro_rules! faceted {
+    ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $ty:ty,)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            $($(#[$field_doc])* pub $field: $ty,)*
+            /// How rough it is, 0 to 1.
+            #[serde(default)]
+            pub roughness: ValueDescription,
+            /// How much rougher it is along its first axis, 0 to 1.
+            #[serde(default)]
+            pub anisotropy: f64,
+            /// How far that axis is turned from the direction of the texture's u towards that of its v, in degrees.
+            #[serde(default)]
+            pub anisotropy_rotation: f64,
+            /// Whether light that bounces between facets is given back.
+            #[serde(default = "yes")]
+            pub energy_compensation: bool,
+            /// What bends its normals.
+            pub normal_map: Option<NormalMapDescription>,
+            /// Radiance that it sends out; black if absent.
+            pub emission: Option<ColorDescription>,
+            /// Whether the camera sees it; yes if absent.
+            pub visible: Option<bool>,
+        }
+    };
+}
+
+faceted! {
+    /// Metal, polished or rough. One of `color`, `metal`, and `eta` with `k` says what it reflects.
+    ConductorDescription {
+        /// The share of the light that it reflects; all if nothing else is said.
+        color: Option<ColorDescription>,
+        /// The name of a metal.
+        metal: Option<String>,
+        /// The real part of its index of refraction.
+        eta: Option<DVec3>,
+        /// The imaginary part.
+        k: Option<DVec3>,
+    }
 }
 
 impl ConductorDescription {
-    /// Metal that reflects this share of the light.
+    /// Polished metal that reflects this share of the light.
     pub fn new(color: impl Into<ColorDescription>) -> Self {
         Self {
-            color: color.into(),
-            normal_map: None,
-            emission: None,
+            color: Some(color.into()),
+            ..Self::default()
         }
     }
 }
 
-/// Clear glass or liquid.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct DielectricDescription {
-    /// Index of refraction.
-    pub ior: f64,
-    /// Factor of the light that passes the surface.
-    #[serde(default)]
-    pub color: ColorDescription,
-    /// How much light it swallows, for each unit of length.
-    #[serde(default)]
-    pub absorption: DVec3,
-    /// What bends its normals.
-    pub normal_map: Option<NormalMapDescription>,
-    /// Radiance that it sends out; black if absent.
-    pub emission: Option<ColorDescription>,
+impl Default for ConductorDescription {
+    /// Polished metal that reflects all light.
+    fn default() -> Self {
+        Self {
+            color: None,
+            metal: None,
+            eta: None,
+            k: None,
+            roughness: ValueDescription::default(),
+            anisotropy: 0.0,
+            anisotropy_rotation: 0.0,
+            energy_compensation: yes(),
+            normal_map: None,
+            emission: None,
+            visible: None,
+        }
+    }
+}
+
+faceted! {
+    /// Clear glass or liquid, or a sheet of it, polished or rough.
+    DielectricDescription {
+        /// Index of refraction.
+        ior: f64,
+        /// Factor of the light that passes the surface.
+        #[serde(default)]
+        color: ColorDescription,
+        /// How much light it swallows, for each unit of length.
+        #[serde(default)]
+        absorption: DVec3,
+        /// Whether it is a thin sheet, behind which all is as before it.
+        #[serde(default)]
+        thin: bool,
+    }
 }
 
 impl DielectricDescription {
-    /// One that colours no light.
+    /// Polished, and one that colours no light.
     pub fn new(ior: f64) -> Self {
         Self {
             ior,
             color: ColorDescription::default(),
             absorption: DVec3::ZERO,
+            thin: false,
+            roughness: ValueDescription::default(),
+            anisotropy: 0.0,
+            anisotropy_rotation: 0.0,
+            energy_compensation: yes(),
             normal_map: None,
             emission: None,
+            visible: None,
         }
     }
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn sixteen() -> f64 {

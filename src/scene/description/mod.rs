@@ -6,9 +6,11 @@
 
 mod camera;
 mod camera_path;
+mod environment;
 mod light;
 mod material;
 mod mesh;
+mod principled;
 mod render;
 mod shape;
 pub(super) mod tagged;
@@ -17,16 +19,17 @@ mod texture;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::{Assets, ViewTransform};
 
 pub use self::camera::*;
 pub use self::camera_path::*;
+pub use self::environment::*;
 pub use self::light::*;
 pub use self::material::*;
 pub use self::mesh::*;
+pub use self::principled::*;
 pub use self::render::*;
 pub use self::shape::*;
 pub use self::texture::*;
@@ -144,7 +147,8 @@ impl Description {
             _ => None,
         });
         let meshes = self.meshes.values().map(|mesh| &mesh.file);
-        let files: BTreeSet<&String> = images.chain(shapes).chain(meshes).collect();
+        let around = (self.environment.iter()).filter_map(|environment| environment.file.as_ref());
+        let files: BTreeSet<&String> = images.chain(shapes).chain(meshes).chain(around).collect();
         files.into_iter().map(move |file| folder.join(file))
     }
 }
@@ -174,21 +178,6 @@ impl ImageDescription {
             view_transform: ViewTransform::default(),
             exposure: 0.0,
         }
-    }
-}
-
-/// What surrounds the scene, for `integrator = "path"`.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct EnvironmentDescription {
-    /// Radiance from everywhere; linear RGB.
-    pub color: DVec3,
-}
-
-impl EnvironmentDescription {
-    /// This radiance from everywhere, in linear RGB.
-    pub fn new(color: impl Into<DVec3>) -> Self {
-        Self { color: color.into() }
     }
 }
 

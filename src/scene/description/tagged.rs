@@ -24,6 +24,7 @@ macro_rules! tagged {
         #[derive(Clone, Debug, PartialEq, Serialize)]
         #[serde(tag = "type")]
         #[non_exhaustive]
+        #[allow(clippy::large_enum_variant, reason = "a scene has few of them")]
         pub enum $name {
             $($(#[$variant_doc])* #[serde(rename = $tag)] $variant($body),)+
         }

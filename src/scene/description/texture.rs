@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::tagged::{ReadError, Tagged, tagged};
-use crate::scene::{Encoding, TextureFilter, Wrap};
+use crate::scene::{Channel, Encoding, TextureFilter, Wrap};
 
 /// A colour of a material: `[r, g, b]` or `{ texture = "NAME" }`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -66,14 +66,14 @@ impl<'de> Deserialize<'de> for ColorDescription {
     }
 }
 
-/// A number of a material: `0.5` or `{ texture = "NAME" }`.
+/// A number of a material: `0.5` or `{ texture = "NAME", channel = "g" }`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum ValueDescription {
     /// The same everywhere.
     Plain(f64),
-    /// A texture's red.
-    Texture(TextureReference),
+    /// One of a texture's values.
+    Texture(ChannelReference),
 }
 
 impl Default for ValueDescription {
@@ -92,7 +92,15 @@ impl From<f64> for ValueDescription {
 impl ValueDescription {
     /// The red of a texture, by its name.
     pub fn texture(name: impl Into<String>) -> Self {
-        Self::Texture(TextureReference { texture: name.into() })
+        Self::channel(name, Channel::default())
+    }
+
+    /// One of the values of a texture, by its name.
+    pub fn channel(name: impl Into<String>, channel: Channel) -> Self {
+        Self::Texture(ChannelReference {
+            texture: name.into(),
+            channel,
+        })
     }
 }
 
@@ -121,7 +129,7 @@ impl<'de> Deserialize<'de> for ValueDescription {
             }
 
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
-                TextureReference::deserialize(MapAccessDeserializer::new(map)).map(ValueDescription::Texture)
+                ChannelReference::deserialize(MapAccessDeserializer::new(map)).map(ValueDescription::Texture)
             }
         }
 
@@ -135,6 +143,20 @@ impl<'de> Deserialize<'de> for ValueDescription {
 pub struct TextureReference {
     /// Name of the texture.
     pub texture: String,
+}
+
+/// `{ texture = "NAME", channel = "r" }`
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a table, such as { texture = \"NAME\", channel = \"g\" }"
+)]
+pub struct ChannelReference {
+    /// Name of the texture.
+    pub texture: String,
+    /// Which of its values.
+    #[serde(default)]
+    pub channel: Channel,
 }
 
 /// `{ texture = "NAME", strength = 1 }`

@@ -189,12 +189,20 @@ fn read_camera(mut camera: Table) -> Result<CameraDescription, Problem> {
             ("look_at", first(|key| key.look_at)),
             ("up", first(|key| key.up)),
         ];
-        let extent = match camera.get("type").and_then(Value::as_str) {
-            Some("orthographic") => ("height", path.keys.iter().find_map(|key| key.height)),
-            _ => ("fov", path.keys.iter().find_map(|key| key.fov)),
+        let number = |of: fn(&CameraKeyDescription) -> Option<f64>| path.keys.iter().find_map(of).map(Value::from);
+        let mut numbers = match camera.get("type").and_then(Value::as_str) {
+            Some("orthographic") => vec![("height", number(|key| key.height))],
+            Some("panorama") => vec![],
+            _ => vec![
+                ("fov", number(|key| key.fov)),
+                ("focus_distance", number(|key| key.focus_distance)),
+                ("aperture", number(|key| key.aperture)),
+            ],
         };
-        let extent = (extent.0, extent.1.map(Value::from));
-        for (name, value) in points.into_iter().chain([extent]) {
+        if camera.contains_key("f_number") {
+            numbers.retain(|(name, _)| *name != "aperture");
+        }
+        for (name, value) in points.into_iter().chain(numbers) {
             if let (false, Some(value)) = (camera.contains_key(name), value) {
                 camera.insert(name.to_owned(), value);
             }

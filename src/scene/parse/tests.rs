@@ -33,7 +33,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "far = 3",
             1,
-            "camera.far: unknown key; the keys here are \"type\", \"position\", \"look_at\", \"up\", \"fov\", \"focal_length\", \"path\"",
+            "camera.far: unknown key; the keys here are \"type\", \"position\", \"look_at\", \"up\", \"fov\", \"focal_length\", \"aperture\", \"f_number\", \"focus_distance\", \"blades\", \"blade_rotation\", \"path\"",
         ),
         (
             "[film]\n",
@@ -43,12 +43,12 @@ fn bad_text_is_told_with_its_line() {
         (
             "type = 'fisheye'",
             1,
-            "camera.type: \"fisheye\" must be one of \"perspective\", \"orthographic\"",
+            "camera.type: \"fisheye\" must be one of \"perspective\", \"orthographic\", \"panorama\"",
         ),
         (
             "type = 3",
             1,
-            "camera.type: 3 must be one of \"perspective\", \"orthographic\"",
+            "camera.type: 3 must be one of \"perspective\", \"orthographic\", \"panorama\"",
         ),
         ("focal_length = '1'", 1, "camera.focal_length: \"1\" must be a number"),
         (
@@ -87,7 +87,11 @@ fn bad_text_is_told_with_its_line() {
         ),
         ("[render]\nclamp = 'off'", 2, "render.clamp: \"off\" must be a number"),
         ("[render]\nalpha = 1", 2, "render.alpha: 1 must be a boolean"),
-        ("[environment]", 1, "environment.color: is missing"),
+        (
+            "[environment]\nname = 'moon'",
+            2,
+            "environment.name: \"moon\" must be \"studio\" or \"sky\"",
+        ),
         (
             "[environment]\ncolor = 1",
             2,
@@ -101,7 +105,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[materials.a]\ntype = 'diffuse'\ncolor = [1, 1, 1]\nroughness = { file = 'a' }",
             4,
-            "materials.a.roughness.file: unknown key; the keys here are \"texture\"",
+            "materials.a.roughness.file: unknown key; the keys here are \"texture\", \"channel\"",
         ),
         ("[materials.a]\ntype = 'diffuse'", 1, "materials.a.color: is missing"),
         ("[materials.a]\ntype = 'dielectric'", 1, "materials.a.ior: is missing"),
@@ -130,7 +134,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[materials.red]\ncolor = [1, 0, 0]",
             1,
-            "materials.red.type: is missing; it is one of \"phong\", \"mirror\", \"glass\", \"diffuse\", \"conductor\", \"dielectric\"",
+            "materials.red.type: is missing; it is one of \"phong\", \"mirror\", \"glass\", \"diffuse\", \"conductor\", \"dielectric\", \"principled\"",
         ),
         (
             "[materials.\"a b\"]\ntype = 'phong'\nshininess = 'x'",

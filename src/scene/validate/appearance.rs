@@ -5,12 +5,12 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::super::decode::Header;
-use super::super::image_file::{File, Place};
-use super::super::texture::{levels, words};
+use super::super::image_file::{File, Part, Place};
+use super::super::texture::{levels, words, words_around};
 use super::super::{
-    Assets, ColorDescription, Encoding, Image, ImageTextureDescription, Integrator, Material, MaterialDescription,
-    NormalMap, NormalMapDescription, PhongDescription, Reflection, Texels, Texture, TextureDescription, TextureKind,
-    Value, ValueDescription,
+    Assets, Channel, ChannelReference, ColorDescription, ConductorDescription, Encoding, Facets, Image,
+    ImageTextureDescription, Integrator, Material, MaterialDescription, MetalIndex, NormalMap, NormalMapDescription,
+    PhongDescription, Reflection, Texels, Texture, TextureDescription, TextureKind, Value, ValueDescription,
 };
 use super::path::needs_path;
 use super::{At, BTreeMap, Checked, Color, Problem, between, check, color, list, number, show_pair};
@@ -57,34 +57,58 @@ impl<'a> Images<'a> {
         }
     }
 
-    fn image(&mut self, texture: &ImageTextureDescription) -> Result<Arc<Image>, String> {
-        let file = &texture.file;
+    fn image(&mut self, texture: &ImageTextureDescription, part: Part) -> Result<Arc<Image>, String> {
+        let needs_levels = texture.filter.needs_levels();
+        self.with_words(&texture.file, part, |header| {
+            let Header { width, height, is_deep } = header;
+            let levels = if needs_levels { levels(width, height) } else { 1 };
+            words(width, height, levels, is_deep)
+        })
+    }
+
+    /// The image that surrounds the scene: its texels lie apart from those of a texture of the same file.
+    pub(super) fn around(&mut self, file: &str) -> Result<Arc<Image>, String> {
+        let others = self.taken;
+        let image = self.with_words(file, Part::Colors(None), |header| {
+            words_around(header.width, header.height)
+        })?;
+        let words = words_around(image.width, image.height);
+        // A file that a texture has too was counted with the larger of both.
+        if self.taken - others < 4 * words {
+            let bytes = others + 4 * words;
+            if bytes > TEXEL_MEMORY {
+                return Err(too_much(file, (image.width, image.height), 4 * words, others));
+            }
+            self.taken = bytes;
+        }
+        Ok(image)
+    }
+
+    /// Counts an image of the program's own that surrounds the scene.
+    pub(super) fn own(&mut self, name: &str, image: &Image) -> Result<(), String> {
+        let bytes = 4 * words_around(image.width, image.height);
+        if self.taken + bytes > TEXEL_MEMORY {
+            return Err(too_much(name, (image.width, image.height), bytes, self.taken));
+        }
+        self.taken += bytes;
+        Ok(())
+    }
+
+    /// An image of a file or of memory, of which so many words are rendered from.
+    fn with_words(&mut self, file: &str, part: Part, wanted: impl Fn(Header) -> u64) -> Result<Arc<Image>, String> {
         let place = self.assets.find(file)?;
         let known = self.files.entry(place.clone()).or_default();
         let taken = self.taken;
         // With what it takes already.
         let fits = |header: Header, before: u64| {
-            let Header { width, height, is_deep } = header;
-            let levels = if texture.filter.needs_levels() {
-                levels(width, height)
-            } else {
-                1
-            };
-            let words = words(width, height, levels, is_deep).max(before);
+            let words = wanted(header).max(before);
             let (bytes, others) = (4 * words, taken - 4 * before);
             match bytes + others <= TEXEL_MEMORY {
                 true => Ok(words),
-                false => {
-                    let mib = |bytes: u64| format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20));
-                    let (bytes, others, limit) = (mib(bytes), mib(others), mib(TEXEL_MEMORY));
-                    Err(format!(
-                        "{file:?}, {width} x {height} texels, takes {bytes}, the textures before it {others}; \
-                         together they must fit {limit}"
-                    ))
-                }
+                false => Err(too_much(file, (header.width, header.height), bytes, others)),
             }
         };
-        if let Some((known, before)) = known.iter_mut().find(|(known, _)| known.is(texture.encoding)) {
+        if let Some((known, before)) = known.iter_mut().find(|(known, _)| known.is(part)) {
             known.check_name(file)?;
             let words = fits(Header::of(&known.image), *before)?;
             self.taken += 4 * (words - *before);
@@ -93,13 +117,21 @@ impl<'a> Images<'a> {
         }
         let read = self
             .assets
-            .image(file, &place, texture.encoding, |header| fits(header, 0).map(|_| ()))?;
+            .image(file, &place, part, |header| fits(header, 0).map(|_| ()))?;
         let words = fits(Header::of(&read.image), 0)?;
         self.taken += 4 * words;
         let image = Arc::clone(&read.image);
         known.push((read, words));
         Ok(image)
     }
+}
+
+fn too_much(file: &str, (width, height): (u32, u32), bytes: u64, others: u64) -> String {
+    let mib = |bytes: u64| format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20));
+    let (bytes, others, limit) = (mib(bytes), mib(others), mib(TEXEL_MEMORY));
+    format!(
+        "{file:?}, {width} x {height} texels, takes {bytes}, the textures before it {others}; together they must fit {limit}"
+    )
 }
 
 pub(super) fn texture(description: &TextureDescription, images: &mut Images) -> Checked<Texture> {
@@ -130,20 +162,23 @@ pub(super) fn texture(description: &TextureDescription, images: &mut Images) -> 
                 transform: transform(grid.scale, grid.rotate, grid.offset)?,
             }
         }
-        TextureDescription::Image(texture) => {
-            let max_anisotropy = between(texture.max_anisotropy, 1.0, LONGEST_FOOTPRINT).at("max_anisotropy")?;
-            let transform = transform(texture.scale, texture.rotate, texture.offset)?;
-            let image = images.image(texture).map_err(Problem::new).at("file")?;
-            Texture {
-                kind: TextureKind::Image {
-                    image,
-                    wrap: texture.wrap,
-                    filter: texture.filter,
-                    max_anisotropy,
-                },
-                transform,
-            }
-        }
+        TextureDescription::Image(texture) => image_texture(texture, Part::Colors(texture.encoding), images)?,
+    })
+}
+
+/// A texture of a part of an image.
+fn image_texture(texture: &ImageTextureDescription, part: Part, images: &mut Images) -> Checked<Texture> {
+    let max_anisotropy = between(texture.max_anisotropy, 1.0, LONGEST_FOOTPRINT).at("max_anisotropy")?;
+    let transform = transform(texture.scale, texture.rotate, texture.offset)?;
+    let image = images.image(texture, part).map_err(Problem::new).at("file")?;
+    Ok(Texture {
+        kind: TextureKind::Image {
+            image,
+            wrap: texture.wrap,
+            filter: texture.filter,
+            max_anisotropy,
+        },
+        transform,
     })
 }
 
@@ -178,8 +213,37 @@ fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 
 pub(super) struct Textures<'a> {
     pub(super) names: Vec<&'a str>,
     pub(super) textures: &'a [Texture],
+    /// Those of the alpha of images, which lie behind the others, by their names; or what is wrong with them.
+    pub(super) alphas: BTreeMap<&'a str, Result<usize, String>>,
     /// Which materials there are depends on it.
     pub(super) integrator: Integrator,
+}
+
+/// Adds the textures of the alpha of images that materials ask for by `channel = "a"`.
+pub(super) fn alphas<'a>(
+    materials: &'a BTreeMap<String, MaterialDescription>,
+    descriptions: &BTreeMap<String, TextureDescription>,
+    images: &mut Images,
+    textures: &mut Vec<Texture>,
+) -> BTreeMap<&'a str, Result<usize, String>> {
+    let mut alphas = BTreeMap::new();
+    for value in materials.values().flat_map(MaterialDescription::values) {
+        let ValueDescription::Texture(ChannelReference { texture, channel }) = value else {
+            continue;
+        };
+        let (Channel::A, Some(description)) = (channel, descriptions.get(texture)) else {
+            continue;
+        };
+        alphas.entry(texture.as_str()).or_insert_with(|| match description {
+            TextureDescription::Image(image) => {
+                let added = image_texture(image, Part::Alpha, images).map_err(|problem| problem.message)?;
+                textures.push(added);
+                Ok(textures.len() - 1)
+            }
+            _ => Err(format!("{texture:?} must be a texture of type \"image\" to have alpha")),
+        });
+    }
+    alphas
 }
 
 impl Textures<'_> {
@@ -194,7 +258,7 @@ impl Textures<'_> {
         self.names.binary_search(&name).map_err(|_| unknown()).at("texture")
     }
 
-    fn color(&self, description: &ColorDescription) -> Checked<Color> {
+    pub(super) fn color(&self, description: &ColorDescription) -> Checked<Color> {
         Ok(match description {
             ColorDescription::Plain(plain) => Color::Plain(color(*plain)?),
             ColorDescription::Texture(reference) => Color::Texture(self.find(&reference.texture)?),
@@ -202,7 +266,7 @@ impl Textures<'_> {
     }
 
     /// The factor of a surface that cannot give more light than it gets.
-    fn tint(&self, description: &ColorDescription) -> Checked<Color> {
+    pub(super) fn tint(&self, description: &ColorDescription) -> Checked<Color> {
         if let ColorDescription::Plain(tint) = description {
             for x in tint.to_array() {
                 between(x, 0.0, 1.0)?;
@@ -211,7 +275,7 @@ impl Textures<'_> {
         self.color(description)
     }
 
-    fn normal_map(&self, description: &Option<NormalMapDescription>) -> Checked<Option<NormalMap>> {
+    pub(super) fn normal_map(&self, description: &Option<NormalMapDescription>) -> Checked<Option<NormalMap>> {
         let Some(NormalMapDescription {
             texture: name,
             strength,
@@ -231,10 +295,17 @@ impl Textures<'_> {
         Ok(Some(NormalMap { texture, strength }))
     }
 
-    fn value(&self, description: &ValueDescription) -> Checked<Value> {
+    pub(super) fn value(&self, description: &ValueDescription) -> Checked<Value> {
         Ok(match description {
             ValueDescription::Plain(plain) => Value::Plain(between(*plain, 0.0, 1.0)?),
-            ValueDescription::Texture(reference) => Value::Texture(self.find(&reference.texture)?),
+            ValueDescription::Texture(reference) => {
+                let found = self.find(&reference.texture)?;
+                let texture = match (reference.channel, self.alphas.get(reference.texture.as_str())) {
+                    (Channel::A, Some(alpha)) => alpha.clone().map_err(Problem::new).at("channel")?,
+                    _ => found,
+                };
+                Value::Texture(texture, reference.channel)
+            }
         })
     }
 
@@ -287,8 +358,17 @@ impl Textures<'_> {
             }
             MaterialDescription::Conductor(conductor) => {
                 self.of_path("conductor")?;
-                let color = self.tint(&conductor.color).at("color")?;
-                let reflection = Reflection::Conductor { color };
+                let white = ColorDescription::default();
+                let reflection = Reflection::Conductor {
+                    color: self.tint(conductor.color.as_ref().unwrap_or(&white)).at("color")?,
+                    index: metal_index(conductor)?,
+                    facets: self.facets(
+                        &conductor.roughness,
+                        conductor.anisotropy,
+                        conductor.anisotropy_rotation,
+                        conductor.energy_compensation,
+                    )?,
+                };
                 (reflection, &conductor.normal_map, &conductor.emission)
             }
             MaterialDescription::Dielectric(dielectric) => {
@@ -297,14 +377,46 @@ impl Textures<'_> {
                     ior: ior(dielectric.ior).at("ior")?,
                     color: self.tint(&dielectric.color).at("color")?,
                     absorption: absorption(dielectric.absorption).at("absorption")?,
+                    thin: dielectric.thin,
+                    facets: self.facets(
+                        &dielectric.roughness,
+                        dielectric.anisotropy,
+                        dielectric.anisotropy_rotation,
+                        dielectric.energy_compensation,
+                    )?,
                 };
+                check(!dielectric.thin || dielectric.absorption == DVec3::ZERO, || {
+                    "must be 0 where thin is true: a sheet has no inside".to_owned()
+                })
+                .at("absorption")?;
                 (reflection, &dielectric.normal_map, &dielectric.emission)
+            }
+            MaterialDescription::Principled(principled) => {
+                self.of_path("principled")?;
+                let reflection = Reflection::Principled(Box::new(self.principled(principled)?));
+                (reflection, &principled.normal_map, &principled.emission)
             }
         };
         Ok(Material {
             reflection,
             emission: self.emission(emission).at("emission")?,
             normal_map: self.normal_map(normal_map).at("normal_map")?,
+            visible: is_visible(description),
+        })
+    }
+
+    fn facets(
+        &self,
+        roughness: &ValueDescription,
+        anisotropy: f64,
+        rotation: f64,
+        compensated: bool,
+    ) -> Checked<Facets> {
+        Ok(Facets {
+            roughness: self.value(roughness).at("roughness")?,
+            anisotropy: between(anisotropy, 0.0, 1.0).at("anisotropy")?,
+            rotation: between(rotation, -360.0, 360.0).at("anisotropy_rotation")?,
+            compensated,
         })
     }
 
@@ -313,6 +425,20 @@ impl Textures<'_> {
         let factor = own.as_ref().or(phong.color.as_ref()).ok_or_else(missing);
         factor.and_then(|factor| self.color(factor)).at(key)
     }
+}
+
+/// Whether the camera sees a material.
+fn is_visible(description: &MaterialDescription) -> bool {
+    let visible = match description {
+        MaterialDescription::Phong(material) => material.visible,
+        MaterialDescription::Mirror(material) => material.visible,
+        MaterialDescription::Glass(material) => material.visible,
+        MaterialDescription::Diffuse(material) => material.visible,
+        MaterialDescription::Conductor(material) => material.visible,
+        MaterialDescription::Dielectric(material) => material.visible,
+        MaterialDescription::Principled(material) => material.visible,
+    };
+    visible.unwrap_or(true)
 }
 
 fn ior(ior: f64) -> Checked<f64> {
@@ -330,4 +456,46 @@ fn absorption(absorption: DVec3) -> Checked<DVec3> {
         })?;
     }
     Ok(absorption)
+}
+
+/// What a conductor says of its index: no more than one way.
+fn metal_index(conductor: &ConductorDescription) -> Checked<Option<MetalIndex>> {
+    let other = |own: &str| {
+        let said = [
+            ("color", conductor.color.is_some()),
+            ("metal", conductor.metal.is_some()),
+            ("eta", conductor.eta.is_some()),
+        ];
+        said.into_iter()
+            .find(|(key, said)| *said && *key != own)
+            .map(|(key, _)| key)
+    };
+    if let Some(name) = &conductor.metal {
+        check(other("metal").is_none(), || {
+            format!("cannot stand beside {}", other("metal").unwrap_or_default())
+        })
+        .at("metal")?;
+        let index = MetalIndex::named(name).ok_or_else(|| {
+            let names: Vec<String> = MetalIndex::names().map(|name| format!("{name:?}")).collect();
+            Problem::new(format!("{name:?} must be one of {}", names.join(", ")))
+        });
+        return index.at("metal").map(Some);
+    }
+    let (eta, k) = match (conductor.eta, conductor.k) {
+        (None, None) => return Ok(None),
+        (Some(eta), Some(k)) => (eta, k),
+        (Some(_), None) => return Err(Problem::new("is missing beside eta".to_owned())).at("k"),
+        (None, Some(_)) => return Err(Problem::new("is missing beside k".to_owned())).at("eta"),
+    };
+    check(other("eta").is_none(), || {
+        format!("cannot stand beside {}", other("eta").unwrap_or_default())
+    })
+    .at("eta")?;
+    for x in eta.to_array() {
+        between(x, 0.001, DENSEST).at("eta")?;
+    }
+    for x in k.to_array() {
+        between(x, 0.0, DENSEST).at("k")?;
+    }
+    Ok(Some(MetalIndex { eta, k }))
 }

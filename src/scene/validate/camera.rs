@@ -3,7 +3,7 @@
 use super::{Checked, FLATTEST, LENGTHS, between, check, length, number, point, show, unit};
 use crate::scene::camera_path::CameraPath;
 use crate::scene::error::{At, Problem};
-use crate::scene::{Camera, CameraDescription, CameraKeyDescription, Projection};
+use crate::scene::{Camera, CameraDescription, CameraKeyDescription, Lens, PerspectiveDescription, Projection};
 
 /// The first and the last frame that a key may be at.
 const FRAMES: (f64, f64) = (-1e9, 1e9);
@@ -11,6 +11,14 @@ const FRAMES: (f64, f64) = (-1e9, 1e9);
 const CLOSEST: f64 = 1e-6;
 /// Vertical fields of view, in degrees.
 const FOVS: (f64, f64) = (0.001, 179.999);
+/// Diameters of lenses.
+const APERTURES: (f64, f64) = (0.0, 1e9);
+/// Focal lengths over diameters.
+const F_NUMBERS: (f64, f64) = (0.1, 1e9);
+/// Corners of lenses that are not round.
+const BLADES: (u32, u32) = (3, 16);
+/// By how many degrees they are turned.
+const ROTATIONS: (f64, f64) = (-360.0, 360.0);
 
 impl CameraDescription {
     /// Checks a camera by itself, as it stands; its path is checked with the scene.
@@ -24,9 +32,10 @@ impl CameraDescription {
 }
 
 fn camera(description: &CameraDescription) -> Checked<Camera> {
+    let mut lens = None;
     let (position, look_at, up, projection) = match description {
         CameraDescription::Perspective(camera) => {
-            length(camera.focal_length).at("focal_length")?;
+            lens = lens_of(camera)?;
             let fov = between(camera.fov, FOVS.0, FOVS.1).at("fov")?.to_radians();
             (
                 camera.position,
@@ -35,6 +44,7 @@ fn camera(description: &CameraDescription) -> Checked<Camera> {
                 Projection::Perspective { fov },
             )
         }
+        CameraDescription::Panorama(camera) => (camera.position, camera.look_at, camera.up, Projection::Panorama),
         CameraDescription::Orthographic(camera) => {
             let height = length(camera.height).at("height")?;
             (
@@ -53,6 +63,9 @@ fn camera(description: &CameraDescription) -> Checked<Camera> {
         format!("{} must not be the camera's position", show(look_at))
     })
     .at("look_at")?;
+    if let (Some(lens), CameraDescription::Perspective(camera)) = (&mut lens, description) {
+        lens.focus = camera.focus_distance.unwrap_or(forward.length());
+    }
     let forward = forward.normalize();
     let right = forward.cross(up);
     check(right.length() > FLATTEST, || {
@@ -68,7 +81,39 @@ fn camera(description: &CameraDescription) -> Checked<Camera> {
         up: right.cross(forward),
         forward,
         projection,
+        lens,
     })
+}
+
+/// The lens of a camera, where it has one, not yet focused.
+fn lens_of(camera: &PerspectiveDescription) -> Checked<Option<Lens>> {
+    let focal_length = length(camera.focal_length).at("focal_length")?;
+    if let Some(f_number) = camera.f_number {
+        between(f_number, F_NUMBERS.0, F_NUMBERS.1).at("f_number")?;
+        check(camera.aperture.is_none(), || {
+            "must not be here beside \"aperture\": each says how wide the lens is".to_owned()
+        })
+        .at("f_number")?;
+    }
+    let aperture = camera.aperture.map(aperture).transpose().at("aperture")?;
+    camera.focus_distance.map(length).transpose().at("focus_distance")?;
+    let blades = camera.blades;
+    check(blades == 0 || (BLADES.0..=BLADES.1).contains(&blades), || {
+        format!("{blades} must be 0, or from {} to {}", BLADES.0, BLADES.1)
+    })
+    .at("blades")?;
+    let rotation = between(camera.blade_rotation, ROTATIONS.0, ROTATIONS.1).at("blade_rotation")?;
+    let diameter = aperture.or(camera.f_number.map(|n| focal_length / n)).unwrap_or(0.0);
+    Ok((diameter > 0.0).then(|| Lens {
+        radius: diameter / 2.0,
+        focus: 1.0,
+        blades,
+        rotation: rotation.to_radians(),
+    }))
+}
+
+fn aperture(diameter: f64) -> Checked<f64> {
+    between(diameter, APERTURES.0, APERTURES.1)
 }
 
 /// Checks a camera and its path, if it has one: each key by itself, the camera as it stands, and the camera at all keys.
@@ -106,6 +151,8 @@ fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f6
         up,
         fov,
         height,
+        aperture: diameter,
+        focus_distance,
     } = *key;
     between(frame, FRAMES.0, FRAMES.1).at("frame")?;
     if let Some(before) = before {
@@ -115,23 +162,51 @@ fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f6
         })
         .at("frame")?;
     }
-    let (extent, other, other_is_there) = match camera {
-        CameraDescription::Perspective(_) => ("fov", "height", height.is_some()),
-        CameraDescription::Orthographic(_) => ("height", "fov", fov.is_some()),
+    let own: &[&str] = match camera {
+        CameraDescription::Perspective(_) => &["fov", "aperture", "focus_distance"],
+        CameraDescription::Orthographic(_) => &["height"],
+        CameraDescription::Panorama(_) => &[],
     };
-    check(!other_is_there, || {
-        format!("must not be here: a camera of this type has {extent:?}")
-    })
-    .at(other)?;
+    for (name, is_there) in [
+        ("fov", fov.is_some()),
+        ("height", height.is_some()),
+        ("aperture", diameter.is_some()),
+        ("focus_distance", focus_distance.is_some()),
+    ] {
+        check(!is_there || own.contains(&name), || match own {
+            [] => "must not be here: a camera of this type has no such value".to_owned(),
+            own => format!("must not be here: a camera of this type has {}", all_of(own, "and")),
+        })
+        .at(name)?;
+    }
     position.map(point).transpose().at("position")?;
     look_at.map(point).transpose().at("look_at")?;
     up.map(unit).transpose().at("up")?;
     let fov = fov.map(|fov| between(fov, FOVS.0, FOVS.1)).transpose().at("fov")?;
     let height = height.map(length).transpose().at("height")?;
+    let diameter = diameter.map(aperture).transpose().at("aperture")?;
+    let focus_distance = focus_distance.map(length).transpose().at("focus_distance")?;
     let points = [position, look_at, up];
-    check(points.iter().any(Option::is_some) || fov.or(height).is_some(), || {
-        format!("must have \"position\", \"look_at\", \"up\" or {extent:?}")
-    })
+    let numbers = [fov, height, diameter, focus_distance];
+    check(
+        points.iter().any(Option::is_some) || numbers.iter().any(Option::is_some),
+        || {
+            format!(
+                "must have {}",
+                all_of(&[&["position", "look_at", "up"], own].concat(), "or")
+            )
+        },
+    )
+}
+
+/// Names with a word before the last: "a", "b" or "c".
+fn all_of(names: &[&str], word: &str) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("{name:?}")).collect();
+    match quoted.split_last() {
+        Some((last, [])) => last.clone(),
+        Some((last, before)) => format!("{} {word} {last}", before.join(", ")),
+        None => String::new(),
+    }
 }
 
 #[cfg(test)]
@@ -266,7 +341,7 @@ mod tests {
             ),
             (
                 format!("{start}{{ frame = 2 }}]"),
-                "9: camera.path.keys[1]: must have \"position\", \"look_at\", \"up\" or \"fov\"",
+                "9: camera.path.keys[1]: must have \"position\", \"look_at\", \"up\", \"fov\", \"aperture\" or \"focus_distance\"",
             ),
             (
                 format!("{start}{{ frame = 1, fov = 4 }}]"),

@@ -281,8 +281,18 @@ fn has_textures(material: &Material) -> bool {
                 ..
             } => [ambient, diffuse, specular].into_iter().any(is_texture),
             Reflection::Mirror { tint } | Reflection::Glass { tint, .. } => is_texture(tint),
-            Reflection::Diffuse { color, roughness } => is_texture(color) || matches!(roughness, Value::Texture(_)),
-            Reflection::Conductor { color } | Reflection::Dielectric { color, .. } => is_texture(color),
+            Reflection::Diffuse { color, roughness } => is_texture(color) || matches!(roughness, Value::Texture(..)),
+            Reflection::Conductor { color, facets, .. } | Reflection::Dielectric { color, facets, .. } => {
+                is_texture(color) || matches!(facets.roughness, Value::Texture(..)) || facets.anisotropy > 0.0
+            }
+            Reflection::Principled(principled) => {
+                principled.clearcoat_normal_map.is_some()
+                    || principled.colors().into_iter().any(is_texture)
+                    || principled
+                        .values()
+                        .iter()
+                        .any(|value| matches!(value, Value::Texture(..)))
+            }
         }
 }
 
@@ -337,7 +347,7 @@ fn factors(factors: DVec3) -> Checked<DVec3> {
     Ok(factors)
 }
 
-fn turn(rotation: &Rotation) -> Checked<DMat3> {
+pub(super) fn turn(rotation: &Rotation) -> Checked<DMat3> {
     let angle = |degrees: f64| between(degrees, -360.0, 360.0);
     Ok(match rotation {
         Rotation::Angles(angles) => {

@@ -4,9 +4,12 @@
 
 mod appearance;
 mod camera;
+mod environment;
+mod light;
 mod mesh;
 mod mtl;
 mod path;
+mod principled;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -73,16 +76,19 @@ impl Description {
         let names = self.materials.keys().map(String::as_str);
         let indices: BTreeMap<_, _> = names.zip(0..).collect();
         let mut images = Images::new(assets);
-        let textures = appearance::textures(&self.textures, &mut images).at("textures")?;
+        let mut textures = appearance::textures(&self.textures, &mut images).at("textures")?;
+        let alphas = appearance::alphas(&self.materials, &self.textures, &mut images, &mut textures);
         let known = Textures {
             names: self.textures.keys().map(String::as_str).collect(),
             textures: &textures,
+            alphas,
             integrator: self.render.integrator,
         };
         let materials = (self.materials.iter())
             .map(|(name, description)| known.material(description).at(name.as_str()))
             .collect::<Checked<Vec<_>>>()
             .at("materials")?;
+        let environment = environment::environment(self, &mut images).at("environment")?;
         let own = (self.materials.keys().cloned().collect(), materials);
         let mut known = Known {
             names: &indices,
@@ -105,8 +111,8 @@ impl Description {
         let files = looks.files.iter().cloned().collect();
         notes.extend(looks.notes());
         notes.extend(path::notes(&self.render, (&material_names, &materials), &textures));
+        notes.extend(environment::note(self, environment.as_ref()));
         let mut render = render(&self.render).at("render")?;
-        let environment = path::environment(self).at("environment")?;
         if render.integrator == Integrator::Path {
             render.background = environment
                 .as_ref()
@@ -283,9 +289,11 @@ fn of_path<T>(integrator: Integrator, value: Option<T>, check: fn(T) -> Checked<
 
 pub(super) fn light(description: &LightDescription) -> Checked<Light> {
     Ok(match description {
+        LightDescription::Spot(light) => return light::spot(light),
         LightDescription::Rectangle(light) => Light::Rectangle {
             rectangle: rectangle(light.center, light.size, light.normal, light.tangent)?,
             color: color(light.color).at("color")?,
+            visible: light.visible,
         },
         LightDescription::Point(light) => Light::Point {
             position: point(light.position).at("position")?,

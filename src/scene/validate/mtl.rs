@@ -208,6 +208,7 @@ impl<'a> Looks<'a> {
                 shininess,
             },
             emission: Color::BLACK,
+            visible: true,
             normal_map: None,
         }
     }

@@ -1,7 +1,7 @@
 //! What a scene has for the path tracer alone, and what it ignores.
 
 use super::super::{Integrator, Reflection, RenderDescription, Shadows, TextureKind};
-use super::{At, Checked, Color, DVec3, Description, Environment, Material, Texture, check, color, cut, number, show};
+use super::{Checked, Color, DVec3, Material, Texture, check, cut, number};
 
 /// The most materials in a note.
 const MOST_NAMES: usize = 8;
@@ -17,25 +17,6 @@ pub(super) fn needs_path(integrator: Integrator) -> Checked<()> {
     check(integrator == Integrator::Path, || {
         "needs integrator = \"path\"".to_owned()
     })
-}
-
-/// The surroundings: under the path tracer the section's, or the background, if they shine.
-pub(super) fn environment(description: &Description) -> Checked<Option<Environment>> {
-    let integrator = description.render.integrator;
-    let background = description.render.background;
-    let color = match &description.environment {
-        None if integrator == Integrator::Phong => return Ok(None),
-        None => background,
-        Some(environment) => {
-            needs_path(integrator)?;
-            check(background == DVec3::ZERO, || {
-                let background = show(background);
-                format!("must not be there beside render.background, {background}, which stands for it")
-            })?;
-            color(environment.color).at("color")?
-        }
-    };
-    Ok((color != DVec3::ZERO).then_some(Environment { color }))
 }
 
 /// The largest value that a colour has in each component; of images that is not known.

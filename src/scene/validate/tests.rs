@@ -104,6 +104,7 @@ fn a_good_scene_is_what_its_file_says() {
         up: DVec3::Z,
         forward: DVec3::Y,
         projection: Projection::Perspective { fov: FRAC_PI_2 },
+        lens: None,
     };
     assert_eq!(scene.camera, camera);
     let phong = |ambient, diffuse, specular, shininess| Material {
@@ -114,6 +115,7 @@ fn a_good_scene_is_what_its_file_says() {
             shininess,
         },
         emission: Color::BLACK,
+        visible: true,
         normal_map: None,
     };
     let (white, red) = (DVec3::splat(0.7), DVec3::X);
@@ -129,6 +131,7 @@ fn a_good_scene_is_what_its_file_says() {
             // The tangent's part along the normal is gone; the bitangent is -Z x X.
             rectangle: square(9.0, DVec3::X, DVec3::NEG_Y * 2.0),
             color: DVec3::new(1.0, 0.5, 0.0),
+            visible: true,
         },
         Light::Point {
             position: DVec3::new(0.0, 0.0, 8.0),

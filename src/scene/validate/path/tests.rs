@@ -3,9 +3,9 @@
 use glam::DVec3;
 
 use super::super::super::{
-    CheckerDescription, Color, ColorDescription, ConductorDescription, Description, DielectricDescription,
-    DiffuseDescription, Environment, EnvironmentDescription, Integrator, Material, Overrides, Pattern,
-    PerspectiveDescription, Reflection, Samples, SamplesDescription, Scene, SceneError, Shadows, Value,
+    Channel, CheckerDescription, Color, ColorDescription, ConductorDescription, Description, DielectricDescription,
+    DiffuseDescription, Environment, EnvironmentDescription, Facets, Integrator, Material, MetalIndex, Overrides,
+    Pattern, PerspectiveDescription, Reflection, Samples, SamplesDescription, Scene, SceneError, Shadows, Value,
     ValueDescription,
 };
 
@@ -105,7 +105,14 @@ fn a_scene_of_paths_is_what_its_file_says() {
     };
     assert_eq!(render.pixel_samples, sobol);
     let color = DVec3::new(0.5, 0.25, 0.0);
-    assert_eq!(scene.environment, Some(Environment { color }));
+    assert_eq!(
+        scene.environment,
+        Some(Environment {
+            color,
+            image: None,
+            visible: true
+        })
+    );
     assert_eq!(render.background, color);
     let material = |name: &str| {
         let i = scene.material_names.iter().position(|known| known == name).unwrap();
@@ -114,6 +121,7 @@ fn a_scene_of_paths_is_what_its_file_says() {
     let told = |reflection, emission| Material {
         reflection,
         emission,
+        visible: true,
         normal_map: None,
     };
     let white = plain(1.0, 1.0, 1.0);
@@ -131,15 +139,25 @@ fn a_scene_of_paths_is_what_its_file_says() {
             "coal",
             Reflection::Diffuse {
                 color: Color::Texture(spots),
-                roughness: Value::Texture(dark),
+                roughness: Value::Texture(dark, Channel::R),
             },
             Color::Texture(spots),
         ),
-        ("gold", Reflection::Conductor { color: white }, plain(7.0, 0.0, 0.0)),
+        (
+            "gold",
+            Reflection::Conductor {
+                color: white,
+                index: None,
+                facets: Facets::default(),
+            },
+            plain(7.0, 0.0, 0.0),
+        ),
         (
             "silver",
             Reflection::Conductor {
                 color: plain(0.9, 0.9, 0.8),
+                index: None,
+                facets: Facets::default(),
             },
             Color::BLACK,
         ),
@@ -149,6 +167,8 @@ fn a_scene_of_paths_is_what_its_file_says() {
                 ior: 1.33,
                 color: white,
                 absorption: DVec3::ZERO,
+                thin: false,
+                facets: Facets::default(),
             },
             Color::BLACK,
         ),
@@ -158,6 +178,8 @@ fn a_scene_of_paths_is_what_its_file_says() {
                 ior: 1.34,
                 color: plain(1.0, 0.5, 0.0),
                 absorption: DVec3::new(0.0, 2.0, 3.0),
+                thin: false,
+                facets: Facets::default(),
             },
             plain(0.0, 0.0, 1.0),
         ),
@@ -180,6 +202,54 @@ fn a_scene_of_paths_is_what_its_file_says() {
     ] {
         assert_eq!(material(name), told(reflection, emission), "{name}");
     }
+}
+
+#[test]
+fn metals_have_an_index_by_name_or_by_numbers() {
+    let silver = "color = [0.9, 0.9, 0.8]";
+    let index = |text: &str| {
+        let scene = parse(&with(silver, text)).unwrap();
+        let at = scene.material_names.iter().position(|name| name == "silver").unwrap();
+        match &scene.materials[at].reflection {
+            Reflection::Conductor { color, index, facets } => (*color, *index, *facets),
+            other => panic!("{other:?}"),
+        }
+    };
+    let (color, plain, facets) = index(silver);
+    assert_eq!((plain, facets), (None, Facets::default()));
+    assert_eq!(color, Color::Plain(DVec3::new(0.9, 0.9, 0.8)));
+    let told = "eta = [1, 2, 3]\nk = [0, 5, 100]\nroughness = 0.5\nanisotropy = 1\nanisotropy_rotation = -90\n\
+                energy_compensation = false";
+    let (color, told, facets) = index(told);
+    let told = told.unwrap();
+    assert_eq!(
+        (told.eta, told.k),
+        (DVec3::new(1.0, 2.0, 3.0), DVec3::new(0.0, 5.0, 100.0))
+    );
+    assert_eq!(color, Color::Plain(DVec3::ONE));
+    let found = (facets.roughness, facets.anisotropy, facets.rotation, facets.compensated);
+    assert_eq!(found, (Value::Plain(0.5), 1.0, -90.0, false));
+    // Every name is on the page.
+    let page = include_str!("../../../../docs/scene-format.md");
+    for name in MetalIndex::names() {
+        let (_, named, _) = index(&format!("metal = '{name}'"));
+        assert_eq!(named, MetalIndex::named(name));
+        assert!(page.contains(&format!("`\"{name}\"`")), "{name}");
+    }
+    for (own, other) in [("eta", "k"), ("k", "eta")] {
+        let told = parse(&with(silver, &format!("{own} = [1, 1, 1]")))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            told.ends_with(&format!("materials.silver.{other}: is missing beside {own}")),
+            "{told}"
+        );
+    }
+    let unknown = parse(&with(silver, "metal = 'bronze'")).unwrap_err().to_string();
+    assert!(
+        unknown.contains("materials.silver.metal: \"bronze\" must be one of \"aluminium\", "),
+        "{unknown}"
+    );
 }
 
 #[test]
@@ -226,7 +296,14 @@ fn the_background_is_the_surroundings() {
     let scene = parse(&text).unwrap();
     let color = DVec3::new(0.1, 0.2, 0.3);
     assert_eq!(scene.render.background, color);
-    assert_eq!(scene.environment, Some(Environment { color }));
+    assert_eq!(
+        scene.environment,
+        Some(Environment {
+            color,
+            image: None,
+            visible: true
+        })
+    );
     // A black one is none, and stands beside the section.
     let text = GOOD.replace("[render]", "[render]\nbackground = [0, 0, 0]");
     assert_eq!(parse(&text).unwrap(), parse(GOOD).unwrap());
@@ -306,6 +383,51 @@ const BAD: &[(&str, &str, &str)] = &[
         "color = [0.5, 0.4, 0.3]",
         "color = [0.5, 0.4, -0.1]",
         "materials.clay.color: -0.1 must be from 0 to 1",
+    ),
+    (
+        "color = [0.9, 0.9, 0.8]",
+        "roughness = 1.1\ncolor = [0.9, 0.9, 0.8]",
+        "materials.silver.roughness: 1.1 must be from 0 to 1",
+    ),
+    (
+        "color = [0.9, 0.9, 0.8]",
+        "anisotropy = -0.1\ncolor = [0.9, 0.9, 0.8]",
+        "materials.silver.anisotropy: -0.1 must be from 0 to 1",
+    ),
+    (
+        "color = [0.9, 0.9, 0.8]",
+        "anisotropy_rotation = 361\ncolor = [0.9, 0.9, 0.8]",
+        "materials.silver.anisotropy_rotation: 361 must be from -360 to 360",
+    ),
+    (
+        "color = [0.9, 0.9, 0.8]",
+        "metal = 'gold'\ncolor = [0.9, 0.9, 0.8]",
+        "materials.silver.metal: cannot stand beside color",
+    ),
+    (
+        "color = [0.9, 0.9, 0.8]",
+        "metal = 'gold'\neta = [1, 1, 1]",
+        "materials.silver.metal: cannot stand beside eta",
+    ),
+    (
+        "color = [0.9, 0.9, 0.8]",
+        "eta = [1, 1, 1]\nk = [1, 1, 1]\ncolor = [0.9, 0.9, 0.8]",
+        "materials.silver.eta: cannot stand beside color",
+    ),
+    (
+        "color = [0.9, 0.9, 0.8]",
+        "eta = [1, 0, 1]\nk = [1, 1, 1]",
+        "materials.silver.eta: 0 must be from 0.001 to 100",
+    ),
+    (
+        "color = [0.9, 0.9, 0.8]",
+        "k = [1, 1, 101]\neta = [1, 1, 1]",
+        "materials.silver.k: 101 must be from 0 to 100",
+    ),
+    (
+        "ior = 1.33",
+        "absorption = [0, 0, 1]\nior = 1.33\nthin = true",
+        "materials.water.absorption: must be 0 where thin is true: a sheet has no inside",
     ),
     (
         "roughness = 0.75",

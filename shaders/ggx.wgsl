@@ -1,0 +1,84 @@
+// Microfacets of the distribution GGX: how the facets of a rough surface lie, which of them are seen, and how much light they reflect.
+// Vectors are local: z is along the normal, x and y along the axes of the two `alpha`, which are at least SMALLEST_ALPHA.
+
+// The density of the facets' normals, per solid angle, on a unit of the surface: Trowbridge and Reitz, "Average irregularity
+// representation of a rough surface for ray reflection", JOSA 65(5), 1975. By the parts of m along the surface, which are exact where
+// it is smooth; 1 - cos^2 is not.
+fn ggx_d(alpha: vec2f, m: vec3f) -> f32 {
+    let x = m.x / alpha.x;
+    let y = m.y / alpha.y;
+    let s = x * x + y * y + m.z * m.z;
+    return select(0.0, 0.31830988618379067 / (alpha.x * alpha.y * s * s), m.z > 0.0);
+}
+
+// The length of w where the facets are stretched to a hemisphere.
+fn ggx_length(alpha: vec2f, w: vec3f) -> f32 {
+    let x = w.x * alpha.x;
+    let y = w.y * alpha.y;
+    return sqrt(x * x + y * y + w.z * w.z);
+}
+
+// The share of the facets that face w and are seen from there: Smith's, as in Heitz, "Understanding the Masking-Shadowing Function in
+// Microfacet-Based BRDFs", JCGT 3(2), 2014, equations 43 and 86.
+fn ggx_g1(alpha: vec2f, w: vec3f) -> f32 {
+    let cosine = abs(w.z);
+    return 2.0 * cosine / max(cosine + ggx_length(alpha, w), 1e-30);
+}
+
+// Of those that face both directions the share that is seen from both, where what is high is seen by both: the same paper, equation 99.
+fn ggx_g2(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
+    let o = abs(wo.z);
+    let i = abs(wi.z);
+    return 2.0 * i * o / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), 1e-30);
+}
+
+// The normal of a facet that is seen from wo: Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps", HPG 2023.
+fn ggx_sample(alpha: vec2f, wo: vec3f, u: vec2f) -> vec3f {
+    let stretched = normalize(vec3f(wo.x * alpha.x, wo.y * alpha.y, wo.z));
+    let middle = cap_sample(disk_sample(u), 1.0 + stretched.z) + stretched;
+    let m = vec3f(middle.x * alpha.x, middle.y * alpha.y, max(middle.z, 0.0));
+    let length2 = dot(m, m);
+    return select(vec3f(0.0, 0.0, 1.0), m * (1.0 / sqrt(length2)), length2 > 1e-20);
+}
+
+// The density of `ggx_sample`, per solid angle of m.
+fn ggx_pdf(alpha: vec2f, wo: vec3f, m: vec3f) -> f32 {
+    return 2.0 * max(dot(wo, m), 0.0) * ggx_d(alpha, m) / max(wo.z + ggx_length(alpha, wo), 1e-30);
+}
+
+// The share of light from everywhere that facets reflect once to a direction at the cosine mu: F0 x + F90 y, by the Fresnel term of
+// Schlick, "An Inexpensive BRDF Model for Physically-based Rendering", Eurographics 1994.
+fn ggx_albedo(alpha: f32, mu: f32) -> vec2f {
+    let length = sqrt(alpha * alpha * (1.0 - mu * mu) + mu * mu);
+    return ggx_albedo_fit(alpha, mu / length, length);
+}
+
+// About the same for two alpha: what the viewer sees is by the one along w, what the light does by their mean square. Within 7 % where one
+// of them is 1 and the other small, within 2 % elsewhere.
+fn ggx_albedo_along(alpha: vec2f, w: vec3f) -> vec2f {
+    let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
+    let length = sqrt(square * (1.0 - w.z * w.z) + w.z * w.z);
+    return ggx_albedo_fit(sqrt(square), abs(w.z) / ggx_length(alpha, w), length);
+}
+
+// Both as functions of `alpha`, of the cosine divided by the length of `ggx_length`, t, and of that length, l: fits of what
+// `scripts/fit-albedo` integrates. y is within 0.004, x + y within 0.005 of itself.
+fn ggx_albedo_fit(alpha: f32, t: f32, l: f32) -> vec2f {
+    let a = alpha;
+    let lost_0 = 0.00548034 + t * (0.0632291 + t * (1.18311 - t * 1.24938));
+    let lost_1 = -0.0095148 + t * (0.365153 - t * (0.350613 + t * 0.129283));
+    let lost_2 = 0.00812975 + t * (1.56884 + t * (1.18546 - t * 1.09209));
+    let over_0 = 1.0 + t * (3.34908 - t * (1.5592 + t * 1.9202));
+    let over_1 = t * (t * 1.2091 - 0.391082) - 1.12089;
+    let over_2 = 0.644689 + t * 1.02691;
+    let lost = (lost_0 + a * (lost_1 + a * lost_2)) / (over_0 + a * (over_1 + a * over_2));
+    let edge_0 = 0.966613 + l * (2.47501 - l * (12.6147 - l * (22.9802 - l * (18.2852 - l * 5.3897))));
+    let edge_1 = -0.386341 - l * (7.14816 - l * (8.05595 - l * (7.34351 - l * 1.95036)));
+    let edge_2 = -0.489888 + l * (9.38023 - l * (2.59002 - l * 2.93296));
+    let edge_3 = 0.498131 - l * (5.66461 + l * 1.88525);
+    let edge_4 = -0.553876 + l * 2.07251;
+    let edge = edge_0 + t * (edge_1 + t * (edge_2 + t * (edge_3 + t * (edge_4 + t * 0.267055))));
+    let wide = 1.0 + l * (17.865 + l * 1.84166) - t * (0.237295 + l * 15.3236 + t * 0.459621);
+    let y = max(edge / wide, 0.0);
+    return vec2f(max(1.0 - lost - y, 0.0), y);
+}

@@ -1,0 +1,80 @@
+// Which of much that shines a sample of light is taken from: the way down the tree over it, and up from what a ray has met.
+
+// What was chosen.
+struct Chosen {
+    emitter: Emitter,
+    density: f32,          // of samples on it, per area, with its choice; 0 for what was not chosen by the tree
+}
+
+// What light is sampled of at p, where the table of emitters gives `emitter`: this, or what the tree chooses if it stands for the
+// tree. n is as `light_importance` has it. Each level has random numbers of its own: sets over the pixel's samples, for two levels at
+// a time.
+fn chosen_light(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u32) -> Chosen {
+    var chosen = Chosen(emitter, 0.0);
+    if emitter.index != NOTHING {
+        return chosen;
+    }
+    var node = load_light_node(0u);
+    var probability = 1.0;
+    var level = 0u;
+    var bits = vec2u(0u);
+    while node.children != NOTHING {
+        let first = load_light_node(node.children);
+        let second = load_light_node(node.children + 1u);
+        let share = first_share(light_importance(first, p, n), light_importance(second, p, n));
+        if (level & 1u) == 0u {
+            bits = decision_set(hash4(vec4u(key.x, key.y, level, 1u)).xy, sample);
+        }
+        let random = unit_float(select(bits.x, bits.y, (level & 1u) == 1u));
+        if random < share {
+            node = first;
+            probability *= share;
+        } else {
+            node = second;
+            probability *= 1.0 - share;
+        }
+        level++;
+    }
+    chosen.emitter.instance = node.instance;
+    chosen.emitter.index = node.index;
+    chosen.density = node.density * probability;
+    return chosen;
+}
+
+// The density of samples, per area, on what the ray from p has met: 0 for what the tree does not know, or unless it is wanted.
+fn met_density(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
+    var at = NOTHING;
+    if wanted {
+        at = light_leaf(hit);
+    }
+    if at == NOTHING {
+        return 0.0;
+    }
+    var node = load_light_node(at);
+    var density = node.density;
+    while node.parent != NOTHING {
+        let own = light_importance(node, p, n);
+        let other = light_importance(load_light_node(light_sibling(at)), p, n);
+        let is_first = (at & 1u) == 1u;
+        let share = first_share(select(other, own, is_first), select(own, other, is_first));
+        density *= select(1.0 - share, share, is_first);
+        at = node.parent;
+        node = load_light_node(at);
+    }
+    return density;
+}
+
+// The number of the node that is what was hit, NOTHING if there is none.
+fn light_leaf(hit: Hit) -> u32 {
+    var place = hit.primitive;
+    if (IN_TREE & (1u << INSTANCE)) != 0u {
+        if hit.instance != 0u {
+            let leaves = load_instance(hit.instance - 1u).leaves;
+            if leaves == NOTHING {
+                return NOTHING;
+            }
+            place = leaves + hit.slot;
+        }
+    }
+    return word_of(records[counts.emitters.w + place / 4u], place % 4u);
+}

@@ -1,0 +1,25 @@
+// A panorama of all directions: longitude along the picture's width, latitude along its height (equirectangular).
+
+// The ray through the point `at` of the picture. What is beyond a pole is on its other side, and the left edge is the right one.
+fn panorama_ray(camera: Camera, at: vec2f) -> Ray {
+    let east = circle_point(panorama_angles(camera, at).x);
+    let north = circle_point(panorama_angles(camera, at).y);
+    let level = camera.forward * east.x + camera.right * east.y;
+    return Ray(camera.position, normalize(level * north.x + camera.up * north.y));
+}
+
+// Its differential, where samples are `spacing` pixels apart.
+fn panorama_differential(camera: Camera, at: vec2f, spacing: f32) -> Differential {
+    let east = circle_point(panorama_angles(camera, at).x);
+    let north = circle_point(panorama_angles(camera, at).y);
+    let level = camera.forward * east.x + camera.right * east.y;
+    let along = camera.right * east.x - camera.forward * east.y;
+    let dx = along * (north.x * (6.2831853 / f32(camera.width) * spacing));
+    let dy = (level * north.y - camera.up * north.x) * (3.1415927 / f32(camera.height) * spacing);
+    return Differential(Derivative(vec3f(0.0), dx), Derivative(vec3f(0.0), dy));
+}
+
+// Longitude from the middle to the right, and latitude, in units of pi.
+fn panorama_angles(camera: Camera, at: vec2f) -> vec2f {
+    return vec2f(at.x * (2.0 / f32(camera.width)) - 1.0, 0.5 - at.y * (1.0 / f32(camera.height)));
+}

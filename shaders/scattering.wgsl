@@ -1,0 +1,259 @@
+// What a surface does with light where it bounces, whatever it is made of: the material as it is met, in which directions it lets light go and
+// how much of it, and what lies behind it.
+
+// How a surface reflects light from a direction, and how densely `sampled_direction` gives that.
+struct Reflection {
+    value: vec3f,          // the BRDF times the cosine of wi; 0 where no light passes
+    pdf: f32,              // per solid angle
+}
+
+fn reflection(spot: Spot, surface: Surface, material: Material, mixture: Mixture, wi: vec3f) -> Reflection {
+    let angles = angles_at(surface.shading_normal, surface.wo, wi);
+    var result = Reflection(vec3f(0.0), 0.0);
+    if (MATERIALS & (1u << DIFFUSE)) != 0u {
+        result = Reflection(diffuse_eval(material, angles), diffuse_pdf(angles));
+        if ROUGH != 0u {
+            if material.roughness > 0.0 {
+                result.value = rough_diffuse_eval(material, angles);
+            }
+        }
+    }
+    if (MATERIALS & (1u << PHONG)) != 0u {
+        if material.kind == PHONG {
+            result = Reflection(modified_phong_eval(material, angles), modified_phong_pdf(material, angles));
+        }
+    }
+    if (MATERIALS & FACET_KINDS) != 0u {
+        if has_facets(material) {
+            let frame = Tangents(surface.du, surface.dv);
+            let wo = vector_to_lobe(frame, surface.shading_normal, surface.wo);
+            result = facet_reflection(material, wo, vector_to_lobe(frame, surface.shading_normal, wi));
+        }
+    }
+    if (MATERIALS & (1u << PRINCIPLED)) != 0u {
+        if material.kind == PRINCIPLED {
+            let local = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, wi);
+            let wo = local_wo(surface);
+            result = Reflection(principled_eval(mixture, wo, local, LOBES), principled_pdf(mixture, wo, local, LOBES));
+        }
+    }
+    result.value = select(vec3f(0.0), result.value, lets_light(spot, surface, material, wi));
+    return result;
+}
+
+// A material as its textures make it, none of which makes more light than there is.
+fn bounded(found: Material) -> Material {
+    var material = found;
+    if LOOKUPS != 0u {
+        let one = vec3f(1.0);
+        let above = (found.diffuse > one) & vec3<bool>((found.kind == DIFFUSE) | (found.kind == PRINCIPLED));
+        material.diffuse = select(found.diffuse, one, above);
+        material.tint = select(found.tint, one, found.tint > one);
+        material.roughness = min(found.roughness, 1.0);
+        if (MATERIALS & (1u << PRINCIPLED)) != 0u {
+            material.sheen = select(found.sheen, one, found.sheen > one);
+            material.sheen_roughness = min(found.sheen_roughness, 1.0);
+            material.anisotropy = min(found.anisotropy, 1.0);
+            material.metallic = min(found.metallic, 1.0);
+            material.transmission = min(found.transmission, 1.0);
+            material.clearcoat = min(found.clearcoat, 1.0);
+            material.clearcoat_roughness = min(found.clearcoat_roughness, 1.0);
+            material.specular_weight = min(found.specular_weight, 1.0);
+        }
+    }
+    return material;
+}
+
+// The normal that light is reflected by: what a normal map makes of it, if that can be.
+fn shaded_normal(surface: Surface, material: Material, normal: vec3f) -> vec3f {
+    if is_delta(material) {
+        let usable = usable_normal(surface, normal);
+        let bends = (material.kind == GLASS) | (material.kind == ROUGH_GLASS);
+        return select(usable, surface.normal, bends & !refracts_inwards(surface, material, usable));
+    }
+    if (MATERIALS & (FACET_KINDS | (1u << PRINCIPLED))) != 0u {
+        if has_facets(material) | (material.kind == PRINCIPLED) {
+            return usable_normal(surface, normal);
+        }
+    }
+    return normal;
+}
+
+// The share of light that a surface reflects, about.
+fn albedo(material: Material) -> vec3f {
+    if material.kind == PHONG {
+        let factors = phong_factors(material);
+        return factors.diffuse + factors.specular;
+    }
+    if (MATERIALS & FACET_KINDS) != 0u {
+        if has_facets(material) {
+            return select(material.tint, metal_fresnel(material, 1.0), material.kind == METAL);
+        }
+    }
+    return select(vec3f(0.0), material.diffuse, (material.kind == DIFFUSE) | (material.kind == PRINCIPLED));
+}
+
+// Whether light may be on its way through what is behind the surface.
+fn has_inside(material: Material) -> bool {
+    let is_volume = (material.kind == PRINCIPLED) & (material.thin == 0u) & (material.transmission > 0.0);
+    return (material.kind == GLASS) | (material.kind == ROUGH_GLASS) | is_volume;
+}
+
+// Whether a material does nothing but mirror or refract light, here.
+fn is_delta(material: Material) -> bool {
+    if (DELTA_KINDS & FACET_KINDS) != 0u {
+        return is_specular(material) | (has_facets(material) & is_polished(material));
+    }
+    return is_specular(material);
+}
+
+// Whether it is one of those with facets, polished or not.
+fn has_facets(material: Material) -> bool {
+    return ((FACET_KINDS >> material.kind) & 1u) != 0u;
+}
+
+// The axes that its facets lie along.
+fn facet_frame(surface: Surface, material: Material) -> Tangents {
+    if ANISOTROPIC != 0u {
+        return lobe_frame(surface, material.rotation);
+    }
+    return frame_around(surface.shading_normal);
+}
+
+// A material as the viewer sees its facets, in the frame of the surface's du and dv: with the index behind the surface relative to that
+// before it, and with what is lost between facets.
+fn facets_of(surface: Surface, found: Material) -> Material {
+    var material = found;
+    let wo = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, surface.wo);
+    if (MATERIALS & (1u << ROUGH_GLASS)) != 0u {
+        if material.kind == ROUGH_GLASS {
+            material.ior = 1.0 / eta_of(surface, found);
+        }
+    }
+    if material.energy != NOTHING {
+        material.loss = facet_loss(facet_alpha(material), wo);
+        if (MATERIALS & (1u << ROUGH_GLASS)) != 0u {
+            if material.kind == ROUGH_GLASS {
+                material.loss = 1.0 / energy_kept(material.energy, facet_alpha(material), wo, surface.side) - 1.0;
+            }
+        }
+    }
+    return material;
+}
+
+// What rough glass reflects and lets pass at once of light from everywhere: from its table (`src/pack/energy.rs`), between rows by
+// roughness and columns by the cosine.
+fn energy_kept(energy: u32, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
+    let last = f32(ENERGY_SIZE - 1u);
+    let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
+    let row = min(sqrt(sqrt(square)), 1.0) * last;
+    let column = min(max(wo.z, 0.0), 1.0) * last;
+    let i = min(floor(row), last - 1.0);
+    let j = min(floor(column), last - 1.0);
+    let start = energy + select(ENERGY_SIZE * ENERGY_SIZE, 0u, side > 0.0) + u32(i) * ENERGY_SIZE + u32(j);
+    let finer = bitcast<vec2f>(vec2u(texel_word(start), texel_word(start + 1u)));
+    let rougher = bitcast<vec2f>(vec2u(texel_word(start + ENERGY_SIZE), texel_word(start + ENERGY_SIZE + 1u)));
+    let both = finer + (rougher - finer) * (row - i);
+    return both.x + (both.y - both.x) * (column - j);
+}
+
+// What facets do with light from wi, in their frame, and how densely they choose that.
+fn facet_reflection(material: Material, wo: vec3f, wi: vec3f) -> Reflection {
+    var result = Reflection(vec3f(0.0), 0.0);
+    if (MATERIALS & (1u << METAL)) != 0u {
+        if material.kind == METAL {
+            result = Reflection(metal_eval(material, wo, wi), metal_pdf(material, wo, wi));
+        }
+    }
+    if (MATERIALS & (1u << ROUGH_GLASS)) != 0u {
+        if material.kind == ROUGH_GLASS {
+            result = Reflection(rough_dielectric_eval(material, wo, wi), rough_dielectric_pdf(material, wo, wi));
+        }
+    }
+    if (MATERIALS & (1u << THIN)) != 0u {
+        if material.kind == THIN {
+            result = Reflection(thin_eval(material, wo, wi), thin_pdf(material, wo, wi));
+        }
+    }
+    return result;
+}
+
+// A way on from facets, in their frame.
+fn facet_sample(material: Material, wo: vec3f, u: vec2f, random: f32) -> LobeSample {
+    var result = LobeSample(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 0.0, 1.0);
+    if (MATERIALS & (1u << METAL)) != 0u {
+        if material.kind == METAL {
+            result = metal_sample(material, wo, u);
+        }
+    }
+    if (MATERIALS & (1u << ROUGH_GLASS)) != 0u {
+        if material.kind == ROUGH_GLASS {
+            result = rough_dielectric_sample(material, wo, u, random);
+        }
+    }
+    if (MATERIALS & (1u << THIN)) != 0u {
+        if material.kind == THIN {
+            result = thin_sample(material, wo, u, random);
+        }
+    }
+    return result;
+}
+
+// To the viewer, in the frame of the surface's lobe; never below the surface.
+fn local_wo(surface: Surface) -> vec3f {
+    let wo = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, surface.wo);
+    return vec3f(wo.x, wo.y, max(wo.z, 1e-6));
+}
+
+// A principled material as the viewer sees it.
+fn mixture_at(surface: Surface, material: Material, coat_normal: vec3f) -> Mixture {
+    var coat = vec3f(0.0, 0.0, 1.0);
+    if ((LOBES & LOBE_COAT) != 0u) & (NORMAL_MAPS == 1u) {
+        coat = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, usable_normal(surface, coat_normal));
+    }
+    return principled_mixture(material, local_wo(surface), surface.side > 0.0, coat, LOBES);
+}
+
+// Whether light may come from wi, by what the surface is and what it is taken for: not where the two are at odds about the side.
+fn lets_light(spot: Spot, surface: Surface, material: Material, wi: vec3f) -> bool {
+    var lit = is_lit(surface, wi);
+    if (IN_TREE & (1u << INSTANCE)) != 0u {
+        lit &= face_lets_pass(spot, surface, wi);
+    }
+    if ((MATERIALS & PASSING_KINDS) != 0u) | ((LOBES & LOBE_TRANSMISSION) != 0u) {
+        let behind = (dot(surface.shading_normal, wi) < 0.0) & (dot(surface.smooth_normal, wi) < 0.0);
+        lit |= lets_through(material) & behind & (dot(surface.normal, wi) < 0.0);
+    }
+    return lit;
+}
+
+// Whether light comes through a material in many directions.
+fn lets_through(material: Material) -> bool {
+    var passes = ((PASSING_KINDS >> material.kind) & 1u) != 0u;
+    if (LOBES & LOBE_TRANSMISSION) != 0u {
+        passes |= (material.kind == PRINCIPLED) & (material.transmission > 0.0);
+    }
+    return passes;
+}
+
+// The normal of a surface that reflects no light from behind it; 0 of others.
+fn lit_normal(surface: Surface, material: Material) -> vec3f {
+    return select(surface.shading_normal, vec3f(0.0), lets_through(material));
+}
+
+// The surface as rays leave it on the other side.
+fn turned_over(surface: Surface) -> Surface {
+    var result = surface;
+    result.start = surface.position - (surface.start - surface.position);
+    if (IN_TREE & (1u << INSTANCE)) != 0u {
+        result.start += surface.bulge;
+    }
+    result.above = surface.below;
+    result.below = surface.above;
+    return result;
+}
+
+// How strongly light is absorbed behind a surface that is `before`, on the viewer's side.
+fn absorption_behind(before: vec3f, surface: Surface, material: Material) -> vec3f {
+    return select(before, select(vec3f(0.0), material.absorption, surface.side > 0.0), has_inside(material));
+}

@@ -1,0 +1,49 @@
+// Directions around a scene, and the cells of the image that surrounds it. The image's middle lies towards +x, its left and right edges
+// towards -x, its upper edge towards +z; a cell lies between the centres of four texels, or of two and a pole.
+
+// A cell: of `width` a row, and one row more than the image has.
+struct MapCell {
+    column: u32,
+    row: u32,
+    x: f32,                // where in it, 0 to 1
+    y: f32,
+}
+
+// The cell that a direction points at.
+fn cell_towards(d: vec3f, width: u32, height: u32) -> MapCell {
+    let u = (0.5 - atan2(d.y, d.x) * 0.15915494) * f32(width) - 0.5;
+    let v = atan2(sqrt(d.x * d.x + d.y * d.y), d.z) * 0.31830987 * f32(height) + 0.5;
+    let column = floor(u);
+    let row = min(floor(v), f32(height));
+    // The outermost rows are half as high: from 1/2 to 1 of their unit, and from 0 to 1/2.
+    let at = v - row;
+    let first = row == 0.0;
+    let last = row == f32(height);
+    let y = select(select(at, 2.0 * at, last), 2.0 * at - 1.0, first);
+    let inside = min(max(y, 0.0), 1.0);
+    return MapCell(u32(select(f32(width) - 1.0, column, column >= 0.0)), u32(row), u - column, inside);
+}
+
+// The column to the right of one.
+fn column_after(column: u32, width: u32) -> u32 {
+    return select(column + 1u, 0u, column + 1u == width);
+}
+
+// 1 minus the cosine of the angle from the pole to the border above `row`, which has no digits left itself near the pole.
+fn cap_above(row: u32, height: u32) -> f32 {
+    let from_pole = max(f32(row) - 0.5, 0.0) / f32(height);
+    let s = sine(0.5 * min(from_pole, 1.0));
+    return 2.0 * s * s;
+}
+
+// The direction of a point of a cell, uniform by solid angle where u is uniform. Its length is 1 within 1 / 10^6.
+fn direction_in_cell(column: u32, row: u32, u: vec2f, width: u32, height: u32) -> vec3f {
+    let turn = 1.0 - 2.0 * ((f32(column) + 0.5 + u.x) / f32(width));
+    let below = row > height / 2u;
+    let from_pole = select(row, height - row, below);
+    let inner = cap_above(from_pole, height);
+    let cap = inner + (cap_above(from_pole + 1u, height) - inner) * u.y;
+    let radius = sqrt(max(cap * (2.0 - cap), 0.0));
+    let z = 1.0 - cap;
+    return vec3f(radius * sine(turn + 0.5), radius * sine(turn), select(z, -z, below));
+}

@@ -1,0 +1,315 @@
+//! Twin of `shaders/ggx.wgsl`: microfacets of the distribution GGX.
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::{Vec2, Vec3};
+
+use super::math::{dot, max, normalize};
+use super::warp::{cap_sample, disk_sample};
+
+pub fn ggx_d(alpha: Vec2, m: Vec3) -> f32 {
+    let x = m.x / alpha.x;
+    let y = m.y / alpha.y;
+    let s = x * x + y * y + m.z * m.z;
+    if m.z > 0.0 {
+        FRAC_1_PI / (alpha.x * alpha.y * s * s)
+    } else {
+        0.0
+    }
+}
+
+pub fn ggx_length(alpha: Vec2, w: Vec3) -> f32 {
+    let x = w.x * alpha.x;
+    let y = w.y * alpha.y;
+    (x * x + y * y + w.z * w.z).sqrt()
+}
+
+pub fn ggx_g1(alpha: Vec2, w: Vec3) -> f32 {
+    let cosine = w.z.abs();
+    2.0 * cosine / max(cosine + ggx_length(alpha, w), 1e-30)
+}
+
+pub fn ggx_g2(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
+    let o = wo.z.abs();
+    let i = wi.z.abs();
+    2.0 * i * o / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), 1e-30)
+}
+
+pub fn ggx_sample(alpha: Vec2, wo: Vec3, u: Vec2) -> Vec3 {
+    let stretched = normalize(Vec3::new(wo.x * alpha.x, wo.y * alpha.y, wo.z));
+    let middle = cap_sample(disk_sample(u), 1.0 + stretched.z) + stretched;
+    let m = Vec3::new(middle.x * alpha.x, middle.y * alpha.y, max(middle.z, 0.0));
+    let length2 = dot(m, m);
+    if length2 > 1e-20 {
+        m * (1.0 / length2.sqrt())
+    } else {
+        Vec3::Z
+    }
+}
+
+pub fn ggx_pdf(alpha: Vec2, wo: Vec3, m: Vec3) -> f32 {
+    2.0 * max(dot(wo, m), 0.0) * ggx_d(alpha, m) / max(wo.z + ggx_length(alpha, wo), 1e-30)
+}
+
+pub fn ggx_albedo(alpha: f32, mu: f32) -> Vec2 {
+    let length = (alpha * alpha * (1.0 - mu * mu) + mu * mu).sqrt();
+    ggx_albedo_fit(alpha, mu / length, length)
+}
+
+pub fn ggx_albedo_along(alpha: Vec2, w: Vec3) -> Vec2 {
+    let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
+    let length = (square * (1.0 - w.z * w.z) + w.z * w.z).sqrt();
+    ggx_albedo_fit(square.sqrt(), w.z.abs() / ggx_length(alpha, w), length)
+}
+
+pub fn ggx_albedo_fit(alpha: f32, t: f32, l: f32) -> Vec2 {
+    let a = alpha;
+    let lost_0 = 0.005_480_34 + t * (0.063_229_1 + t * (1.183_11 - t * 1.249_38));
+    let lost_1 = -0.009_514_8 + t * (0.365_153 - t * (0.350_613 + t * 0.129_283));
+    let lost_2 = 0.008_129_75 + t * (1.568_84 + t * (1.185_46 - t * 1.092_09));
+    let over_0 = 1.0 + t * (3.349_08 - t * (1.559_2 + t * 1.920_2));
+    let over_1 = t * (t * 1.209_1 - 0.391_082) - 1.120_89;
+    let over_2 = 0.644_689 + t * 1.026_91;
+    let lost = (lost_0 + a * (lost_1 + a * lost_2)) / (over_0 + a * (over_1 + a * over_2));
+    let edge_0 = 0.966_613 + l * (2.475_01 - l * (12.614_7 - l * (22.980_2 - l * (18.285_2 - l * 5.389_7))));
+    let edge_1 = -0.386_341 - l * (7.148_16 - l * (8.055_95 - l * (7.343_51 - l * 1.950_36)));
+    let edge_2 = -0.489_888 + l * (9.380_23 - l * (2.590_02 - l * 2.932_96));
+    let edge_3 = 0.498_131 - l * (5.664_61 + l * 1.885_25);
+    let edge_4 = -0.553_876 + l * 2.072_51;
+    let edge = edge_0 + t * (edge_1 + t * (edge_2 + t * (edge_3 + t * (edge_4 + t * 0.267_055))));
+    let wide = 1.0 + l * (17.865 + l * 1.841_66) - t * (0.237_295 + l * 15.323_6 + t * 0.459_621);
+    let y = max(edge / wide, 0.0);
+    Vec2::new(max(1.0 - lost - y, 0.0), y)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{PI, TAU};
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::cpu::rng::{hash4, unit_float};
+
+    /// Pairs of alpha over their range.
+    const ALPHAS: [(f64, f64); 8] = [
+        (0.001, 0.001),
+        (0.02, 0.02),
+        (0.25, 0.25),
+        (1.0, 1.0),
+        (0.001, 0.05),
+        (0.6, 0.1),
+        (1.0, 0.04),
+        (0.04, 1.0),
+    ];
+
+    fn pair((x, y): (f64, f64)) -> Vec2 {
+        Vec2::new(x as f32, y as f32)
+    }
+
+    fn unit(cosine: f64, longitude: f64) -> Vec3 {
+        let sine = (1.0 - cosine * cosine).sqrt();
+        DVec3::new(sine * longitude.cos(), sine * longitude.sin(), cosine).as_vec3()
+    }
+
+    /// The integral over the hemisphere of facets' normals. The slopes are x = ax tan(angle) cos(longitude) and so on, which spreads the
+    /// steps over the facets that there are.
+    fn over_normals((ax, ay): (f64, f64), mut f: impl FnMut(DVec3) -> f64) -> f64 {
+        let (rings, spokes) = (400, 400);
+        let mut sum = 0.0;
+        for i in 0..rings {
+            let angle = (f64::from(i) + 0.5) / f64::from(rings) * PI / 2.0;
+            for j in 0..spokes {
+                let longitude = (f64::from(j) + 0.5) / f64::from(spokes) * TAU;
+                let slope = DVec3::new(ax * longitude.cos(), ay * longitude.sin(), 0.0) * angle.tan() + DVec3::Z;
+                let m = slope.normalize();
+                // d(slopes) = ax ay tan / cos^2 of the angle; the solid angle is cos^3 of m's times that.
+                let step = ax * ay * angle.tan() / angle.cos().powi(2);
+                sum += f(m) * step * m.z.powi(3);
+            }
+        }
+        sum * (PI / 2.0 / f64::from(rings)) * (TAU / f64::from(spokes))
+    }
+
+    #[test]
+    fn facets_cover_the_surface() {
+        for alpha in ALPHAS {
+            let area = over_normals(alpha, |m| f64::from(ggx_d(pair(alpha), m.as_vec3())) * m.z);
+            assert!((area - 1.0).abs() < 1e-4, "{alpha:?}: {area}");
+        }
+        assert_eq!(ggx_d(Vec2::ONE, -Vec3::Z), 0.0);
+    }
+
+    #[test]
+    fn what_is_seen_is_as_large_as_it_looks() {
+        for alpha in ALPHAS {
+            for (cosine, longitude) in [(1.0, 0.0), (0.7, 0.3), (0.3, 1.5), (0.05, 2.9)] {
+                let wo = unit(cosine, longitude);
+                // Of all facets that face the viewer the projected area is the surface's, of which the share G1 is seen.
+                let facing = over_normals(alpha, |m| {
+                    f64::from(ggx_d(pair(alpha), m.as_vec3())) * m.dot(wo.as_dvec3()).max(0.0)
+                });
+                let seen = facing * f64::from(ggx_g1(pair(alpha), wo));
+                assert!((seen / cosine - 1.0).abs() < 3e-3, "{alpha:?} {wo}: {seen}");
+                let density = over_normals(alpha, |m| f64::from(ggx_pdf(pair(alpha), wo, m.as_vec3())));
+                assert!((density - 1.0).abs() < 3e-3, "{alpha:?} {wo}: {density}");
+            }
+        }
+    }
+
+    #[test]
+    fn of_both_directions_less_is_seen_than_of_one() {
+        for alpha in ALPHAS {
+            let alpha = pair(alpha);
+            for (wo, wi) in [(unit(0.9, 0.2), unit(0.2, 3.0)), (unit(0.1, 1.0), unit(0.4, 1.2))] {
+                let both = ggx_g2(alpha, wo, wi);
+                let (o, i) = (ggx_g1(alpha, wo), ggx_g1(alpha, wi));
+                assert!(both <= o.min(i) * 1.000_001 && both >= o * i * 0.999_999);
+                // Heitz, equation 99, by the two Lambda.
+                let lambda = |g: f32| (1.0 - f64::from(g)) / f64::from(g);
+                let expected = 1.0 / (1.0 + lambda(o) + lambda(i));
+                assert!((f64::from(both) / expected - 1.0).abs() < 1e-5, "{both} {expected}");
+            }
+        }
+    }
+
+    /// Pearson's chi-square of sampled normals over cells of the angle and longitude of stretched slopes, in standard deviations
+    /// above what is expected, where `wrong` is a factor of the density on one half of the sphere.
+    fn chi_square(alpha: (f64, f64), wo: Vec3, wrong: f64) -> f64 {
+        const CELLS: usize = 20;
+        const SAMPLES: u32 = 100_000;
+        let (ax, ay) = alpha;
+        let cell = |m: DVec3| {
+            let (x, y) = (m.x / ax / m.z, m.y / ay / m.z);
+            let angle = x.hypot(y).atan() / (PI / 2.0);
+            let longitude = y.atan2(x) / TAU + 0.5;
+            let at = |part: f64| ((part * CELLS as f64) as usize).min(CELLS - 1);
+            at(angle) * CELLS + at(longitude)
+        };
+        let mut counts = vec![0.0; CELLS * CELLS];
+        for i in 0..SAMPLES {
+            let bits = hash4(glam::UVec4::new(i, 3, 5, 7));
+            let m = ggx_sample(pair(alpha), wo, Vec2::new(unit_float(bits.x), unit_float(bits.y)));
+            assert!((m.length() - 1.0).abs() < 1e-5 && m.z >= 0.0, "{m}");
+            counts[cell(m.as_dvec3())] += 1.0;
+        }
+        let mut expected = vec![0.0; CELLS * CELLS];
+        let _ = over_normals(alpha, |m| {
+            let density =
+                f64::from(ggx_pdf(pair(alpha), wo, m.as_vec3())) * if m.x > 0.0 { wrong } else { 2.0 - wrong };
+            let slope = (m.x / ax / m.z).hypot(m.y / ay / m.z);
+            // The same step as `over_normals` takes.
+            let step = ax * ay * slope * (1.0 + slope * slope) * m.z.powi(3) * (PI / 2.0 / 400.0) * (TAU / 400.0);
+            expected[cell(m)] += density * step * f64::from(SAMPLES);
+            0.0
+        });
+        let (mut sum, mut freedom, mut rest) = (0.0, -1.0, (0.0, 0.0));
+        for (count, expected) in counts.iter().zip(&expected) {
+            if *expected < 10.0 {
+                rest = (rest.0 + count, rest.1 + expected);
+            } else {
+                sum += (count - expected) * (count - expected) / expected;
+                freedom += 1.0;
+            }
+        }
+        if rest.1 > 10.0 {
+            sum += (rest.0 - rest.1) * (rest.0 - rest.1) / rest.1;
+            freedom += 1.0;
+        }
+        assert!(freedom > 20.0, "{freedom}");
+        (sum - freedom) / (2.0 * freedom).sqrt()
+    }
+
+    #[test]
+    fn visible_normals_are_as_frequent_as_their_density_says() {
+        for alpha in ALPHAS {
+            for wo in [unit(0.95, 0.4), unit(0.3, 2.5), unit(0.6, 1.5)] {
+                let right = chi_square(alpha, wo, 1.0);
+                assert!(right < 6.0, "{alpha:?}, {wo}: {right}");
+                let wrong = chi_square(alpha, wo, 1.06);
+                assert!(wrong > 6.0, "{alpha:?}, {wo}: a wrong density is not seen: {wrong}");
+            }
+        }
+    }
+
+    /// What facets reflect at once of light from everywhere, by Schlick's two terms: over facets, by Lambda as Heitz has it.
+    fn albedo(alpha: (f64, f64), wo: DVec3) -> (f64, f64) {
+        let lambda = |w: DVec3| {
+            let tangent2 = ((alpha.0 * w.x).powi(2) + (alpha.1 * w.y).powi(2)) / w.z.powi(2);
+            ((1.0 + tangent2).sqrt() - 1.0) / 2.0
+        };
+        let (ax2, ay2) = (alpha.0.powi(2), alpha.1.powi(2));
+        let term = |m: DVec3, edge: bool| {
+            let c = wo.dot(m);
+            let wi = m * (2.0 * c) - wo;
+            if c <= 0.0 || wi.z <= 0.0 {
+                return 0.0;
+            }
+            let tangent2 = (m.x * m.x / ax2 + m.y * m.y / ay2) / (m.z * m.z);
+            let d = 1.0 / (PI * alpha.0 * alpha.1 * m.z.powi(4) * (1.0 + tangent2).powi(2));
+            let g = 1.0 / (1.0 + lambda(wo) + lambda(wi));
+            let schlick = (1.0 - c).powi(5);
+            d * g * c / wo.z * if edge { schlick } else { 1.0 - schlick }
+        };
+        (
+            over_normals(alpha, |m| term(m, false)),
+            over_normals(alpha, |m| term(m, true)),
+        )
+    }
+
+    #[test]
+    fn albedos_are_those_of_a_quadrature() {
+        for alpha in [0.001, 0.01, 0.06, 0.2, 0.45, 0.8, 1.0] {
+            for cosine in [1.0, 0.8, 0.5, 0.25, 0.1, 0.03] {
+                let wo = unit(cosine, 0.4);
+                let (x, y) = albedo((alpha, alpha), wo.as_dvec3());
+                let found = ggx_albedo(alpha as f32, wo.z).as_dvec2();
+                let place = format!("{alpha} {cosine}: {found} {x} {y}");
+                assert!((found.y - y).abs() < 4.5e-3, "{place}");
+                assert!((found.x + found.y - x - y).abs() < 5.5e-3 * (x + y), "{place}");
+                let along = ggx_albedo_along(Vec2::splat(alpha as f32), wo).as_dvec2();
+                assert!(along.abs_diff_eq(found, 1e-5), "{place} {along}");
+            }
+        }
+        let mut errors = Vec::new();
+        for alpha in [(0.3, 0.2), (0.04, 0.36), (0.5, 0.01), (1.0, 0.04)] {
+            for (cosine, longitude) in [(1.0, 0.0), (0.6, 0.0), (0.6, 1.5), (0.2, 0.7), (0.1, 1.5)] {
+                let wo = unit(cosine, longitude);
+                let (x, y) = albedo(alpha, wo.as_dvec3());
+                let found = ggx_albedo_along(pair(alpha), wo).as_dvec2();
+                let error = (found.x + found.y - x - y).abs() / (x + y);
+                assert!(error < 0.075, "{alpha:?} {wo}: {error}");
+                errors.push(error);
+            }
+        }
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        assert!(mean < 0.02, "{mean}");
+    }
+
+    #[test]
+    fn the_ends_of_all_ranges_are_numbers() {
+        let tiny = f32::from_bits(1);
+        for alpha in [Vec2::splat(0.001), Vec2::ONE, Vec2::new(0.001, 1.0)] {
+            for wo in [Vec3::Z, Vec3::X, Vec3::new(0.6, -0.8, tiny), Vec3::new(0.0, 1.0, 1e-20)] {
+                for u in [
+                    Vec2::ZERO,
+                    Vec2::splat(0.5),
+                    Vec2::splat(1.0 - 6e-8),
+                    Vec2::new(0.0, 0.5),
+                ] {
+                    let m = ggx_sample(alpha, wo, u);
+                    assert!((m.length() - 1.0).abs() < 1e-5, "{alpha} {wo} {u}: {m}");
+                    let values = [
+                        ggx_pdf(alpha, wo, m),
+                        ggx_d(alpha, m),
+                        ggx_g1(alpha, wo),
+                        ggx_g2(alpha, wo, wo),
+                        ggx_albedo(alpha.x, wo.z).x,
+                        ggx_albedo_along(alpha, wo).y,
+                    ];
+                    assert!(values.iter().all(|x| x.is_finite()), "{alpha} {wo} {u}: {values:?}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! Twin of `shaders/lobe.wgsl`: lobes of rough surfaces.
+
+use glam::{Vec2, Vec3};
+
+use super::ggx::{ggx_albedo_along, ggx_d, ggx_length};
+use super::math::{cross, dot, max, normalize, sine};
+use super::primitive::Tangents;
+use super::surface::Surface;
+use super::warp::frame_around;
+use crate::pack::{Material, SMALLEST_ALPHA};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LobeSample {
+    pub wi: Vec3,
+    pub weight: Vec3,
+    pub pdf: f32,
+    pub eta: f32,
+}
+
+pub fn plain_alpha(material: &Material) -> Vec2 {
+    let across = material.roughness * material.roughness;
+    let along = across + (1.0 - across) * (material.anisotropy * material.anisotropy);
+    Vec2::new(along, across)
+}
+
+pub fn is_polished(material: &Material) -> bool {
+    plain_alpha(material).x < SMALLEST_ALPHA
+}
+
+pub fn facet_alpha(material: &Material) -> Vec2 {
+    let alpha = plain_alpha(material);
+    Vec2::new(max(alpha.x, SMALLEST_ALPHA), max(alpha.y, SMALLEST_ALPHA))
+}
+
+pub fn lobe_frame(surface: &Surface, rotation: f32) -> Tangents {
+    let n = surface.shading_normal;
+    let along = surface.du - n * dot(n, surface.du);
+    let length2 = dot(along, along);
+    let usable = (length2 > 1e-12 * dot(surface.du, surface.du)) & (length2 < 1e30);
+    let other = frame_around(n);
+    let first = if usable {
+        along * (1.0 / max(length2, 1e-30).sqrt())
+    } else {
+        other.u
+    };
+    let across = cross(n, first);
+    let second = across * if dot(across, surface.dv) >= 0.0 { 1.0 } else { -1.0 };
+    let u = normalize(first * sine(rotation + 0.5) + second * sine(rotation));
+    Tangents { u, v: cross(n, u) }
+}
+
+pub fn vector_to_lobe(frame: Tangents, n: Vec3, w: Vec3) -> Vec3 {
+    Vec3::new(dot(frame.u, w), dot(frame.v, w), dot(n, w))
+}
+
+pub fn vector_from_lobe(frame: Tangents, n: Vec3, w: Vec3) -> Vec3 {
+    frame.u * w.x + frame.v * w.y + n * w.z
+}
+
+pub fn half_vector(wo: Vec3, wi: Vec3) -> Vec3 {
+    let sum = wo + wi;
+    let length2 = dot(sum, sum);
+    if length2 > 1e-20 {
+        sum * (1.0 / length2.sqrt())
+    } else {
+        Vec3::Z
+    }
+}
+
+pub fn facet_eval(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
+    let o = wo.z.abs();
+    let i = wi.z.abs();
+    let seen = 0.5 * i / max(o * ggx_length(alpha, wi) + i * ggx_length(alpha, wo), 1e-30);
+    ggx_d(alpha, half_vector(wo, wi)) * seen
+}
+
+pub fn facet_pdf(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
+    ggx_d(alpha, half_vector(wo, wi)) * 0.5 / max(wo.z + ggx_length(alpha, wo), 1e-30)
+}
+
+pub fn facet_weight(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
+    let length = ggx_length(alpha, wo);
+    wi.z * (wo.z + length) / max(wo.z * ggx_length(alpha, wi) + wi.z * length, 1e-30)
+}
+
+pub fn facet_loss(alpha: Vec2, wo: Vec3) -> f32 {
+    let once = ggx_albedo_along(alpha, wo);
+    max(1.0 / (once.x + once.y) - 1.005, 0.0)
+}

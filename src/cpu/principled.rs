@@ -1,0 +1,377 @@
+//! Twin of `shaders/principled.wgsl`: the material `principled`.
+
+use glam::{Vec2, Vec3, Vec4};
+
+use super::ggx::{ggx_albedo, ggx_albedo_along, ggx_d, ggx_g2, ggx_pdf, ggx_sample};
+use super::lobe::LobeSample;
+use super::math::{dot, exp2, max, min, power};
+use super::specular::{refracted_cosine, refracted_direction};
+use super::surface::largest;
+use super::warp::{disk_sample, frame_around, vector_around};
+use crate::pack::{
+    COAT_F0, LEAST_SHEEN, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, LOBE_TRANSMISSION, Material,
+    SMALLEST_ALPHA,
+};
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mixture {
+    pub diffuse: Vec3,
+    pub alpha: Vec2,
+    pub f0: Vec3,
+    pub f90: f32,
+    pub gain: Vec3,
+    pub passed: Vec3,
+    pub inner_f0: Vec3,
+    pub inner_f90: f32,
+    pub eta: f32,
+    pub thin: bool,
+    pub coat: f32,
+    pub coat_alpha: f32,
+    pub coat_normal: Vec3,
+    pub sheen: Vec3,
+    pub sheen_alpha: f32,
+    pub chances: Vec4,
+}
+
+pub fn principled_mixture(material: &Material, wo: Vec3, outside: bool, coat_normal: Vec3, lobes: u32) -> Mixture {
+    let mut m = Mixture::default();
+    let rough = max(material.roughness * material.roughness, SMALLEST_ALPHA);
+    m.alpha = Vec2::new(rough, rough);
+    if lobes & LOBE_ANISOTROPY != 0 {
+        m.alpha.x = rough + (1.0 - rough) * (material.anisotropy * material.anisotropy);
+    }
+    let volume = (material.thin == 0) & (material.transmission > 0.0);
+    m.thin = material.thin != 0;
+    m.eta = match (volume, outside) {
+        (false, _) => 1.0,
+        (true, true) => 1.0 / material.ior,
+        (true, false) => material.ior,
+    };
+    let mut left = 1.0;
+    m.coat_normal = coat_normal;
+    let over = outside | !volume;
+    let mut coat_share = 0.0;
+    if lobes & LOBE_COAT != 0 {
+        let cosine = dot(wo, coat_normal);
+        m.coat_alpha = max(
+            material.clearcoat_roughness * material.clearcoat_roughness,
+            SMALLEST_ALPHA,
+        );
+        m.coat = if over & (cosine > 0.0) { material.clearcoat } else { 0.0 };
+        let reflected = ggx_albedo(m.coat_alpha, max(cosine, 0.0));
+        coat_share = min(m.coat * (COAT_F0 * reflected.x + reflected.y), 1.0);
+        left = 1.0 - coat_share;
+    }
+    let mut sheen_share = 0.0;
+    if lobes & LOBE_SHEEN != 0 {
+        let roughness = max(material.sheen_roughness, LEAST_SHEEN);
+        m.sheen_alpha = roughness * roughness;
+        let albedo = sheen_albedo(roughness, wo.z);
+        m.sheen = material.sheen * (if over { left } else { 0.0 } / max(albedo, 1.0));
+        let bounded = min(albedo, 1.0);
+        sheen_share = luminance(m.sheen) * albedo;
+        left *= if over {
+            max(1.0 - largest(material.sheen) * bounded, 0.0)
+        } else {
+            1.0
+        };
+    }
+    let base = material.diffuse;
+    let dielectric = 1.0 - material.metallic;
+    let mut reflected = Vec3::ZERO;
+    let mut inner = Vec3::ZERO;
+    if lobes & LOBE_SPECULAR != 0 {
+        let ratio = (material.ior - 1.0) / (material.ior + 1.0);
+        let f0 = material.specular * (ratio * ratio);
+        m.inner_f0 = Vec3::new(min(f0.x, 1.0), min(f0.y, 1.0), min(f0.z, 1.0)) * material.specular_weight;
+        m.inner_f90 = material.specular_weight;
+        m.f0 = m.inner_f0 * dielectric + base * material.metallic;
+        m.f90 = m.inner_f90 * dielectric + material.metallic;
+        let cosine = if m.eta > 1.0 {
+            refracted_cosine(wo.z, m.eta)
+        } else {
+            wo.z
+        };
+        let mut share = ggx_albedo(m.alpha.y, cosine);
+        if lobes & LOBE_ANISOTROPY != 0 {
+            let along = if m.eta <= 1.0 {
+                ggx_albedo_along(m.alpha, wo)
+            } else {
+                share
+            };
+            let other = ggx_albedo(m.alpha.x, cosine);
+            share = Vec2::new(max(max(share.x, other.x), along.x), max(max(share.y, other.y), along.y));
+        }
+        let whole = max(share.x + share.y, 1e-3);
+        let known = if lobes & LOBE_ANISOTROPY != 0 {
+            1.0 - material.anisotropy * material.anisotropy
+        } else {
+            1.0
+        };
+        let lost = max(1.0 / whole - 1.005, 0.0) * known;
+        let gain = Vec3::ONE + m.f0 * lost;
+        m.gain = gain * left;
+        reflected = (m.f0 * share.x + Vec3::splat(m.f90 * share.y)) * gain;
+        inner = m.inner_f0 * share.x + Vec3::splat(m.inner_f90 * share.y);
+        inner *= Vec3::ONE + m.inner_f0 * lost;
+    }
+    let ground = dielectric * (1.0 - material.transmission);
+    m.diffuse = base * (ground * left * max(1.0 - largest(inner), 0.0));
+    let mut passing = 0.0;
+    if lobes & LOBE_TRANSMISSION != 0 {
+        m.passed = base * (dielectric * material.transmission * left);
+        passing = luminance(m.passed) * max(1.0 - largest(inner), 0.0);
+    }
+    let weights = Vec4::new(luminance(m.diffuse), luminance(reflected) * left, passing, coat_share);
+    let sum = weights.x + weights.y + weights.z + weights.w + sheen_share;
+    m.chances = if sum > 1e-30 {
+        weights * (1.0 / max(sum, 1e-30))
+    } else {
+        Vec4::X
+    };
+    m
+}
+
+pub fn luminance(color: Vec3) -> f32 {
+    0.2126 * color.x + 0.7152 * color.y + 0.0722 * color.z
+}
+
+pub fn sheen_chance(m: &Mixture) -> f32 {
+    max(1.0 - (m.chances.x + m.chances.y + m.chances.z + m.chances.w), 0.0)
+}
+
+pub fn schlick(f0: Vec3, f90: f32, cosine: f32, eta: f32) -> Vec3 {
+    let behind = refracted_cosine(cosine, eta);
+    let x = 1.0 - min(if eta > 1.0 { behind } else { cosine }, 1.0);
+    let x2 = x * x;
+    let f = f0 + (Vec3::splat(f90) - f0) * (x2 * x2 * x);
+    if (eta > 1.0) & (behind == 0.0) { Vec3::ONE } else { f }
+}
+
+pub fn passes_straight(m: &Mixture) -> bool {
+    is_flat(m.alpha) | (!m.thin & ((m.eta - 1.0).abs() < 1e-3))
+}
+
+pub fn is_flat(alpha: Vec2) -> bool {
+    max(alpha.x, alpha.y) <= SMALLEST_ALPHA
+}
+
+pub fn facets_eval(alpha: Vec2, wo: Vec3, wi: Vec3, half: Vec3) -> f32 {
+    ggx_d(alpha, half) * ggx_g2(alpha, wo, wi) / (4.0 * max(wo.z, 1e-6))
+}
+
+pub fn half_between(wo: Vec3, wi: Vec3) -> Vec3 {
+    let sum = wo + wi;
+    sum * (1.0 / max(dot(sum, sum), 1e-20).sqrt())
+}
+
+pub fn refracting_half(wo: Vec3, wi: Vec3, eta: f32) -> Vec3 {
+    let sum = wo * eta + wi;
+    let unit = sum * (1.0 / max(dot(sum, sum), 1e-20).sqrt());
+    if unit.z > 0.0 { unit } else { -unit }
+}
+
+pub fn refracting_density(wo: Vec3, wi: Vec3, half: Vec3, eta: f32) -> f32 {
+    let o = dot(wo, half);
+    let i = dot(wi, half);
+    let sum = eta * o + i;
+    let density = i.abs() / max(sum * sum, 1e-20);
+    if (o > 0.0) & (i < 0.0) { density } else { 0.0 }
+}
+
+pub fn principled_eval(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> Vec3 {
+    let mut value = m.diffuse * (max(wi.z, 0.0) * std::f32::consts::FRAC_1_PI);
+    if (lobes & LOBE_SPECULAR != 0) && (wi.z > 0.0) & !is_flat(m.alpha) {
+        let half = half_between(wo, wi);
+        value += schlick(m.f0, m.f90, max(dot(wo, half), 0.0), m.eta) * m.gain * facets_eval(m.alpha, wo, wi, half);
+    }
+    if (lobes & LOBE_TRANSMISSION != 0) && (wi.z < 0.0) & !passes_straight(m) {
+        value += passed_eval(m, wo, wi);
+    }
+    if (lobes & LOBE_COAT != 0) && (wi.z > 0.0) & (m.coat > 0.0) {
+        value += Vec3::splat(coat_eval(m, wo, wi));
+    }
+    if (lobes & LOBE_SHEEN != 0) && wi.z > 0.0 {
+        value += m.sheen * (sheen_lobe(m.sheen_alpha, wo, wi) * wi.z);
+    }
+    value
+}
+
+pub fn passed_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> Vec3 {
+    if m.thin {
+        let mirrored = Vec3::new(wi.x, wi.y, -wi.z);
+        let half = half_between(wo, mirrored);
+        let reflected = schlick(m.inner_f0, m.inner_f90, max(dot(wo, half), 0.0), 1.0);
+        return m.passed * (Vec3::ONE - reflected) * facets_eval(m.alpha, wo, mirrored, half);
+    }
+    let half = refracting_half(wo, wi, m.eta);
+    let o = max(dot(wo, half), 0.0);
+    let reflected = schlick(m.inner_f0, m.inner_f90, o, m.eta);
+    let facets = ggx_d(m.alpha, half) * ggx_g2(m.alpha, wo, Vec3::new(wi.x, wi.y, -wi.z)) * o / max(wo.z, 1e-6);
+    m.passed * (Vec3::ONE - reflected) * (facets * refracting_density(wo, wi, half, m.eta) * (m.eta * m.eta))
+}
+
+pub fn coat_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> f32 {
+    let o = to_frame_around(m.coat_normal, wo);
+    let i = to_frame_around(m.coat_normal, wi);
+    let alpha = Vec2::splat(m.coat_alpha);
+    if is_flat(alpha) | (o.z <= 0.0) | (i.z <= 0.0) {
+        return 0.0;
+    }
+    let half = half_between(o, i);
+    let f = schlick(Vec3::splat(COAT_F0), 1.0, max(dot(o, half), 0.0), 1.0);
+    m.coat * f.x * facets_eval(alpha, o, i, half)
+}
+
+pub fn to_frame_around(n: Vec3, v: Vec3) -> Vec3 {
+    let frame = frame_around(n);
+    Vec3::new(dot(frame.u, v), dot(frame.v, v), dot(n, v))
+}
+
+pub fn principled_pdf(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> f32 {
+    let mut pdf = m.chances.x * (max(wi.z, 0.0) * std::f32::consts::FRAC_1_PI);
+    if (lobes & LOBE_SPECULAR != 0) && (wi.z > 0.0) & !is_flat(m.alpha) {
+        pdf += m.chances.y * mirrored_pdf(m.alpha, wo, half_between(wo, wi));
+    }
+    if (lobes & LOBE_TRANSMISSION != 0) && (wi.z < 0.0) & !passes_straight(m) {
+        let mirrored = Vec3::new(wi.x, wi.y, -wi.z);
+        let density = if m.thin {
+            mirrored_pdf(m.alpha, wo, half_between(wo, mirrored))
+        } else {
+            let half = refracting_half(wo, wi, m.eta);
+            ggx_pdf(m.alpha, wo, half) * refracting_density(wo, wi, half, m.eta)
+        };
+        pdf += m.chances.z * density;
+    }
+    if lobes & LOBE_COAT != 0 {
+        let o = to_frame_around(m.coat_normal, wo);
+        let i = to_frame_around(m.coat_normal, wi);
+        let alpha = Vec2::splat(m.coat_alpha);
+        if (m.chances.w > 0.0) & (i.z > 0.0) & !is_flat(alpha) {
+            pdf += m.chances.w * mirrored_pdf(alpha, o, half_between(o, i));
+        }
+    }
+    if lobes & LOBE_SHEEN != 0 {
+        pdf += if wi.z > 0.0 {
+            sheen_chance(m) * 0.159_154_94
+        } else {
+            0.0
+        };
+    }
+    pdf
+}
+
+pub fn mirrored_pdf(alpha: Vec2, wo: Vec3, half: Vec3) -> f32 {
+    let cosine = dot(wo, half);
+    if cosine > 0.0 {
+        ggx_pdf(alpha, wo, half) / (4.0 * max(cosine, 1e-6))
+    } else {
+        0.0
+    }
+}
+
+pub fn nowhere() -> LobeSample {
+    LobeSample {
+        wi: Vec3::Z,
+        weight: Vec3::ZERO,
+        pdf: 0.0,
+        eta: 1.0,
+    }
+}
+
+pub fn principled_sample(m: &Mixture, wo: Vec3, u: Vec2, random: f32, lobes: u32) -> LobeSample {
+    let p = disk_sample(u);
+    let mut wi = p.extend(max(1.0 - p.x * p.x - p.y * p.y, 0.0).sqrt());
+    let mut is_delta = false;
+    let mut weight = Vec3::ZERO;
+    let mut eta = 1.0;
+    let mut rest = random - m.chances.x;
+    if lobes & LOBE_SPECULAR != 0 {
+        if (rest >= 0.0) & (rest < m.chances.y) {
+            is_delta = is_flat(m.alpha);
+            let half = if is_delta { Vec3::Z } else { ggx_sample(m.alpha, wo, u) };
+            wi = half * (2.0 * dot(wo, half)) - wo;
+            weight = schlick(m.f0, m.f90, wo.z, m.eta) * m.gain * (1.0 / m.chances.y);
+            if wi.z <= 0.0 {
+                return nowhere();
+            }
+        }
+        rest -= m.chances.y;
+    }
+    if lobes & LOBE_TRANSMISSION != 0 {
+        if (rest >= 0.0) & (rest < m.chances.z) {
+            is_delta = passes_straight(m);
+            let half = if is_delta { Vec3::Z } else { ggx_sample(m.alpha, wo, u) };
+            let cosine = dot(wo, half);
+            let mirrored = half * (2.0 * cosine) - wo;
+            let behind = refracted_cosine(cosine, m.eta);
+            let bent = refracted_direction(-wo, half, m.eta, cosine, behind);
+            wi = if m.thin {
+                Vec3::new(mirrored.x, mirrored.y, -mirrored.z)
+            } else {
+                bent
+            };
+            eta = m.eta;
+            let through = Vec3::ONE - schlick(m.inner_f0, m.inner_f90, wo.z, m.eta);
+            weight = m.passed * through * (m.eta * m.eta / m.chances.z);
+            if wi.z >= 0.0 {
+                return nowhere();
+            }
+        }
+        rest -= m.chances.z;
+    }
+    if lobes & LOBE_COAT != 0 {
+        if (rest >= 0.0) & (rest < m.chances.w) {
+            let alpha = Vec2::splat(m.coat_alpha);
+            is_delta = is_flat(alpha);
+            let o = to_frame_around(m.coat_normal, wo);
+            let half = if is_delta { Vec3::Z } else { ggx_sample(alpha, o, u) };
+            wi = vector_around(m.coat_normal, half * (2.0 * dot(o, half)) - o);
+            let reflected = schlick(Vec3::splat(COAT_F0), 1.0, o.z, 1.0) * (m.coat / m.chances.w);
+            weight = if wi.z > 0.0 { reflected } else { Vec3::ZERO };
+        }
+        rest -= m.chances.w;
+    }
+    if (lobes & LOBE_SHEEN != 0) && rest >= 0.0 {
+        let height = 1.0 - p.x * p.x - p.y * p.y;
+        wi = (p * max(1.0 + height, 0.0).sqrt()).extend(max(height, 0.0));
+        is_delta = false;
+    }
+    if is_delta {
+        return LobeSample {
+            wi,
+            weight,
+            pdf: 0.0,
+            eta,
+        };
+    }
+    let pdf = principled_pdf(m, wo, wi, lobes);
+    let value = principled_eval(m, wo, wi, lobes);
+    let factor = if pdf > 1e-30 { 1.0 / max(pdf, 1e-30) } else { 0.0 };
+    LobeSample {
+        wi,
+        weight: value * factor,
+        pdf,
+        eta,
+    }
+}
+
+pub fn sheen_lobe(alpha: f32, wo: Vec3, wi: Vec3) -> f32 {
+    let half = half_between(wo, wi);
+    let sine = min(half.x * half.x + half.y * half.y, 1.0).sqrt();
+    let d = (2.0 + 1.0 / alpha) * power(sine, 1.0 / alpha) * 0.159_154_94;
+    d / (4.0 * max(wi.z + wo.z - wi.z * wo.z, 1e-4))
+}
+
+pub fn sheen_albedo(roughness: f32, cosine: f32) -> f32 {
+    let r = roughness;
+    let q = 1.0 / r;
+    let s = max(cosine, 0.0).sqrt();
+    let p0 = 0.389_026_82 - 1.904_149_5 * r + 0.943_046_03 * r * r + 0.132_342_25 * q;
+    let p1 = 1.077_997_7 - 1.356_616_1 * r + 0.205_053_67 * r * r - 0.262_595_7 * q;
+    let p2 = -12.212_699 + 15.173_416 * r - 5.192_227 * r * r + 0.104_818_46 * q;
+    let p3 = 29.434_828 - 40.606_533 * r + 16.015_73 * r * r - 2.291_067_8 * q;
+    let p4 = -18.896_416 + 29.188_488 * r - 12.603_876 * r * r + 0.700_986_5 * q;
+    let logarithm = p0 + s * (p1 + s * (p2 + s * (p3 + s * p4)));
+    1.02 * exp2(logarithm * std::f32::consts::LOG2_E)
+}

@@ -1,0 +1,306 @@
+//! Twin of `shaders/scattering.wgsl`: what a surface does with light where it bounces, whatever it is made of.
+
+use glam::{Vec2, Vec3, Vec4};
+
+use super::dielectric::{eta_of, refracts_inwards};
+use super::diffuse::{angles_at, diffuse_eval, diffuse_pdf, rough_diffuse_eval};
+use super::lobe::{LobeSample, facet_alpha, facet_loss, is_polished, lobe_frame, vector_to_lobe};
+use super::math::{dot, floor, max, min};
+use super::mesh::{Spot, face_lets_pass};
+use super::metal::{metal_eval, metal_fresnel, metal_pdf, metal_sample};
+use super::modified_phong::{modified_phong_eval, modified_phong_pdf, phong_factors};
+use super::path::{is_specular, usable_normal};
+use super::phong::is_lit;
+use super::primitive::Tangents;
+use super::principled::{Mixture, principled_eval, principled_mixture, principled_pdf};
+use super::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf, rough_dielectric_sample};
+use super::surface::Surface;
+use super::thin::{thin_eval, thin_pdf, thin_sample};
+use super::warp::frame_around;
+use crate::pack::{
+    DIFFUSE, ENERGY_SIZE, FACET_KINDS, GLASS, INSTANCE, LOBE_COAT, METAL, Material, NOTHING, PASSING_KINDS, PHONG,
+    PRINCIPLED, Packed, ROUGH_GLASS, THIN,
+};
+
+/// What a material has that is none of that kind.
+pub static NO_MIXTURE: Mixture = Mixture {
+    diffuse: Vec3::ZERO,
+    alpha: Vec2::ZERO,
+    f0: Vec3::ZERO,
+    f90: 0.0,
+    gain: Vec3::ZERO,
+    passed: Vec3::ZERO,
+    inner_f0: Vec3::ZERO,
+    inner_f90: 0.0,
+    eta: 0.0,
+    thin: false,
+    coat: 0.0,
+    coat_alpha: 0.0,
+    coat_normal: Vec3::ZERO,
+    sheen: Vec3::ZERO,
+    sheen_alpha: 0.0,
+    chances: Vec4::ZERO,
+};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reflection {
+    pub value: Vec3,
+    pub pdf: f32,
+}
+
+#[inline(always)]
+pub fn reflection(
+    scene: &Packed,
+    spot: &Spot,
+    surface: &Surface,
+    material: &Material,
+    mixture: &Mixture,
+    wi: Vec3,
+) -> Reflection {
+    if has_facets(material) {
+        let frame = Tangents {
+            u: surface.du,
+            v: surface.dv,
+        };
+        let wo = vector_to_lobe(frame, surface.shading_normal, surface.wo);
+        let mut result = facet_reflection(material, wo, vector_to_lobe(frame, surface.shading_normal, wi));
+        if !lets_light(scene, spot, surface, material, wi) {
+            result.value = Vec3::ZERO;
+        }
+        return result;
+    }
+    let angles = angles_at(surface.shading_normal, surface.wo, wi);
+    let (value, pdf) = if material.kind == PHONG {
+        (
+            modified_phong_eval(material, angles),
+            modified_phong_pdf(material, angles),
+        )
+    } else if material.kind == PRINCIPLED {
+        let lobes = scene.specialization.lobes;
+        let frame = Tangents {
+            u: surface.du,
+            v: surface.dv,
+        };
+        let local = vector_to_lobe(frame, surface.shading_normal, wi);
+        let wo = local_wo(surface);
+        (
+            principled_eval(mixture, wo, local, lobes),
+            principled_pdf(mixture, wo, local, lobes),
+        )
+    } else if material.roughness > 0.0 {
+        (rough_diffuse_eval(material, angles), diffuse_pdf(angles))
+    } else {
+        (diffuse_eval(material, angles), diffuse_pdf(angles))
+    };
+    Reflection {
+        value: if lets_light(scene, spot, surface, material, wi) {
+            value
+        } else {
+            Vec3::ZERO
+        },
+        pdf,
+    }
+}
+
+pub fn bounded(found: Material) -> Material {
+    let mut material = found;
+    let bounded = |color: Vec3| color.map(|x| if x > 1.0 { 1.0 } else { x });
+    if (found.kind == DIFFUSE) | (found.kind == PRINCIPLED) {
+        material.diffuse = bounded(found.diffuse);
+    }
+    material.tint = bounded(found.tint);
+    material.roughness = min(found.roughness, 1.0);
+    if found.kind == PRINCIPLED {
+        material.sheen = bounded(found.sheen);
+        material.sheen_roughness = min(found.sheen_roughness, 1.0);
+        material.anisotropy = min(found.anisotropy, 1.0);
+        material.metallic = min(found.metallic, 1.0);
+        material.transmission = min(found.transmission, 1.0);
+        material.clearcoat = min(found.clearcoat, 1.0);
+        material.clearcoat_roughness = min(found.clearcoat_roughness, 1.0);
+        material.specular_weight = min(found.specular_weight, 1.0);
+    }
+    material
+}
+
+#[inline(always)]
+pub fn shaded_normal(surface: Surface, material: &Material, normal: Vec3) -> Vec3 {
+    if is_delta(material) {
+        let usable = usable_normal(surface, normal);
+        let bends = (material.kind == GLASS) | (material.kind == ROUGH_GLASS);
+        if bends && !refracts_inwards(&surface, material, usable) {
+            return surface.normal;
+        }
+        return usable;
+    }
+    if has_facets(material) | (material.kind == PRINCIPLED) {
+        return usable_normal(surface, normal);
+    }
+    normal
+}
+
+pub fn albedo(material: &Material) -> Vec3 {
+    if material.kind == PHONG {
+        let factors = phong_factors(material);
+        return factors.diffuse + factors.specular;
+    }
+    match material.kind {
+        DIFFUSE | PRINCIPLED => material.diffuse,
+        METAL => metal_fresnel(material, 1.0),
+        ROUGH_GLASS | THIN => material.tint,
+        _ => Vec3::ZERO,
+    }
+}
+
+#[inline(always)]
+pub fn has_inside(material: &Material) -> bool {
+    let is_volume = (material.kind == PRINCIPLED) & (material.thin == 0) & (material.transmission > 0.0);
+    (material.kind == GLASS) | (material.kind == ROUGH_GLASS) | is_volume
+}
+
+#[inline(always)]
+pub fn is_delta(material: &Material) -> bool {
+    is_specular(material) || has_facets(material) && is_polished(material)
+}
+
+#[inline(always)]
+pub fn has_facets(material: &Material) -> bool {
+    (FACET_KINDS >> material.kind) & 1 != 0
+}
+
+#[inline(always)]
+pub fn facet_frame(scene: &Packed, surface: Surface, material: &Material) -> Tangents {
+    if scene.specialization.anisotropic != 0 {
+        return lobe_frame(&surface, material.rotation);
+    }
+    frame_around(surface.shading_normal)
+}
+
+pub fn facets_of(scene: &Packed, surface: &Surface, found: Material) -> Material {
+    let mut material = found;
+    let frame = Tangents {
+        u: surface.du,
+        v: surface.dv,
+    };
+    let wo = vector_to_lobe(frame, surface.shading_normal, surface.wo);
+    if material.kind == ROUGH_GLASS {
+        material.ior = 1.0 / eta_of(surface, &found);
+    }
+    if material.energy != NOTHING {
+        material.loss = if material.kind == ROUGH_GLASS {
+            1.0 / energy_kept(scene, material.energy, facet_alpha(&material), wo, surface.side) - 1.0
+        } else {
+            facet_loss(facet_alpha(&material), wo)
+        };
+    }
+    material
+}
+
+pub fn energy_kept(scene: &Packed, energy: u32, alpha: Vec2, wo: Vec3, side: f32) -> f32 {
+    let last = (ENERGY_SIZE - 1) as f32;
+    let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
+    let row = min(square.sqrt().sqrt(), 1.0) * last;
+    let column = min(max(wo.z, 0.0), 1.0) * last;
+    let i = min(floor(row), last - 1.0);
+    let j = min(floor(column), last - 1.0);
+    let table = if side > 0.0 { 0 } else { ENERGY_SIZE * ENERGY_SIZE };
+    let start = energy + table + i as u32 * ENERGY_SIZE + j as u32;
+    let word = |i: u32| f32::from_bits(scene.texels[i as usize]);
+    let finer = Vec2::new(word(start), word(start + 1));
+    let rougher = Vec2::new(word(start + ENERGY_SIZE), word(start + ENERGY_SIZE + 1));
+    let both = finer + (rougher - finer) * (row - i);
+    both.x + (both.y - both.x) * (column - j)
+}
+
+#[inline(always)]
+pub fn facet_reflection(material: &Material, wo: Vec3, wi: Vec3) -> Reflection {
+    let (value, pdf) = match material.kind {
+        METAL => (metal_eval(material, wo, wi), metal_pdf(material, wo, wi)),
+        ROUGH_GLASS => (
+            rough_dielectric_eval(material, wo, wi),
+            rough_dielectric_pdf(material, wo, wi),
+        ),
+        _ => (thin_eval(material, wo, wi), thin_pdf(material, wo, wi)),
+    };
+    Reflection { value, pdf }
+}
+
+#[inline(always)]
+pub fn facet_sample(material: &Material, wo: Vec3, u: Vec2, random: f32) -> LobeSample {
+    match material.kind {
+        METAL => metal_sample(material, wo, u),
+        ROUGH_GLASS => rough_dielectric_sample(material, wo, u, random),
+        _ => thin_sample(material, wo, u, random),
+    }
+}
+
+pub fn local_wo(surface: &Surface) -> Vec3 {
+    let frame = Tangents {
+        u: surface.du,
+        v: surface.dv,
+    };
+    let wo = vector_to_lobe(frame, surface.shading_normal, surface.wo);
+    Vec3::new(wo.x, wo.y, max(wo.z, 1e-6))
+}
+
+pub fn mixture_at(scene: &Packed, surface: &Surface, material: &Material, coat_normal: Vec3) -> Mixture {
+    let s = &scene.specialization;
+    let mut coat = Vec3::Z;
+    if (s.lobes & LOBE_COAT != 0) & (s.normal_maps == 1) {
+        let frame = Tangents {
+            u: surface.du,
+            v: surface.dv,
+        };
+        coat = vector_to_lobe(frame, surface.shading_normal, usable_normal(*surface, coat_normal));
+    }
+    principled_mixture(material, local_wo(surface), surface.side > 0.0, coat, s.lobes)
+}
+
+#[inline(always)]
+pub fn lets_light(scene: &Packed, spot: &Spot, surface: &Surface, material: &Material, wi: Vec3) -> bool {
+    let mut lit = is_lit(surface, wi);
+    if scene.specialization.in_tree & (1 << INSTANCE) != 0 {
+        lit &= face_lets_pass(spot, surface, wi);
+    }
+    if lets_through(material) {
+        let behind = (dot(surface.shading_normal, wi) < 0.0) & (dot(surface.smooth_normal, wi) < 0.0);
+        lit |= behind & (dot(surface.normal, wi) < 0.0);
+    }
+    lit
+}
+
+#[inline(always)]
+pub fn lets_through(material: &Material) -> bool {
+    let passes = (PASSING_KINDS >> material.kind) & 1 != 0;
+    passes | ((material.kind == PRINCIPLED) & (material.transmission > 0.0))
+}
+
+#[inline(always)]
+pub fn lit_normal(surface: &Surface, material: &Material) -> Vec3 {
+    if !lets_through(material) {
+        surface.shading_normal
+    } else {
+        Vec3::ZERO
+    }
+}
+
+pub fn turned_over(scene: &Packed, surface: &Surface) -> Surface {
+    let mut result = *surface;
+    result.start = surface.position - (surface.start - surface.position);
+    if scene.specialization.in_tree & (1 << INSTANCE) != 0 {
+        result.start += surface.bulge;
+    }
+    result.above = surface.below;
+    result.below = surface.above;
+    result
+}
+
+pub fn absorption_behind(before: Vec3, surface: &Surface, material: &Material) -> Vec3 {
+    if !has_inside(material) {
+        before
+    } else if surface.side > 0.0 {
+        material.absorption
+    } else {
+        Vec3::ZERO
+    }
+}

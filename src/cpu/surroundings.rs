@@ -1,0 +1,62 @@
+//! Twin of `shaders/surroundings.wgsl`: directions around a scene, and the cells of the image that surrounds it.
+
+use glam::{Vec2, Vec3};
+
+use super::math::{atan2, floor, max, min, sine};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapCell {
+    pub column: u32,
+    pub row: u32,
+    pub x: f32,
+    pub y: f32,
+}
+
+pub fn cell_towards(d: Vec3, width: u32, height: u32) -> MapCell {
+    let u = (0.5 - atan2(d.y, d.x) * 0.159_154_94) * width as f32 - 0.5;
+    let v = atan2((d.x * d.x + d.y * d.y).sqrt(), d.z) * std::f32::consts::FRAC_1_PI * height as f32 + 0.5;
+    let column = floor(u);
+    let row = min(floor(v), height as f32);
+    let at = v - row;
+    let first = row == 0.0;
+    let last = row == height as f32;
+    let y = if first {
+        2.0 * at - 1.0
+    } else if last {
+        2.0 * at
+    } else {
+        at
+    };
+    let inside = min(max(y, 0.0), 1.0);
+    MapCell {
+        column: if column >= 0.0 { column } else { width as f32 - 1.0 } as u32,
+        row: row as u32,
+        x: u - column,
+        y: inside,
+    }
+}
+
+pub fn column_after(column: u32, width: u32) -> u32 {
+    if column + 1 == width { 0 } else { column + 1 }
+}
+
+pub fn cap_above(row: u32, height: u32) -> f32 {
+    let from_pole = max(row as f32 - 0.5, 0.0) / height as f32;
+    let s = sine(0.5 * min(from_pole, 1.0));
+    2.0 * s * s
+}
+
+pub fn direction_in_cell(column: u32, row: u32, u: Vec2, width: u32, height: u32) -> Vec3 {
+    let turn = 1.0 - 2.0 * ((column as f32 + 0.5 + u.x) / width as f32);
+    let below = row > height / 2;
+    let from_pole = if below { height - row } else { row };
+    let inner = cap_above(from_pole, height);
+    let cap = inner + (cap_above(from_pole + 1, height) - inner) * u.y;
+    let radius = max(cap * (2.0 - cap), 0.0).sqrt();
+    let z = 1.0 - cap;
+    Vec3::new(
+        radius * sine(turn + 0.5),
+        radius * sine(turn),
+        if below { -z } else { z },
+    )
+}

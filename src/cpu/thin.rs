@@ -1,0 +1,64 @@
+//! Twin of `shaders/thin.wgsl`: the material `dielectric` where it is a thin sheet.
+
+use glam::{Vec2, Vec3};
+
+use super::ggx::{ggx_d, ggx_length, ggx_sample};
+use super::lobe::{LobeSample, facet_alpha, facet_eval, facet_pdf, facet_weight, half_vector};
+use super::math::{dot, max, min};
+use super::rough_dielectric::dielectric_gain;
+use super::specular::{fresnel, refracted_cosine};
+use crate::pack::Material;
+
+pub fn thin_reflectance(ior: f32, cosine: f32) -> f32 {
+    let c = min(max(cosine, 1e-6), 1.0);
+    let eta = 1.0 / ior;
+    let once = fresnel(c, refracted_cosine(c, eta), eta);
+    2.0 * once / (1.0 + once)
+}
+
+pub fn turned_up(wi: Vec3) -> Vec3 {
+    Vec3::new(wi.x, wi.y, wi.z.abs())
+}
+
+pub fn thin_eval(material: &Material, wo: Vec3, wi: Vec3) -> Vec3 {
+    let up = turned_up(wi);
+    let reflected = thin_reflectance(material.ior, dot(wo, half_vector(wo, up)));
+    let share = if wi.z > 0.0 {
+        Vec3::splat(reflected)
+    } else {
+        material.tint * (1.0 - reflected)
+    };
+    let value = share * (facet_eval(facet_alpha(material), wo, up) * dielectric_gain(material));
+    if (wo.z > 0.0) & (up.z > 0.0) { value } else { Vec3::ZERO }
+}
+
+pub fn thin_pdf(material: &Material, wo: Vec3, wi: Vec3) -> f32 {
+    let up = turned_up(wi);
+    let reflected = thin_reflectance(material.ior, dot(wo, half_vector(wo, up)));
+    let share = if wi.z > 0.0 { reflected } else { 1.0 - reflected };
+    if (wo.z > 0.0) & (up.z > 0.0) {
+        share * facet_pdf(facet_alpha(material), wo, up)
+    } else {
+        0.0
+    }
+}
+
+pub fn thin_sample(material: &Material, wo: Vec3, u: Vec2, random: f32) -> LobeSample {
+    let alpha = facet_alpha(material);
+    let m = ggx_sample(alpha, wo, u);
+    let cosine = dot(wo, m);
+    let reflected = thin_reflectance(material.ior, cosine);
+    let mirrors = random < reflected;
+    let up = m * (2.0 * cosine) - wo;
+    let lit = (wo.z > 0.0) & (up.z > 0.0) & (cosine > 0.0);
+    let weight =
+        if mirrors { Vec3::ONE } else { material.tint } * (facet_weight(alpha, wo, up) * dielectric_gain(material));
+    let share = if mirrors { reflected } else { 1.0 - reflected };
+    let pdf = share * ggx_d(alpha, m) * 0.5 / max(wo.z + ggx_length(alpha, wo), 1e-30);
+    LobeSample {
+        wi: Vec3::new(up.x, up.y, if mirrors { up.z } else { -up.z }),
+        weight: if lit { weight } else { Vec3::ZERO },
+        pdf: if lit { pdf } else { 0.0 },
+        eta: 1.0,
+    }
+}

@@ -1,0 +1,313 @@
+//! The tree's cones, bounds and probabilities against integrals and searches written from other formulas, in f64.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use glam::{DVec3, Vec3};
+
+use super::*;
+use crate::cpu::light_tree::{first_share, light_importance, light_sibling};
+
+/// Numbers from 0 to 1, by a linear congruence.
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn point(&mut self) -> DVec3 {
+        DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
+    }
+
+    fn direction(&mut self) -> DVec3 {
+        loop {
+            let p = self.point();
+            if (1e-3..=1.0).contains(&p.length()) {
+                return p.normalize();
+            }
+        }
+    }
+
+    fn cone(&mut self) -> Cone {
+        let spread = match (self.unit() * 4.0) as u32 {
+            0 => 0.0,
+            1 => self.unit() * 0.3,
+            2 => self.unit() * PI,
+            _ => return Cone::ALL,
+        };
+        Cone {
+            axis: self.direction(),
+            spread,
+            edge: if self.unit() < 0.5 {
+                FRAC_PI_2
+            } else {
+                self.unit() * FRAC_PI_2
+            },
+            two_sided: self.unit() < 0.3,
+        }
+    }
+
+    /// A square lamp, or a point.
+    fn lamp(&mut self, i: u32, two_sided: bool) -> Lamp {
+        let (center, normal) = (self.point() * 5.0, self.direction());
+        let half = if self.unit() < 0.2 { 0.0 } else { 0.3 * self.unit() };
+        let cone = match half == 0.0 {
+            true => Cone::ALL,
+            false => Cone::flat(normal, two_sided),
+        };
+        Lamp {
+            low: center - half,
+            high: center + half,
+            cone,
+            intensity: (self.unit() * 20.0 - 15.0).exp(),
+            density: 1.0,
+            instance: 0,
+            index: i,
+        }
+    }
+}
+
+/// Whether a cone has a normal; of a cone of both sides, it or its opposite.
+fn has(cone: &Cone, normal: DVec3) -> bool {
+    let away = cone.axis.angle_between(normal);
+    let away = if cone.two_sided { away.min(PI - away) } else { away };
+    away <= cone.spread + 1e-7
+}
+
+#[test]
+fn a_cone_around_two_has_what_both_have() {
+    let mut random = Random(1);
+    let mut narrower = 0;
+    for _ in 0..4000 {
+        let (a, b) = (random.cone(), random.cone());
+        let both = a.with(&b);
+        assert!(both.edge >= a.edge.max(b.edge) && (both.axis.length() - 1.0).abs() < 1e-9);
+        assert!(both.two_sided == (a.two_sided || b.two_sided));
+        narrower += u32::from(both.spread < PI);
+        for cone in [a, b] {
+            for _ in 0..8 {
+                // A normal of it, at its rim as often as inside.
+                let side = cone.axis.any_orthonormal_vector();
+                let around = DQuat::from_axis_angle(cone.axis, random.unit() * 2.0 * PI) * side;
+                let angle = cone.spread * if random.unit() < 0.5 { 1.0 } else { random.unit() };
+                let normal = DQuat::from_axis_angle(around, angle) * cone.axis;
+                assert!(has(&both, normal), "{a:?} {b:?}: {both:?} has no {normal}");
+            }
+        }
+    }
+    assert!(narrower > 400, "not all are everything: {narrower}");
+}
+
+#[test]
+fn the_measure_of_a_cone_is_the_integral_of_its_weights() {
+    // Equation 1 is the integral over the sphere of 1 inside the spread and of the cosine beyond, to the edge.
+    for (spread, edge) in [
+        (0.0, FRAC_PI_2),
+        (0.5, FRAC_PI_2),
+        (1.2, 0.7),
+        (PI, FRAC_PI_2),
+        (2.5, FRAC_PI_2),
+        (0.0, 0.2),
+    ] {
+        let steps = 200_000;
+        let sum: f64 = (0..steps)
+            .map(|i| {
+                let angle = PI * (f64::from(i) + 0.5) / f64::from(steps);
+                let weight = match angle {
+                    angle if angle <= spread => 1.0,
+                    angle if angle <= spread + edge => (angle - spread).cos(),
+                    _ => 0.0,
+                };
+                2.0 * PI * angle.sin() * weight * PI / f64::from(steps)
+            })
+            .sum();
+        let cone = Cone {
+            axis: DVec3::X,
+            spread,
+            edge,
+            two_sided: false,
+        };
+        assert!(
+            (cone.measure() - sum).abs() < 1e-4,
+            "{spread}, {edge}: {} for {sum}",
+            cone.measure()
+        );
+    }
+}
+
+/// The probability of each lamp at p, by the way down the tree.
+fn probabilities(nodes: &[LightNode], p: Vec3, n: Vec3) -> Vec<f64> {
+    let mut found = vec![0.0; nodes.len().div_ceil(2)];
+    let mut waiting = vec![(0_usize, 1.0)];
+    while let Some((i, probability)) = waiting.pop() {
+        let node = &nodes[i];
+        if node.children == NOTHING {
+            found[node.index as usize] = probability;
+            continue;
+        }
+        let children = node.children as usize;
+        let share = first_share(
+            light_importance(&nodes[children], p, n),
+            light_importance(&nodes[children + 1], p, n),
+        );
+        waiting.push((children, probability * f64::from(share)));
+        waiting.push((children + 1, probability * f64::from(1.0 - share)));
+    }
+    found
+}
+
+#[test]
+fn probabilities_sum_to_one_and_whatever_can_shine_has_one() {
+    let mut random = Random(2);
+    for (count, two_sided) in [(1, false), (2, false), (17, true), (300, false), (300, true)] {
+        let lamps: Vec<Lamp> = (0..count).map(|i| random.lamp(i, two_sided)).collect();
+        let nodes = build(&lamps);
+        assert_eq!(nodes.len(), 2 * lamps.len() - 1);
+        let mut dark = 0;
+        for _ in 0..200 {
+            let p = random.point() * 6.0;
+            let n = if random.unit() < 0.3 {
+                DVec3::ZERO
+            } else {
+                random.direction()
+            };
+            let found = probabilities(&nodes, p.as_vec3(), n.as_vec3());
+            let sum: f64 = found.iter().sum();
+            assert!((sum - 1.0).abs() < 1e-5, "{sum}");
+            for lamp in &lamps {
+                // A point of it, that its normal and the surface's face.
+                let (center, half) = (0.5 * (lamp.low + lamp.high), 0.5 * (lamp.high - lamp.low).x);
+                let u = lamp.cone.axis.any_orthonormal_vector();
+                let v = lamp.cone.axis.cross(u);
+                let lit = (0..9).any(|k| {
+                    let at = center + (u * f64::from(k % 3 - 1) + v * f64::from(k / 3 - 1)) * half / 2.0;
+                    let to = (at - p).normalize();
+                    let faces = lamp.cone.spread > 3.0 || -to.dot(lamp.cone.axis) > 0.0 || lamp.cone.two_sided;
+                    faces && (n == DVec3::ZERO || to.dot(n) > 0.0)
+                });
+                let probability = found[lamp.index as usize];
+                assert!(!lit || probability > 0.0, "{lamp:?} from {p}, {n}");
+                dark += u32::from(probability == 0.0);
+            }
+        }
+        assert!(
+            count < 3 || dark > 100,
+            "some cannot shine there, and are not asked: {dark}"
+        );
+    }
+}
+
+#[test]
+fn nodes_know_their_parents_and_hold_their_children() {
+    let mut random = Random(3);
+    let lamps: Vec<Lamp> = (0..1000).map(|i| random.lamp(i, false)).collect();
+    let nodes = build(&lamps);
+    let (mut seen, mut leaves) = (0, 0);
+    let mut waiting = vec![0_u32];
+    while let Some(i) = waiting.pop() {
+        seen += 1;
+        let node = &nodes[i as usize];
+        if node.children == NOTHING {
+            leaves += 1;
+            continue;
+        }
+        for child in [node.children, node.children + 1] {
+            assert_eq!(nodes[child as usize].parent, i);
+            assert_eq!(light_sibling(child), if child % 2 == 1 { child + 1 } else { child - 1 });
+            let (a, b) = (node, &nodes[child as usize]);
+            // Spheres around boxes: that of a part may stick out, but its middle does not.
+            assert!((a.center - b.center).length() <= a.radius * 1.0001);
+            waiting.push(child);
+        }
+        let sum = nodes[node.children as usize].intensity + nodes[node.children as usize + 1].intensity;
+        assert!((sum - node.intensity).abs() <= 1e-5 * node.intensity);
+    }
+    assert_eq!((seen, leaves), (nodes.len(), lamps.len()));
+}
+
+#[test]
+fn importance_is_what_angles_say() {
+    let mut random = Random(4);
+    let (mut compared, mut dark) = (0, 0);
+    for i in 0..20_000 {
+        let lamp = Lamp {
+            cone: random.cone(),
+            intensity: 1.0,
+            ..random.lamp(i, false)
+        };
+        let node = build(&[lamp])[0];
+        let (p, n) = (random.point() * 6.0, random.direction());
+        let to = 0.5 * (lamp.low + lamp.high) - p;
+        let (distance, radius) = (to.length(), 0.5 * (lamp.high - lamp.low).length());
+        let seen = if distance <= radius {
+            PI
+        } else {
+            (radius / distance).asin()
+        };
+        let along = lamp.cone.axis.angle_between(-to);
+        let along = if lamp.cone.two_sided {
+            along.min(PI - along)
+        } else {
+            along
+        };
+        let leaving = (along - lamp.cone.spread).max(0.0);
+        let facing = n.angle_between(to);
+        let share = |cosine: f64| (cosine + radius / distance) / (1.0 + radius / distance);
+        let value = share(leaving.cos()).max(1e-3) * share(facing.cos()).max(1e-3)
+            / (distance * distance + 0.5 * radius * radius);
+        let found = f64::from(light_importance(&node, p.as_vec3(), n.as_vec3()));
+        if leaving - seen < lamp.cone.edge && facing - seen < FRAC_PI_2 {
+            compared += 1;
+            assert!(
+                (found - value).abs() < 2e-3 * value.max(1e-3),
+                "{found} for {value}: {lamp:?} {p} {n}"
+            );
+        } else if found == 0.0 {
+            dark += 1;
+        }
+    }
+    assert!(
+        compared > 3_000 && dark > 3_000,
+        "{compared} that can shine there, {dark} that are left out"
+    );
+}
+
+#[test]
+fn lamps_in_one_place_and_in_a_row_make_trees_of_few_levels() {
+    let at = |i: u32, p: DVec3, intensity: f64| Lamp {
+        low: p,
+        high: p,
+        cone: Cone::ALL,
+        intensity,
+        density: 1.0,
+        instance: 0,
+        index: i,
+    };
+    let depth = |lamps: &[Lamp]| {
+        let nodes = build(lamps);
+        let levels = |mut i: usize| {
+            let mut levels = 0;
+            while nodes[i].parent != NOTHING {
+                i = nodes[i].parent as usize;
+                levels += 1;
+            }
+            levels
+        };
+        (0..nodes.len()).map(levels).max().unwrap()
+    };
+    let count = 20_000;
+    let one_place: Vec<Lamp> = (0..count).map(|i| at(i, DVec3::ONE, 1.0)).collect();
+    assert_eq!(depth(&one_place), 15);
+    let row: Vec<Lamp> = (0..count).map(|i| at(i, DVec3::X * f64::from(i), 1.0)).collect();
+    assert!(depth(&row) <= 24, "{}", depth(&row));
+    // Each a thousandth of the next: split off one by one, were it not for the bound.
+    let falling: Vec<Lamp> = (0..300)
+        .map(|i| at(i, DVec3::X * 0.5_f64.powi(i as i32), 0.001_f64.powi(i as i32 % 90)))
+        .collect();
+    assert!(depth(&falling) <= 48 + 9, "{}", depth(&falling));
+    assert!(build(&[]).is_empty());
+}

@@ -1,0 +1,101 @@
+//! What a scene file says of the material `principled`.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use super::{ColorDescription, NormalMapDescription, ValueDescription};
+
+/// glTF's metallic-roughness material with its extensions, for `integrator = "path"`; glTF's defaults.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PrincipledDescription {
+    /// The share of light that a dielectric's ground spreads, or a metal reflects head-on.
+    pub base_color: ColorDescription,
+    /// How much of it is metal, 0 to 1.
+    pub metallic: ValueDescription,
+    /// How rough it is, 0 to 1.
+    pub roughness: ValueDescription,
+    /// How much rougher it is along the tangent, 0 to 1.
+    pub anisotropy: ValueDescription,
+    /// The tangent's angle, counter-clockwise in degrees.
+    pub anisotropy_rotation: f64,
+    /// Index of refraction of the dielectric.
+    pub ior: f64,
+    /// Factor of what the dielectric reflects, 0 to 1.
+    pub specular: ValueDescription,
+    /// Factor of what it reflects head-on.
+    pub specular_color: ColorDescription,
+    /// How much of the dielectric's light passes the surface, 0 to 1.
+    pub transmission: ValueDescription,
+    /// 0 where the surface is a thin sheet; else what is behind it is a volume.
+    pub thickness: f64,
+    /// What is left of light after `attenuation_distance` in the volume.
+    pub attenuation_color: DVec3,
+    /// That distance; infinite if absent.
+    pub attenuation_distance: Option<f64>,
+    /// How much there is of a clear coat, 0 to 1.
+    pub clearcoat: ValueDescription,
+    /// How rough that is, 0 to 1.
+    pub clearcoat_roughness: ValueDescription,
+    /// What bends the coat's normals.
+    pub clearcoat_normal_map: Option<NormalMapDescription>,
+    /// The colour of the sheen of cloth.
+    pub sheen_color: ColorDescription,
+    /// How rough the sheen is, 0 to 1.
+    pub sheen_roughness: ValueDescription,
+    /// How much of the surface there is, 0 to 1.
+    pub alpha: ValueDescription,
+    /// What `alpha` does.
+    pub alpha_mode: AlphaMode,
+    /// The least alpha of what is there, under [`AlphaMode::Mask`].
+    pub alpha_cutoff: f64,
+    /// What bends its normals.
+    pub normal_map: Option<NormalMapDescription>,
+    /// Radiance that it sends out; black if absent.
+    pub emission: Option<ColorDescription>,
+    /// Whether the camera sees it; yes if absent.
+    pub visible: Option<bool>,
+}
+
+impl Default for PrincipledDescription {
+    fn default() -> Self {
+        Self {
+            base_color: ColorDescription::default(),
+            metallic: 1.0.into(),
+            roughness: 1.0.into(),
+            anisotropy: 0.0.into(),
+            anisotropy_rotation: 0.0,
+            ior: 1.5,
+            specular: 1.0.into(),
+            specular_color: ColorDescription::default(),
+            transmission: 0.0.into(),
+            thickness: 0.0,
+            attenuation_color: DVec3::ONE,
+            attenuation_distance: None,
+            clearcoat: 0.0.into(),
+            clearcoat_roughness: 0.0.into(),
+            clearcoat_normal_map: None,
+            sheen_color: [0.0; 3].into(),
+            sheen_roughness: 0.0.into(),
+            alpha: 1.0.into(),
+            alpha_mode: AlphaMode::Opaque,
+            alpha_cutoff: 0.5,
+            normal_map: None,
+            emission: None,
+            visible: None,
+        }
+    }
+}
+
+/// What a material's alpha does. In a file the names are in snake case: `"mask"`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AlphaMode {
+    /// Nothing: all of the surface is there.
+    #[default]
+    Opaque,
+    /// The surface is there where its alpha is the cutoff or more.
+    Mask,
+    /// That share of the light meets it; the rest passes straight on.
+    Blend,
+}

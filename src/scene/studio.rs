@@ -1,0 +1,102 @@
+//! A photographer's studio as an image around a scene, by a formula: grey walls, and rectangular lamps with soft edges.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec3, Vec3};
+
+use super::texture::{Image, Texels};
+
+/// Of the image.
+const WIDTH: usize = 1024;
+const HEIGHT: usize = 512;
+/// The radiance of the floor, and of the walls at the height of the eye and overhead.
+const FLOOR: f64 = 0.08;
+const WALL: f64 = 0.14;
+const CEILING: f64 = 0.25;
+/// How wide a lamp's edge is, as a part of a half side.
+const EDGE: f64 = 0.15;
+
+/// A lamp: a rectangle, one unit away.
+struct Lamp {
+    /// The middle.
+    towards: DVec3,
+    /// Half its width and half its height.
+    half: [f64; 2],
+    radiance: f64,
+}
+
+/// The studio. Its main lamp is to the left of who looks along +y, as is its edge; a weaker one to the right, one overhead, and one behind what is
+/// seen.
+const LAMPS: [Lamp; 4] = [
+    Lamp {
+        towards: DVec3::new(-0.75, -0.6, 0.65),
+        half: [0.5, 0.45],
+        radiance: 3.0,
+    },
+    Lamp {
+        towards: DVec3::new(0.95, -0.35, 0.35),
+        half: [0.3, 0.55],
+        radiance: 1.1,
+    },
+    Lamp {
+        towards: DVec3::new(0.0, 0.0, 1.0),
+        half: [0.35, 0.6],
+        radiance: 1.8,
+    },
+    Lamp {
+        towards: DVec3::new(0.35, 0.95, 0.5),
+        half: [0.12, 0.5],
+        radiance: 2.2,
+    },
+];
+
+/// The studio's image.
+pub fn studio() -> Image {
+    let texel = |i: usize| {
+        let angle = (0.5 + (i / WIDTH) as f64) * PI / HEIGHT as f64;
+        let turn = PI - (0.5 + (i % WIDTH) as f64) * TAU / WIDTH as f64;
+        let direction = DVec3::new(angle.sin() * turn.cos(), angle.sin() * turn.sin(), angle.cos());
+        Vec3::splat(radiance(direction) as f32).into()
+    };
+    Image {
+        width: WIDTH as u32,
+        height: HEIGHT as u32,
+        texels: Texels::Floats((0..WIDTH * HEIGHT).map(texel).collect()),
+    }
+}
+
+fn radiance(direction: DVec3) -> f64 {
+    let z = direction.z;
+    // The floor meets the walls in a wide curve, as a studio's does.
+    let room = match z < 0.0 {
+        true => WALL + (FLOOR - WALL) * smooth(-3.0 * z),
+        false => WALL + (CEILING - WALL) * smooth(z),
+    };
+    let lamps = LAMPS.iter().map(|lamp| lamp.radiance * lamp.share(direction));
+    lamps.fold(room, f64::max)
+}
+
+impl Lamp {
+    /// 1 on the lamp, 0 beside it.
+    fn share(&self, direction: DVec3) -> f64 {
+        let axis = self.towards.normalize();
+        let ahead = direction.dot(axis);
+        if ahead <= 0.0 {
+            return 0.0;
+        }
+        let right = match axis.z.abs() < 0.99 {
+            true => axis.cross(DVec3::Z).normalize(),
+            false => DVec3::X,
+        };
+        let up = right.cross(axis);
+        let at = [right, up].map(|side| direction.dot(side).abs() / ahead);
+        let inside = |i: usize| smooth((1.0 + EDGE - at[i] / self.half[i]) / EDGE);
+        inside(0) * inside(1)
+    }
+}
+
+/// From 0 to 1, without a corner.
+fn smooth(x: f64) -> f64 {
+    let x = x.clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
+}

@@ -1,0 +1,106 @@
+//! The rules of what surrounds a scene.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+
+use super::super::sky::{Sky, sky};
+use super::super::studio::studio;
+use super::super::{EnvironmentDescription, EnvironmentImage, EnvironmentName, EnvironmentRotation, Image, Rotation};
+use super::appearance::Images;
+use super::mesh::turn;
+use super::path::needs_path;
+use super::{At, Checked, Description, Environment, Integrator, Problem, between, check, color, show};
+
+/// The largest factor of radiance.
+const MOST_SCALE: f64 = 1e6;
+/// How high the sun may stand, in degrees.
+const ELEVATIONS: (f64, f64) = (0.0, 90.0);
+/// How hazy a sky may be.
+const TURBIDITIES: (f64, f64) = (1.0, 10.0);
+/// Where the sun stands, in degrees, and how hazy it is, if nothing is said.
+const ELEVATION: f64 = 40.0;
+const TURBIDITY: f64 = 2.0;
+
+/// The surroundings: under the path tracer the section's, or the background, if they shine.
+pub(super) fn environment(description: &Description, images: &mut Images) -> Checked<Option<Environment>> {
+    let integrator = description.render.integrator;
+    let background = description.render.background;
+    let environment = match &description.environment {
+        None if integrator == Integrator::Phong => return Ok(None),
+        None => plain(background),
+        Some(environment) => {
+            needs_path(integrator)?;
+            check(background == DVec3::ZERO, || {
+                let background = show(background);
+                format!("must not be there beside render.background, {background}, which stands for it")
+            })?;
+            described(environment, images)?
+        }
+    };
+    let shines = environment.color != DVec3::ZERO || environment.image.as_ref().is_some_and(|image| image.scale > 0.0);
+    Ok(shines.then_some(environment))
+}
+
+fn plain(color: DVec3) -> Environment {
+    Environment {
+        color,
+        image: None,
+        visible: true,
+    }
+}
+
+fn described(description: &EnvironmentDescription, images: &mut Images) -> Checked<Environment> {
+    let scale = between(description.scale, 0.0, MOST_SCALE).at("scale")?;
+    let to_world = match &description.rotate {
+        None => DMat3::IDENTITY,
+        Some(EnvironmentRotation::Degrees(degrees)) => {
+            turn(&Rotation::Angles(DVec3::new(0.0, 0.0, *degrees))).at("rotate")?
+        }
+        Some(EnvironmentRotation::Any(rotation)) => turn(rotation).at("rotate")?,
+    };
+    let sky = sky_of(description)?;
+    let with = |image: Arc<Image>| Environment {
+        color: DVec3::ZERO,
+        image: Some(EnvironmentImage { image, scale, to_world }),
+        visible: description.visible,
+    };
+    let own = |name: &str, image: Image, images: &mut Images| {
+        let kept = images.own(name, &image).map_err(Problem::new).at("name");
+        kept.map(|()| with(Arc::new(image)))
+    };
+    match (description.color, &description.file, description.name) {
+        (Some(plain), None, None) => Ok(Environment {
+            color: color(plain).at("color")? * scale,
+            image: None,
+            visible: description.visible,
+        }),
+        (None, Some(file), None) => Ok(with(images.around(file).map_err(Problem::new).at("file")?)),
+        (None, None, Some(EnvironmentName::Studio)) => own("studio", studio(), images),
+        (None, None, Some(EnvironmentName::Sky)) => own("sky", self::sky(&sky), images),
+        _ => Err(Problem::new("must have one of \"color\", \"file\" and \"name\"")),
+    }
+}
+
+/// The sky that is described; its keys belong to nothing else.
+fn sky_of(description: &EnvironmentDescription) -> Checked<Sky> {
+    let is_sky = description.name == Some(EnvironmentName::Sky);
+    let value = |key: &str, value: Option<f64>, default: f64, (low, high): (f64, f64)| {
+        let Some(value) = value else { return Ok(default) };
+        check(is_sky, || "needs name = \"sky\"".to_owned()).at(key)?;
+        between(value, low, high).at(key)
+    };
+    Ok(Sky {
+        elevation: value("sun_elevation", description.sun_elevation, ELEVATION, ELEVATIONS)?.to_radians(),
+        azimuth: value("sun_azimuth", description.sun_azimuth, 0.0, (-360.0, 360.0))?.to_radians(),
+        turbidity: value("turbidity", description.turbidity, TURBIDITY, TURBIDITIES)?,
+    })
+}
+
+/// What is told of an image that is no panorama.
+pub(super) fn note(description: &Description, environment: Option<&Environment>) -> Option<String> {
+    let file = description.environment.as_ref()?.file.as_ref()?;
+    let Image { width, height, .. } = *environment?.image.as_ref()?.image;
+    let rule = "an equirectangular one is twice as wide as it is high, and this one is stretched to that";
+    (width != 2 * height).then(|| format!("environment.file: {file:?} has {width} x {height} texels; {rule}"))
+}

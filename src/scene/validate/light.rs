@@ -1,0 +1,57 @@
+//! The rules of spot lights.
+
+use glam::DVec3;
+
+use super::super::{Light, SpotLightDescription};
+use super::{At, Checked, LENGTHS, Problem, check, color, number, point, show, unit};
+
+/// The smallest and the largest angle between a cone's middle and its edge, in degrees.
+const CONES: (f64, f64) = (0.01, 180.0);
+
+pub(super) fn spot(light: &SpotLightDescription) -> Checked<Light> {
+    let position = point(light.position).at("position")?;
+    let direction = direction(light, position)?;
+    let (low, high) = CONES;
+    let cone = light.cone_angle;
+    check((low..=high).contains(&cone), || {
+        let [cone, low, high] = [cone, low, high].map(number);
+        format!("{cone} must be greater than 0, from {low} to {high}")
+    })
+    .at("cone_angle")?;
+    let inner = light.inner_angle;
+    check((0.0..=cone).contains(&inner), || {
+        let [inner, cone] = [inner, cone].map(number);
+        format!("{inner} must be from 0 to cone_angle, {cone}")
+    })
+    .at("inner_angle")?;
+    Ok(Light::Spot {
+        position,
+        direction,
+        color: color(light.color).at("color")?,
+        cone: cone.to_radians(),
+        inner: inner.to_radians(),
+    })
+}
+
+/// The direction, or the way to the point that the light looks at.
+fn direction(light: &SpotLightDescription, position: DVec3) -> Checked<DVec3> {
+    match (light.direction, light.look_at) {
+        (Some(direction), None) => unit(direction).at("direction"),
+        (None, Some(goal)) => {
+            let way = point(goal).at("look_at")? - position;
+            check(way.length() >= LENGTHS.0, || {
+                let (goal, least) = (show(goal), number(LENGTHS.0));
+                format!("{goal} must not be where the light is: at least {least} away")
+            })
+            .at("look_at")?;
+            Ok(way.normalize())
+        }
+        (Some(_), Some(_)) => {
+            Err(Problem::new("must not be there beside look_at, which stands for it")).at("direction")
+        }
+        (None, None) => Err(Problem::new("is missing, and there is no look_at to stand in for it")).at("direction"),
+    }
+}
+
+#[cfg(test)]
+mod tests;

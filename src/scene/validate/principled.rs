@@ -1,0 +1,72 @@
+//! The rules of the material `principled`.
+
+use glam::DVec3;
+
+use super::super::{Principled, PrincipledDescription};
+use super::appearance::{DARKEST, Textures};
+use super::{At, Checked, between, check, number};
+
+/// Indices of refraction, from that of empty space on.
+pub(super) const IORS: (f64, f64) = (1.0, 100.0);
+/// Distances after which light is attenuated.
+pub(super) const ATTENUATION_DISTANCES: (f64, f64) = (1e-6, 1e9);
+
+impl Textures<'_> {
+    pub(super) fn principled(&self, d: &PrincipledDescription) -> Checked<Principled> {
+        let thin = d.thickness == 0.0;
+        check((0.0..=ATTENUATION_DISTANCES.1).contains(&d.thickness), || {
+            let (thickness, most) = (number(d.thickness), number(ATTENUATION_DISTANCES.1));
+            format!("{thickness} must be finite, from 0 to {most}; 0 is a thin sheet")
+        })
+        .at("thickness")?;
+        let absorption = absorption(d.attenuation_color, d.attenuation_distance)?;
+        check(!thin || absorption == DVec3::ZERO, || {
+            "needs a thickness: what is thin has no inside in which light is lost".to_owned()
+        })
+        .at("attenuation_color")?;
+        Ok(Principled {
+            base_color: self.tint(&d.base_color).at("base_color")?,
+            metallic: self.value(&d.metallic).at("metallic")?,
+            roughness: self.value(&d.roughness).at("roughness")?,
+            anisotropy: self.value(&d.anisotropy).at("anisotropy")?,
+            anisotropy_rotation: between(d.anisotropy_rotation, -360.0, 360.0)
+                .at("anisotropy_rotation")?
+                .to_radians(),
+            ior: between(d.ior, IORS.0, IORS.1).at("ior")?,
+            specular: self.value(&d.specular).at("specular")?,
+            specular_color: self.color(&d.specular_color).at("specular_color")?,
+            transmission: self.value(&d.transmission).at("transmission")?,
+            thin,
+            absorption,
+            clearcoat: self.value(&d.clearcoat).at("clearcoat")?,
+            clearcoat_roughness: self.value(&d.clearcoat_roughness).at("clearcoat_roughness")?,
+            clearcoat_normal_map: self.normal_map(&d.clearcoat_normal_map).at("clearcoat_normal_map")?,
+            sheen_color: self.tint(&d.sheen_color).at("sheen_color")?,
+            sheen_roughness: self.value(&d.sheen_roughness).at("sheen_roughness")?,
+            alpha: self.value(&d.alpha).at("alpha")?,
+            alpha_mode: d.alpha_mode,
+            alpha_cutoff: between(d.alpha_cutoff, 0.0, 1.0).at("alpha_cutoff")?,
+        })
+    }
+}
+
+/// How much light is swallowed for each unit of length, where `color` is left of it after a distance.
+fn absorption(color: DVec3, distance: Option<f64>) -> Checked<DVec3> {
+    for x in color.to_array() {
+        between(x, 0.0, 1.0).at("attenuation_color")?;
+    }
+    let Some(distance) = distance else {
+        check(color == DVec3::ONE, || {
+            "is missing, and attenuation_color, which is left after it, needs it".to_owned()
+        })
+        .at("attenuation_distance")?;
+        return Ok(DVec3::ZERO);
+    };
+    let (low, high) = ATTENUATION_DISTANCES;
+    check((low..=high).contains(&distance), || {
+        let [distance, low, high] = [distance, low, high].map(number);
+        format!("{distance} must be greater than 0, from {low} to {high}")
+    })
+    .at("attenuation_distance")?;
+    Ok(color.map(|x| (-x.ln() / distance).clamp(0.0, DARKEST)))
+}

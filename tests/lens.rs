@@ -1,0 +1,343 @@
+//! A thin lens: the circle of confusion in closed form, the shape of the opening, what is sharp, and the ends of its ranges.
+
+use glam::{Vec2, Vec3};
+use wgray::Scene;
+use wgray::cpu::camera::camera_ray;
+use wgray::cpu::lens::{lens_ray, lens_sample};
+use wgray::cpu::sequence::sobol_sample;
+use wgray::pack::Packed;
+
+use crate::pictures::{both, differing, exact_ways, means, render};
+use crate::scenes::{self, parse};
+
+/// Pixels along each side of the picture, and its field of view.
+const SIDE: u32 = 64;
+const FOV: f64 = 10.0;
+
+/// The camera at the origin looks along y at a shining disk of radius 0.005 times its distance. `lens` are lines of `[camera]`.
+fn spot(distance: f64, lens: &str, samples: u32) -> Packed {
+    let radius = 0.005 * distance;
+    parse(&format!(
+        "image = {{ width = {SIDE}, height = {SIDE} }}
+        [camera]
+        position = [0, 0, 0]
+        look_at = [0, 4, 0]
+        fov = {FOV}
+        {lens}
+        [render]
+        integrator = 'path'
+        pixel_samples = {{ count = {samples} }}
+        [materials.lamp]
+        type = 'diffuse'
+        color = [0, 0, 0]
+        emission = [1, 1, 1]
+        [[shapes]]
+        type = 'disk'
+        material = 'lamp'
+        center = [0, {distance}, 0]
+        radius = {radius}
+        normal = [0, -1, 0]
+        tangent = [1, 0, 0]"
+    ))
+}
+
+/// Pixels per unit of a plane at distance 1.
+fn pixels() -> f64 {
+    f64::from(SIDE) / 2.0 / (FOV / 2.0).to_radians().tan()
+}
+
+/// Where a pixel's centre is, in pixels from the middle, to the right and upwards.
+fn place(i: usize) -> (f64, f64) {
+    let side = SIDE as usize;
+    let half = f64::from(SIDE) / 2.0;
+    ((i % side) as f64 + 0.5 - half, half - (i / side) as f64 - 0.5)
+}
+
+/// What is wrong with a picture as that of a spot spread over a circle of this radius at a distance of 1: the largest error of the
+/// light's mean in rings, as a share of what it should be, and of the light as a whole.
+fn wrong(picture: &[[f64; 3]], radius: f64) -> (f64, f64) {
+    let (circle, spot) = (radius * pixels(), 0.005 * pixels());
+    let within = spot * spot / (circle * circle); // the share of the opening that sees it
+    let mut worst = 0.0_f64;
+    let mut total = 0.0;
+    let rings = [0.0, 0.4, 0.7, 1.0].map(|share| share * (circle - spot - 1.0));
+    let mut sums = [(0.0, 0.0); 3];
+    for (i, mean) in picture.iter().enumerate() {
+        let (x, y) = place(i);
+        let away = x.hypot(y);
+        total += mean[0];
+        for (ring, sum) in rings.windows(2).zip(&mut sums) {
+            if (ring[0]..ring[1]).contains(&away) {
+                *sum = (sum.0 + mean[0], sum.1 + 1.0);
+            }
+        }
+        if away > circle + spot + 1.0 {
+            worst = worst.max(mean[0] / within);
+        }
+    }
+    for (sum, count) in sums {
+        worst = worst.max((sum / count / within - 1.0).abs());
+    }
+    let whole = std::f64::consts::PI * spot * spot;
+    (worst, (total / whole - 1.0).abs())
+}
+
+#[test]
+fn a_spot_out_of_focus_is_its_circle_of_confusion() {
+    // Of an opening of radius r focused at f, what is at z spreads over r |1 / f - 1 / z| at a distance of 1.
+    let lens = "aperture = 0.4\nfocus_distance = 4";
+    for way in both() {
+        for distance in [12.0, 2.5] {
+            let radius = 0.2 * (1.0_f64 / 4.0 - 1.0 / distance).abs();
+            let packed = spot(distance, lens, 1024);
+            let picture = means(&render(&packed, way));
+            let (worst, lost) = wrong(&picture, radius);
+            assert!(worst < 0.03, "{way:?} {distance}: {worst}");
+            assert!(lost < 0.02, "{way:?} {distance}: {lost}");
+            assert!(wrong(&picture, 1.1 * radius).0 > 0.1, "another circle is told apart");
+            assert!(wrong(&picture, 0.9 * radius).0 > 0.1, "another circle is told apart");
+        }
+    }
+}
+
+#[test]
+fn the_width_may_be_told_by_the_f_number() {
+    // The focus is at what is looked at, unless something else is said.
+    let by = |lens: &str| spot(12.0, lens, 1).camera;
+    assert_eq!(
+        by("focal_length = 0.8\nf_number = 2"),
+        by("aperture = 0.4\nfocus_distance = 4")
+    );
+    assert_ne!(
+        by("focal_length = 0.8\nf_number = 4"),
+        by("aperture = 0.4\nfocus_distance = 4")
+    );
+}
+
+#[test]
+fn what_is_in_the_focus_plane_is_sharp() {
+    let lens = "aperture = 0.4\nfocus_distance = 5";
+    for way in both() {
+        let with = means(&render(&spot(5.0, lens, 256), way));
+        let without = means(&render(&spot(5.0, "", 256), way));
+        let off = means(&render(&spot(5.5, lens, 256), way));
+        // The same samples of the pixel, up to rounding at the spot's edge.
+        let apart = |a: &[[f64; 3]]| a.iter().zip(&without).map(|(a, b)| (a[0] - b[0]).abs()).sum::<f64>();
+        assert!(apart(&with) < 0.05, "{way:?}: {}", apart(&with));
+        assert!(apart(&off) > 1.0, "{way:?}: {}", apart(&off));
+    }
+}
+
+#[test]
+fn blades_make_a_polygon_with_a_corner_at_the_top_of_what_is_far() {
+    let lens = "aperture = 0.4\nfocus_distance = 4\nblades = 3\nblade_rotation = ";
+    let lit = |packed: &Packed, (x, y): (f64, f64), way| {
+        let picture = means(&render(packed, way));
+        let pixel = |i: usize| (place(i).0 - x).hypot(place(i).1 - y) < 2.0;
+        (0..picture.len())
+            .filter(|i| pixel(*i))
+            .map(|i| picture[i][0])
+            .sum::<f64>()
+            > 0.0
+    };
+    for way in both() {
+        let circle = 0.2 * (1.0 / 4.0 - 1.0 / 12.0) * pixels();
+        let turned = |degrees: f64| {
+            let (sin, cos) = (90.0 + degrees).to_radians().sin_cos();
+            (0.8 * circle * cos, 0.8 * circle * sin)
+        };
+        // Far things show the opening as it is; 60 degrees farther on is the middle of a side, half as far away.
+        for degrees in [0.0, 30.0, -100.0] {
+            let far = spot(12.0, &format!("{lens}{degrees}"), 64);
+            assert!(lit(&far, turned(degrees), way), "{way:?} {degrees}");
+            assert!(!lit(&far, turned(degrees + 60.0), way), "{way:?} {degrees}");
+            assert!(lit(&far, turned(degrees + 120.0), way), "{way:?} {degrees}");
+        }
+        // Near ones show it upside down. This one has nearly the same circle.
+        let near = spot(2.4, &format!("{lens}0"), 64);
+        assert!(lit(&near, turned(180.0), way), "{way:?}");
+        assert!(!lit(&near, turned(0.0), way), "{way:?}");
+    }
+}
+
+#[test]
+fn openings_are_covered_evenly() {
+    for blades in [0, 3, 4, 5, 6, 7, 16] {
+        let corners = f64::from(blades);
+        let turn = std::f64::consts::TAU / corners;
+        let count = 1 << 14;
+        // The second moment about the middle: Young and Budynas, "Roark's Formulas for Stress and Strain", table A.1, over the area.
+        let expected = if blades == 0 { 0.5 } else { (2.0 + turn.cos()) / 6.0 };
+        let (mut middle, mut moment, mut inner, mut farthest) = (Vec2::ZERO.as_dvec2(), 0.0, 0.0, 0.0_f64);
+        for i in 0..count {
+            let p = lens_sample(blades, sobol_sample(i, glam::UVec2::new(3, 7))).as_dvec2();
+            middle += p / f64::from(count);
+            moment += p.length_squared() / f64::from(count);
+            // How far out it is, as a share of the way to the edge.
+            let out = match blades {
+                0 => p.length(),
+                _ => (0..blades)
+                    .map(|side| {
+                        let (sin, cos) = ((f64::from(side) + 0.5) * turn).sin_cos();
+                        (p.x * cos + p.y * sin) / (turn / 2.0).cos()
+                    })
+                    .fold(0.0, f64::max),
+            };
+            assert!(out < 1.0 + 1e-6, "{blades}: {p}");
+            inner += f64::from(u8::from(out < 0.5)) / f64::from(count);
+            farthest = farthest.max(p.length());
+        }
+        assert!(middle.length() < 2e-3, "{blades}: {middle}");
+        assert!((moment - expected).abs() < 2e-3, "{blades}: {moment} {expected}");
+        assert!((inner - 0.25).abs() < 3e-3, "{blades}: {inner}");
+        assert!(farthest > 0.98 && farthest < 1.0 + 1e-6, "{blades}: {farthest}");
+    }
+}
+
+#[test]
+fn samples_of_the_lens_are_spread_over_it_and_not_tied_to_the_pixel() {
+    // Of 16 samples four are in each quarter of the lens's square: of 64 pixels, so many samples in each quarter of pixel and lens.
+    let packed = spot(12.0, "aperture = 2\nfocus_distance = 1", 16);
+    let mut counts = [[0_u32; 4]; 4];
+    for pixel in 0..64 {
+        let mut of_lens = [0; 4];
+        for sample in 0..16 {
+            let pixel = glam::UVec2::new(pixel, 9);
+            let ray = wgray::cpu::pixel::camera_sample(&packed, pixel, sample).ray;
+            let lens = ray.origin / packed.camera.lens_u.length();
+            let straight =
+                (ray.direction / ray.direction.y + ray.origin * packed.camera.inverse_focus) * pixels() as f32;
+            let at = Vec2::new(straight.x + SIDE as f32 / 2.0, SIDE as f32 / 2.0 - straight.z) - pixel.as_vec2();
+            // The map from the square to the disk keeps its diagonals' sectors, and these have equal areas.
+            let sector = usize::from(lens.x > lens.z) + 2 * usize::from(lens.x > -lens.z);
+            let quarter = usize::from(at.x > 0.5) + 2 * usize::from(at.y > 0.5);
+            of_lens[sector] += 1;
+            counts[sector][quarter] += 1;
+        }
+        assert!(of_lens.iter().all(|count| (2..=6).contains(count)), "{of_lens:?}");
+    }
+    for count in counts.iter().flatten() {
+        assert!(
+            (40..=88).contains(count),
+            "64 each, if they are independent: {counts:?}"
+        );
+    }
+}
+
+#[test]
+fn every_ray_meets_the_focus_plane_where_the_middle_one_does() {
+    let packed = spot(12.0, "aperture = 0.4\nfocus_distance = 4", 1);
+    for at in [Vec2::new(1.0, 60.0), Vec2::new(40.5, 3.25)] {
+        let middle = camera_ray(&packed.camera, at).direction;
+        for p in [Vec2::X, Vec2::new(-0.3, 0.9), Vec2::ZERO] {
+            let ray = lens_ray(&packed.camera, at, p);
+            let start = ray.origin - packed.camera.position;
+            let met = start + ray.direction * (4.0 / ray.direction.y);
+            assert!(met.distance(middle * (4.0 / middle.y)) < 2e-6, "{at} {p}: {met}");
+            assert!((start - Vec3::new(0.2 * p.x, 0.0, 0.2 * p.y)).length() < 1e-6);
+        }
+    }
+}
+
+#[test]
+fn the_ends_of_its_ranges_give_pictures_and_the_same_ones() {
+    let pinhole = spot(12.0, "", 16);
+    for aperture in ["0", "1e-300", "1e-9", "1", "1e9"] {
+        for focus in ["1e-9", "1e-3", "1e9"] {
+            let packed = spot(12.0, &format!("aperture = {aperture}\nfocus_distance = {focus}"), 16);
+            assert_eq!(packed.specialization.lens == 0, aperture == "0");
+            let films: Vec<_> = exact_ways().into_iter().map(|way| render(&packed, way)).collect();
+            for film in &films {
+                assert!(film.sums.iter().all(|sum| sum.is_finite()), "{aperture} {focus}");
+                assert_eq!(differing(film, &films[0]), 0, "{aperture} {focus}");
+            }
+            if aperture == "0" {
+                assert_eq!(packed.camera, pinhole.camera);
+                assert_eq!(packed.specialization, pinhole.specialization);
+            }
+        }
+    }
+}
+
+#[test]
+fn bad_lenses_are_told() {
+    for (lens, told) in [
+        ("aperture = -0.1", "camera.aperture: -0.1 must be from 0 to 1e9"),
+        ("aperture = nan", "camera.aperture: nan must be from 0 to 1e9"),
+        ("aperture = 2e9", "camera.aperture: 2e9 must be from 0 to 1e9"),
+        ("f_number = 0", "camera.f_number: 0 must be from 0.1 to 1e9"),
+        (
+            "f_number = 2\naperture = 0.1",
+            "camera.f_number: must not be here beside \"aperture\": each says how wide the lens is",
+        ),
+        (
+            "focus_distance = 0",
+            "camera.focus_distance: 0 must be finite and greater than 0, from 1e-9 to 1e9",
+        ),
+        ("blades = 2", "camera.blades: 2 must be 0, or from 3 to 16"),
+        ("blades = 17", "camera.blades: 17 must be 0, or from 3 to 16"),
+        (
+            "blade_rotation = 361",
+            "camera.blade_rotation: 361 must be from -360 to 360",
+        ),
+        (
+            "type = 'orthographic'\nheight = 1\naperture = 1",
+            "camera.aperture: unknown key",
+        ),
+    ] {
+        let fov = if lens.contains("height") { "" } else { "fov = 40\n" };
+        let text = format!(
+            "image = {{ width = 4, height = 4 }}\n[camera]\nposition = [0, 0, 0]\nlook_at = [0, 1, 0]\n{fov}{lens}\n"
+        );
+        let error = Scene::parse(&text, "s.toml").expect_err(lens).to_string();
+        assert!(error.contains(told), "{lens}: {error}");
+    }
+}
+
+#[test]
+fn a_path_moves_the_focus_and_the_opening() {
+    let text = "image = { width = 4, height = 4 }
+        [camera]
+        position = [0, 0, 0]
+        look_at = [0, 1, 0]
+        fov = 40
+        f_number = 10
+        path.keys = [{ frame = 1, focus_distance = 2 }, { frame = 2, aperture = 0 }, { frame = 3, focus_distance = 4, aperture = 1 }]
+        ";
+    let scene = Scene::parse(text, "s.toml").unwrap();
+    let still = scene.camera.lens.unwrap();
+    assert_eq!(
+        (still.radius, still.focus),
+        (0.05, 2.0),
+        "as it stands it has its own opening"
+    );
+    assert_eq!(
+        scene.camera_at(1.0).unwrap().lens,
+        None,
+        "and on its way that of the keys"
+    );
+    let lens = scene.camera_at(2.5).unwrap().lens.unwrap();
+    assert_eq!((lens.radius, lens.focus), (0.25, 3.5));
+    for (key, told) in [
+        (
+            "aperture = -1",
+            "camera.path.keys[0].aperture: -1 must be from 0 to 1e9",
+        ),
+        (
+            "focus_distance = 0",
+            "camera.path.keys[0].focus_distance: 0 must be finite",
+        ),
+        ("height = 1", "camera.path.keys[0].height: must not be here"),
+    ] {
+        let text = text.replace("focus_distance = 2 }", &format!("{key} }}"));
+        let error = Scene::parse(&text, "s.toml").expect_err(key).to_string();
+        assert!(error.contains(told), "{error}");
+    }
+}
+
+#[test]
+fn the_lens_scene_shows_one() {
+    let scene = scenes::scene("lens.toml");
+    let packed = scenes::packed(&scene);
+    assert_eq!(packed.specialization.lens, 1);
+}

@@ -1,0 +1,181 @@
+//! A panorama: known directions at known pixels, poles and seam, solid angles, differentials, crops.
+
+use glam::{DVec3, Vec2, Vec3};
+use wgray::Scene;
+use wgray::cpu::panorama::{panorama_differential, panorama_ray};
+use wgray::film::Region;
+use wgray::job::Cut;
+use wgray::pack::{NOTHING, Packed};
+
+use crate::pictures::{backend, both, crop, differing, film, first_hits, means, render};
+use crate::scenes::parse;
+
+const WIDTH: u32 = 128;
+const HEIGHT: u32 = 64;
+
+/// Looks along y from (1, 2, 3); spheres of this radius are 10 away in these directions.
+fn spheres(directions: &[DVec3], radius: f64) -> Packed {
+    let shapes: String = directions
+        .iter()
+        .map(|d| {
+            let c = DVec3::new(1.0, 2.0, 3.0) + *d * 10.0;
+            format!(
+                "[[shapes]]\ntype = 'sphere'\nmaterial = 'lamp'\ncenter = [{}, {}, {}]\nradius = {radius}\n",
+                c.x, c.y, c.z
+            )
+        })
+        .collect();
+    parse(&format!(
+        "image = {{ width = {WIDTH}, height = {HEIGHT} }}
+        camera = {{ type = 'panorama', position = [1, 2, 3], look_at = [1, 5, 3] }}
+        [render]
+        integrator = 'path'
+        pixel_samples = {{ count = 64 }}
+        [materials.lamp]
+        type = 'diffuse'
+        color = [0, 0, 0]
+        emission = [1, 1, 1]
+        {shapes}"
+    ))
+}
+
+/// The direction of degrees to the right of the middle and above the horizon.
+fn direction(east: f64, north: f64) -> DVec3 {
+    let (east, north) = (east.to_radians(), north.to_radians());
+    DVec3::new(east.sin() * north.cos(), east.cos() * north.cos(), north.sin())
+}
+
+#[test]
+fn directions_are_where_they_should_be() {
+    let packed = spheres(&[], 1.0);
+    let (w, h) = (WIDTH as f32, HEIGHT as f32);
+    for (at, expected) in [
+        ((0.5, 0.5), Vec3::Y),
+        ((0.0, 0.5), Vec3::NEG_Y),
+        ((1.0, 0.5), Vec3::NEG_Y),
+        ((0.25, 0.5), Vec3::NEG_X),
+        ((0.75, 0.5), Vec3::X),
+        ((0.5, 0.0), Vec3::Z),
+        ((0.1, 0.0), Vec3::Z),
+        ((0.5, 1.0), Vec3::NEG_Z),
+        ((0.5, 0.25), Vec3::new(0.0, 0.5_f32.sqrt(), 0.5_f32.sqrt())),
+        ((0.5, -0.25), Vec3::new(0.0, -(0.5_f32.sqrt()), 0.5_f32.sqrt())), // a filter reaches over the pole
+        ((1.25, 0.5), Vec3::NEG_X),                                        // and over the seam
+    ] {
+        let ray = panorama_ray(&packed.camera, Vec2::new(at.0 * w, at.1 * h));
+        assert_eq!(ray.origin, packed.camera.position);
+        assert!(ray.direction.distance(expected) < 1e-6, "{at:?}: {}", ray.direction);
+        assert!((ray.direction.length() - 1.0).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_sphere_is_seen_where_it_is_and_fills_its_solid_angle() {
+    // In the middle, at the seam, at the poles.
+    for (east, north) in [(0.0, 0.0), (180.0, 0.0), (77.0, -31.0), (0.0, 90.0), (33.0, -86.0)] {
+        let to = direction(east, north);
+        let packed = spheres(&[to], 3.0);
+        for way in both() {
+            let hits = first_hits(&packed, way);
+            let picture = means(&render(&packed, way));
+            let mut found = 0.0;
+            for (i, (hit, mean)) in hits.iter().zip(&picture).enumerate() {
+                let (x, y) = (i as u32 % WIDTH, i as u32 / WIDTH);
+                let center = direction(
+                    (f64::from(x) + 0.5) * 360.0 / f64::from(WIDTH) - 180.0,
+                    90.0 - (f64::from(y) + 0.5) * 180.0 / f64::from(HEIGHT),
+                );
+                let sine = center.cross(to).length();
+                if (sine - 0.3).abs() > 1e-5 {
+                    let seen = sine < 0.3 && center.dot(to) > 0.0;
+                    assert_eq!(hit.shape != NOTHING, seen, "{way:?} {east} {north}: pixel {x}, {y}");
+                }
+                if hit.shape != NOTHING {
+                    // The depth goes along the ray, to the nearer side.
+                    let along = 10.0 * (center.dot(to) - (center.dot(to).powi(2) - 1.0 + 0.09).sqrt());
+                    assert!((f64::from(hit.depth) - along).abs() < 1e-3, "{} {along}", hit.depth);
+                }
+                let turn = std::f64::consts::TAU / f64::from(WIDTH);
+                let edge = |row: u32| (f64::from(row) * std::f64::consts::PI / f64::from(HEIGHT)).cos();
+                found += mean[0] * turn * (edge(y) - edge(y + 1));
+            }
+            let angle = std::f64::consts::TAU * (1.0 - (1.0 - 0.09_f64).sqrt());
+            // A row near a pole counts as if it were even, which it is not quite.
+            assert!(
+                (found / angle - 1.0).abs() < 0.015,
+                "{way:?} {east} {north}: {found} {angle}"
+            );
+        }
+    }
+}
+
+#[test]
+fn differentials_are_those_of_neighbouring_rays() {
+    let packed = spheres(&[], 1.0);
+    let exact = |x: f64, y: f64| {
+        direction(
+            x * 360.0 / f64::from(WIDTH) - 180.0,
+            90.0 - y * 180.0 / f64::from(HEIGHT),
+        )
+    };
+    for (x, y) in [(64.0, 32.0), (3.25, 7.5), (127.9, 60.0), (10.0, 0.01), (20.0, 63.99)] {
+        let found = panorama_differential(&packed.camera, Vec2::new(x as f32, y as f32), 0.5);
+        let h = 1e-4;
+        let dx = (exact(x + h, y) - exact(x - h, y)) * (0.5 / (2.0 * h));
+        let dy = (exact(x, y + h) - exact(x, y - h)) * (0.5 / (2.0 * h));
+        assert!(
+            found.x.direction.as_dvec3().distance(dx) < 1e-6,
+            "{x} {y}: {found:?} {dx}"
+        );
+        assert!(
+            found.y.direction.as_dvec3().distance(dy) < 1e-6,
+            "{x} {y}: {found:?} {dy}"
+        );
+        assert_eq!((found.x.position, found.y.position), (Vec3::ZERO, Vec3::ZERO));
+    }
+}
+
+#[test]
+fn a_crop_has_the_pixels_of_the_whole() {
+    let packed = spheres(&[direction(10.0, 20.0), direction(180.0, 0.0)], 3.0);
+    let whole = render(&packed, both()[0]);
+    let part = Region {
+        x0: 0,
+        y0: 5,
+        x1: 90,
+        y1: 17,
+    };
+    for way in both() {
+        let found = film(&mut *backend(&packed, way), &packed, part, &Cut::default());
+        assert_eq!(differing(&found, &crop(&whole, part)), 0, "{way:?}");
+    }
+}
+
+#[test]
+fn what_a_panorama_has_not_is_told() {
+    let camera =
+        "image = { width = 4, height = 2 }\n[camera]\ntype = 'panorama'\nposition = [0, 0, 0]\nlook_at = [0, 1, 0]\n";
+    Scene::parse(camera, "s.toml").unwrap();
+    for (added, told) in [
+        ("fov = 40", "camera.fov: unknown key"),
+        ("aperture = 1", "camera.aperture: unknown key"),
+        ("up = [0, 1, 0]", "camera.look_at: [0, 1, 0] must not lie on the line"),
+        (
+            "path.keys = [{ frame = 1, fov = 40 }]",
+            "camera.path.keys[0].fov: must not be here: a camera of this type has no such value",
+        ),
+        (
+            "path.keys = [{ frame = 1 }]",
+            "camera.path.keys[0]: must have \"position\", \"look_at\" or \"up\"",
+        ),
+    ] {
+        let error = Scene::parse(&format!("{camera}{added}\n"), "s.toml")
+            .expect_err(added)
+            .to_string();
+        assert!(error.contains(told), "{added}: {error}");
+    }
+    let moving =
+        format!("{camera}path.keys = [{{ frame = 1, position = [0, 0, 1] }}, {{ frame = 3, position = [0, 0, 3] }}]\n");
+    let scene = Scene::parse(&moving, "s.toml").unwrap();
+    assert_eq!(scene.camera_at(2.0).unwrap().position, DVec3::Z * 2.0);
+}

@@ -1,0 +1,182 @@
+//! Surfaces that are there for some rays: closed forms, shadows of the shape of a mask, and the same bits on both paths.
+
+use wgray::pack::{Packed, pack};
+use wgray::scene::{Assets, Description};
+
+use super::{mean, scene};
+use crate::pictures::{both, differing, exact_ways, first_hits, means, reference, render};
+
+/// Straight down on a square of side 2 around the origin, from above all.
+const DOWN: &str =
+    "camera = { type = 'orthographic', position = [0, 0, 9], look_at = [0, 0, 0], up = [0, 1, 0], height = 2 }\n";
+
+/// Something black that reflects nothing.
+fn black(rest: &str) -> String {
+    format!("{{ type = 'principled', base_color = [0, 0, 0], metallic = 0, specular = 0, {rest} }}")
+}
+
+fn square(z: f64, size: f64, material: &str) -> String {
+    format!(
+        "[[shapes]]\ntype = 'rectangle'\nmaterial = '{material}'\ncenter = [0, 0, {z}]\nsize = [{size}, {size}]\n\
+         normal = [0, 0, 1]\ntangent = [1, 0, 0]\n"
+    )
+}
+
+#[test]
+fn what_blends_lets_its_share_through() {
+    for (alpha, layers) in [(0.5, 1), (0.3, 1), (0.5, 3), (0.0, 2), (1.0, 2)] {
+        let head = format!(
+            "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.veil = {}\n",
+            black(&format!("alpha = {alpha}, alpha_mode = 'blend'"))
+        );
+        let text: String = (0..layers).map(|i| square(f64::from(i), 4.0, "veil")).collect();
+        let packed = scene(256, 4, &format!("{head}{text}"));
+        // Each layer lets 1 - alpha pass, apart from all others.
+        let expected = (1.0f64 - alpha).powi(layers);
+        for way in both() {
+            let found = mean(&render(&packed, way))[0];
+            let error = (expected * (1.0 - expected) / (256.0 * 256.0)).sqrt();
+            assert!(
+                (found - expected).abs() <= 5.0 * error,
+                "{alpha} {layers} {way:?}: {found} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_ball_that_blends_is_passed_twice() {
+    // Both walls decide by themselves.
+    let text = format!(
+        "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.veil = {}\n[[shapes]]\ntype = 'sphere'\nmaterial = 'veil'\n\
+         center = [0, 0, 0]\nradius = 3\n",
+        black("alpha = 0.5, alpha_mode = 'blend'")
+    );
+    let packed = scene(256, 4, &text);
+    for way in both() {
+        let found = mean(&render(&packed, way))[0];
+        assert!((found - 0.25).abs() < 0.009, "{way:?}: {found}");
+    }
+}
+
+#[test]
+fn shadows_are_as_dark_as_what_casts_them_is_there() {
+    let lit = |alpha: f64, light: &str| {
+        let veil = black(&format!("alpha = {alpha}, alpha_mode = 'blend'"));
+        // Of the shadow the camera sees the floor below the veil, from under it.
+        let text = format!(
+            "camera = {{ type = 'orthographic', position = [0, 0, 0.4], look_at = [0, 0, 0], up = [0, 1, 0], height = 0.2 }}\n\
+             materials.veil = {veil}\nmaterials.floor = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{}{}{light}",
+            square(0.0, 4.0, "floor"),
+            square(0.5, 4.0, "veil")
+        );
+        scene(256, 1, &text)
+    };
+    for light in [
+        "[[lights]]\ntype = 'point'\nposition = [0, 0, 1]\ncolor = [1, 1, 1]\n",
+        "[[lights]]\ntype = 'directional'\ndirection = [0, 0, -1]\ncolor = [1, 1, 1]\n",
+        "[[lights]]\ntype = 'rectangle'\ncenter = [0, 0, 2]\nsize = [1, 1]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [1, 1, 1]\n",
+    ] {
+        for way in both() {
+            let found = |alpha: f64| mean(&render(&lit(alpha, light), way))[0];
+            let (none, half, all) = (found(0.0), found(0.6), found(1.0));
+            assert!(none > 0.0 && all == 0.0, "{light}: {none} {all}");
+            assert!((half / none - 0.4).abs() < 0.02, "{light} {way:?}: {}", half / none);
+        }
+    }
+}
+
+#[test]
+fn what_is_seen_past_a_surface_is_weighed_as_if_there_were_none() {
+    // A light that both ways of sampling find, with and without something before it that is never there.
+    let with = |veil: bool| {
+        let veil = if veil { square(0.5, 4.0, "veil") } else { String::new() };
+        let text = format!(
+            "camera = {{ type = 'orthographic', position = [0, 0, 0.4], look_at = [0, 0, 0], up = [0, 1, 0], height = 0.2 }}\n\
+             materials.veil = {}\nmaterials.floor = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n{}{veil}\
+             [[lights]]\ntype = 'rectangle'\ncenter = [0, 0, 1]\nsize = [3, 3]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [1, 1, 1]\n",
+            black("alpha = 0, alpha_mode = 'blend'"),
+            square(0.0, 4.0, "floor")
+        );
+        scene(1024, 1, &text)
+    };
+    for way in both() {
+        let [bare, veiled] = [false, true].map(|veil| mean(&render(&with(veil), way))[0]);
+        assert!((veiled / bare - 1.0).abs() < 2e-3, "{way:?}: {bare} {veiled}");
+    }
+}
+
+/// A leaf on a mesh's quad, a disk in a square by its image's alpha, above a floor.
+fn leaf(folder: &std::path::Path, mode: &str, way_in: &str) -> Packed {
+    let size = 64u32;
+    let texel = |x: u32, y: u32| {
+        let [x, y] = [x, y].map(|i| f64::from(i) + 0.5 - f64::from(size) / 2.0);
+        let inside = x.hypot(y) < f64::from(size) / 4.0;
+        image::Rgba([40, 200, 60, if inside { 255 } else { 0 }])
+    };
+    image::RgbaImage::from_fn(size, size, texel)
+        .save(folder.join("leaf.png"))
+        .unwrap();
+    let quad = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+    std::fs::write(folder.join("quad.obj"), quad).unwrap();
+    let text = format!(
+        "image = {{ width = 40, height = 40 }}\n{way_in}\
+         [render]\nintegrator = 'path'\nmax_depth = 3\npixel_samples = {{ count = 16 }}\n\
+         [textures.leaf]\ntype = 'image'\nfile = 'leaf.png'\nfilter = 'nearest'\n\
+         [materials.leaf]\ntype = 'principled'\nmetallic = 0\nroughness = 0.6\nbase_color = {{ texture = 'leaf' }}\n\
+         alpha = {{ texture = 'leaf', channel = 'a' }}\nalpha_mode = '{mode}'\n\
+         [materials.floor]\ntype = 'diffuse'\ncolor = [0.5, 0.5, 0.5]\n\
+         [[lights]]\ntype = 'directional'\ndirection = [0, 0, -1]\ncolor = [1, 1, 1]\n{}\
+         [[shapes]]\ntype = 'mesh'\nfile = 'quad.obj'\nmaterial = 'leaf'\ntranslate = [0, 0, 1]\n",
+        square(0.0, 8.0, "floor")
+    );
+    let description = Description::parse(&text, "leaf.toml").expect("a scene");
+    pack(&description.validate_with(&Assets::beside(folder)).expect("valid"))
+}
+
+#[test]
+fn a_leaf_casts_the_shadow_of_a_leaf() {
+    let place = tempfile::tempdir().unwrap();
+    let under =
+        "camera = { type = 'orthographic', position = [0, 0, 0.5], look_at = [0, 0, 0], up = [0, 1, 0], height = 2 }\n";
+    for mode in ["mask", "blend", "opaque"] {
+        let packed = leaf(place.path(), mode, under);
+        for way in both() {
+            let found = means(&render(&packed, way));
+            for (i, pixel) in found.iter().enumerate() {
+                let [x, y] = [i % 40, i / 40].map(|i| (i as f64 + 0.5) / 20.0 - 1.0);
+                let r = x.hypot(y);
+                if (r - 0.5).abs() > 0.08 {
+                    // Light that bounces between leaf and floor is left.
+                    let is_dark = pixel[0] < 0.05;
+                    assert_eq!(
+                        is_dark,
+                        r < 0.5 || mode == "opaque",
+                        "{mode} {way:?} {x} {y}: {pixel:?}"
+                    );
+                }
+            }
+        }
+    }
+    let above = "camera = { position = [0.3, -2.5, 2.5], look_at = [0, 0, 0.5], fov = 45 }\n";
+    for mode in ["mask", "blend"] {
+        let packed = leaf(place.path(), mode, above);
+        let expected = reference(&packed);
+        for way in exact_ways() {
+            assert_eq!(differing(&render(&packed, way), &expected), 0, "{mode} {way:?}");
+        }
+    }
+    // What a pixel's centre meets.
+    let packed = leaf(place.path(), "mask", DOWN);
+    for way in both() {
+        let hits = first_hits(&packed, way);
+        for (i, hit) in hits.iter().enumerate() {
+            let [x, y] = [i % 40, i / 40].map(|i| (i as f64 + 0.5) / 20.0 - 1.0);
+            let r = x.hypot(y);
+            if (r - 0.5).abs() > 0.08 {
+                let depth = if r < 0.5 { 8.0 } else { 9.0 };
+                assert!((f64::from(hit.depth) - depth).abs() < 1e-4, "{way:?} {x} {y}: {hit:?}");
+            }
+        }
+    }
+}

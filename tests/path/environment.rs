@@ -1,0 +1,486 @@
+//! An image around the scene: that its light is that of sums over its texels, that samples of it are as frequent as their density says, and
+//! that it lies as the page says.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+use glam::{DVec3, UVec2, Vec3};
+use wgray::cpu::environment::{arriving_from, sample_environment};
+use wgray::cpu::sequence::sobol_sample;
+use wgray::pack::{ENVIRONMENT, Packed, pack};
+use wgray::scene::{Assets, Description, Image, Texels};
+
+use super::mean;
+use crate::pictures::{Way, both, differing, exact_ways, render, render_with};
+use crate::random::Random;
+use crate::{adapter, sources};
+
+/// A wide and low camera that sees a part of the ground, whose colour is 1.
+const GROUND: &str = "camera = { position = [0, 0, 1], look_at = [0, 0.01, 0], fov = 10 }\n\
+                      materials.m = { type = 'diffuse', color = [1, 1, 1] }\n\
+                      [[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
+
+fn image(width: u32, height: u32, texel: impl Fn(u32, u32) -> [f32; 3]) -> Image {
+    let texels = (0..width * height).map(|i| texel(i % width, i / width)).collect();
+    Image {
+        width,
+        height,
+        texels: Texels::Floats(texels),
+    }
+}
+
+/// A scene of 16 x 16 pixels with an image around it, and more keys of its environment.
+fn around(image: &Image, more: &str, (samples, depth): (u32, u32), rest: &str) -> Packed {
+    described(&format!("file = 'around'{more}"), Some(image), (samples, depth), rest)
+}
+
+fn described(environment: &str, image: Option<&Image>, (samples, depth): (u32, u32), rest: &str) -> Packed {
+    let text = format!(
+        "image = {{ width = 16, height = 16 }}\n{rest}\n[environment]\n{environment}\n\
+         [render]\nintegrator = 'path'\nmax_depth = {depth}\npixel_samples = {{ count = {samples} }}\n"
+    );
+    let description = Description::parse(&text, "test").unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let mut assets = Assets::beside(&sources::path("scenes"));
+    assets
+        .images
+        .extend(image.map(|image| ("around".to_owned(), Arc::new(image.clone()))));
+    pack(
+        &description
+            .validate_with(&assets)
+            .unwrap_or_else(|problem| panic!("{problem}")),
+    )
+}
+
+/// The radiance of an image at (u, v) of the unit square, v from the upper edge on: between texels' centres, and between the outermost rows and
+/// their means at the poles.
+fn radiance(image: &Image, u: f64, v: f64) -> DVec3 {
+    let Texels::Floats(texels) = &image.texels else {
+        panic!("an image of bytes")
+    };
+    let (width, height) = (i64::from(image.width), i64::from(image.height));
+    let texel = |x: i64, y: i64| {
+        let at = |x: i64, y: i64| DVec3::from_array(texels[(y * width + x.rem_euclid(width)) as usize].map(f64::from));
+        if (0..height).contains(&y) {
+            return at(x, y);
+        }
+        (0..width).map(|x| at(x, y.clamp(0, height - 1))).sum::<DVec3>() / width as f64
+    };
+    let (s, t) = (u * width as f64 - 0.5, v * height as f64 - 0.5);
+    let (x, y) = (s.floor(), t.floor());
+    // At a pole a row of centres is half a row away.
+    let down = match t {
+        t if t < 0.0 => 1.0 + 2.0 * t,
+        t if t > height as f64 - 1.0 => 2.0 * (t - y),
+        _ => t - y,
+    };
+    let along = |y: i64| texel(x as i64, y).lerp(texel(x as i64 + 1, y), s - x);
+    along(y as i64).lerp(along(y as i64 + 1), down)
+}
+
+/// A sum over directions, of so many points a side of each texel.
+fn sum_over(image: &Image, points: u32, mut value: impl FnMut(DVec3, DVec3) -> DVec3) -> DVec3 {
+    let (columns, rows) = (image.width * points, image.height * points);
+    let mut sum = DVec3::ZERO;
+    for row in 0..rows {
+        let v = (f64::from(row) + 0.5) / f64::from(rows);
+        let (sine, cosine) = (PI * v).sin_cos();
+        let solid_angle = TAU / f64::from(columns) * PI / f64::from(rows) * sine;
+        for column in 0..columns {
+            let u = (f64::from(column) + 0.5) / f64::from(columns);
+            let azimuth = PI - TAU * u;
+            let direction = DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), cosine);
+            sum += value(direction, radiance(image, u, v)) * solid_angle;
+        }
+    }
+    sum
+}
+
+fn irradiance(image: &Image, points: u32, normal: DVec3) -> DVec3 {
+    sum_over(image, points, |direction, radiance| {
+        radiance * direction.dot(normal).max(0.0)
+    })
+}
+
+fn noise(width: u32, height: u32) -> Image {
+    let random = Random::new(7);
+    image(width, height, |_, _| {
+        [(); 3].map(|()| random.unit().powi(6) as f32 * 8.0)
+    })
+}
+
+fn sunny() -> Image {
+    image(64, 32, |x, y| match (x, y) {
+        (20, 6) => [4000.0, 3000.0, 2000.0],
+        (_, 0..16) => [0.3, 0.5, 0.9],
+        _ => [0.1, 0.08, 0.05],
+    })
+}
+
+fn one_bright(width: u32, height: u32, at: (u32, u32)) -> Image {
+    image(width, height, move |x, y| [if (x, y) == at { 100.0 } else { 0.0 }; 3])
+}
+
+#[test]
+fn the_ground_gets_what_a_sum_over_all_directions_says() {
+    let images = [
+        (image(1, 1, |_, _| [0.5, 1.0, 2.0]), 64),
+        (image(2, 1, |x, _| [f32::from(x as u8), 1.0, 0.5]), 128),
+        (image(2, 2, |x, y| [x as f32, y as f32, 1.0]), 64),
+        (noise(33, 17), 8),
+        (one_bright(16, 8, (5, 2)), 32),
+        (one_bright(16, 8, (15, 0)), 32),
+        (sunny(), 8),
+    ];
+    // The normal of the ground as the image has it.
+    let sines = |degrees: f64| degrees.to_radians().sin_cos();
+    let tilted = DVec3::new(sines(50.0).0, 0.0, sines(50.0).1);
+    for (image, points) in &images {
+        for (turn, normal) in [
+            ("", DVec3::Z),
+            // What is done to the image is undone to the normal.
+            ("\nrotate = { axis = [0, 1, 0], degrees = -50 }", tilted),
+            ("\nrotate = [0, 90, 0]", DVec3::NEG_X),
+        ] {
+            let expected = irradiance(image, *points, normal) / PI;
+            for way in both() {
+                let found = DVec3::from_array(mean(&render(&around(image, turn, (256, 1), GROUND), way)));
+                if expected == DVec3::ZERO {
+                    assert_eq!(found, expected, "the bright texel is below the ground");
+                    continue;
+                }
+                let ratio = found / expected;
+                let size = (image.width, image.height);
+                assert!(
+                    (ratio - DVec3::ONE).abs().max_element() < 0.01,
+                    "{size:?}{turn}, {way:?}: {found} for {expected}"
+                );
+            }
+        }
+    }
+    // The control: the ground's normal, as if the image was not turned.
+    let wrong = irradiance(&sunny(), 8, DVec3::Z) / irradiance(&sunny(), 8, tilted);
+    assert!((wrong - DVec3::ONE).abs().min_element() > 0.05, "{wrong}");
+}
+
+#[test]
+fn six_colours_are_seen_where_they_lie() {
+    // In the middle of the picture what is towards +x, to its left +y, at its edges -x, to its right -y; above +z.
+    let picture = image(64, 32, |x, y| match (x, y) {
+        (_, 0..8) => [0.0, 0.0, 1.0],
+        (_, 24..) => [1.0, 1.0, 0.0],
+        (24..40, _) => [1.0, 0.0, 0.0],
+        (8..24, _) => [0.0, 1.0, 0.0],
+        (40..56, _) => [1.0, 0.0, 1.0],
+        _ => [0.0, 1.0, 1.0],
+    });
+    let colors = [
+        (DVec3::X, [1.0, 0.0, 0.0]),
+        (DVec3::Y, [0.0, 1.0, 0.0]),
+        (DVec3::NEG_X, [0.0, 1.0, 1.0]),
+        (DVec3::NEG_Y, [1.0, 0.0, 1.0]),
+        (DVec3::Z, [0.0, 0.0, 1.0]),
+        (DVec3::NEG_Z, [1.0, 1.0, 0.0]),
+    ];
+    let seen = |direction: DVec3, turn: &str, way: Way| {
+        let up = if direction.z == 0.0 { DVec3::Z } else { DVec3::X };
+        let (DVec3 { x, y, z }, u) = (direction, up);
+        let camera = format!(
+            "camera = {{ position = [0, 0, 0], look_at = [{x}, {y}, {z}], up = [{}, {}, {}], fov = 20 }}\n",
+            u.x, u.y, u.z
+        );
+        mean(&render(&around(&picture, turn, (4, 0), &camera), way))
+    };
+    for way in both() {
+        for (i, (direction, color)) in colors.into_iter().enumerate() {
+            assert_eq!(seen(direction, "", way), color, "{direction}, {way:?}");
+            // Counter-clockwise from above: what was towards +x is towards +y then.
+            if i < 4 {
+                let before = colors[(i + 3) % 4].1;
+                assert_eq!(seen(direction, "\nrotate = 90", way), before, "{direction}, {way:?}");
+            }
+        }
+        let about_x = "\nrotate = { axis = [1, 0, 0], degrees = 90 }";
+        assert_eq!(seen(DVec3::Z, about_x, way), colors[1].1, "+y goes up");
+        assert_eq!(seen(DVec3::Z, "\nrotate = [90, 0, 0]", way), colors[1].1, "+y goes up");
+    }
+}
+
+#[test]
+fn a_white_image_is_the_constant_colour() {
+    let ball = "camera = { position = [0, -4, 0.3], look_at = [0, 0, 0], fov = 40 }\n\
+                materials.m = { type = 'phong', diffuse = [0.5, 0.5, 0.5], specular = [0.3, 0.3, 0.3], shininess = 20, ambient = [0, 0, 0] }\n\
+                materials.g = { type = 'dielectric', ior = 1.5 }\n\
+                [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [-0.6, 0, 0]\nradius = 0.5\n\
+                [[shapes]]\ntype = 'sphere'\nmaterial = 'g'\ncenter = [0.6, 0, 0]\nradius = 0.5\n";
+    let white = image(8, 4, |_, _| [0.5, 1.0, 1.5]);
+    for way in both() {
+        let colour = mean(&render(&described("color = [1, 2, 3]", None, (1024, 6), ball), way));
+        let found = mean(&render(&around(&white, "\nscale = 2", (1024, 6), ball), way));
+        for (found, colour) in found.into_iter().zip(colour) {
+            assert!((found / colour - 1.0).abs() < 2e-3, "{way:?}: {found} for {colour}");
+        }
+    }
+}
+
+/// An image, and lamps and materials of several kinds in it.
+const LAMPS: &str = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.5], fov = 40 }\n\
+    materials.shine = { type = 'diffuse', color = [0.3, 0.3, 0.3], emission = [5, 3, 1] }\n\
+    materials.gloss = { type = 'phong', diffuse = [0.4, 0.4, 0.4], specular = [0.5, 0.5, 0.5], shininess = 12, ambient = [0, 0, 0] }\n\
+    materials.clay = { type = 'diffuse', color = [0.7, 0.6, 0.5] }\n\
+    [[shapes]]\ntype = 'plane'\nmaterial = 'clay'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n\
+    [[shapes]]\ntype = 'sphere'\nmaterial = 'gloss'\ncenter = [0.4, 0, 0.5]\nradius = 0.5\n\
+    [[shapes]]\ntype = 'sphere'\nmaterial = 'shine'\ncenter = [-0.5, 0, 0.3]\nradius = 0.2\n";
+
+#[test]
+fn samples_of_the_image_alone_and_of_materials_alone_find_the_same() {
+    if adapter::device().is_none() {
+        return;
+    }
+    let with = |changes: [(&str, &str, &str); 2]| {
+        let mut shaders = sources::shaders().clone();
+        for (file, from, to) in changes {
+            let text = shaders.text(file).to_owned();
+            assert!(text.contains(from), "{from} is not there to be changed");
+            shaders = sources::with(&shaders, file, &text.replace(from, to));
+        }
+        shaders
+    };
+    const PATH: &str = "integrators/path.wgsl";
+    const AFAR: &str = "environment.wgsl";
+    const OF_LIGHT: &str = "select(power_heuristic(light.pdf, reflected.pdf), 1.0, light.is_delta)";
+    const OF_RAY: &str = "select(1.0, power_heuristic(pdf, arriving.pdf), pdf > 0.0)";
+    let light_alone = with([(PATH, OF_LIGHT, "1.0"), (AFAR, OF_RAY, "select(1.0, 0.0, pdf > 0.0)")]);
+    let material_alone = with([(PATH, OF_LIGHT, "0.0"), (AFAR, OF_RAY, "1.0")]);
+    let wrong = with([(PATH, OF_LIGHT, "1.1"), (AFAR, OF_RAY, "select(1.0, 0.0, pdf > 0.0)")]);
+    // Without the lamp, whose light has its own weights.
+    let text = LAMPS.replace(", emission = [5, 3, 1]", "");
+    for image in [
+        noise(16, 8),
+        one_bright(16, 8, (4, 1)),
+        image(2, 1, |x, _| [x as f32, 1.0, 2.0]),
+    ] {
+        let packed = around(&image, "\nvisible = false", (4096, 2), &text);
+        let found = |shaders| mean(&render_with(&packed, Way::Baked, shaders));
+        let both = found(sources::shaders());
+        let [light, materials, wrong] = [&light_alone, &material_alone, &wrong].map(found);
+        for i in 0..3 {
+            let near = |x: f64| (x - both[i]).abs() < 1e-2 * both[i];
+            assert!(near(light[i]), "light alone: {light:?} for {both:?}");
+            assert!(near(materials[i]), "materials alone: {materials:?} for {both:?}");
+            assert!(!near(wrong[i]), "the control: {wrong:?} for {both:?}");
+        }
+    }
+}
+
+#[test]
+fn light_of_an_image_and_of_lamps_adds_up() {
+    let image = sunny();
+    let lamps = "[[lights]]\ntype = 'point'\nposition = [1, -1, 2]\ncolor = [2, 2, 2]\n\
+                 [[lights]]\ntype = 'directional'\ndirection = [1, 2, -3]\ncolor = [1, 1, 0.5]\n\
+                 [[lights]]\ntype = 'rectangle'\ncenter = [0, 0.5, 1.5]\nsize = [0.5, 0.5]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\ncolor = [3, 3, 3]\n";
+    let text = format!("{LAMPS}{lamps}");
+    let dark = LAMPS.replace(", emission = [5, 3, 1]", "");
+    for way in both() {
+        let sum = |packed: Packed| mean(&render(&packed, way));
+        // What hides is there in all of them.
+        let hidden = lamps.split("[[lights]]").last().unwrap_or_default();
+        let plate = format!("[[lights]]{}", hidden.replace("color = [3, 3, 3]", "color = [0, 0, 0]"));
+        let of_image = sum(around(&image, "", (1024, 3), &format!("{dark}{plate}")));
+        let of_lamps = sum(described("color = [0, 0, 0]", None, (1024, 3), &text));
+        let all = sum(around(&image, "", (1024, 3), &text));
+        for i in 0..3 {
+            let expected = of_image[i] + of_lamps[i];
+            assert!(
+                (all[i] / expected - 1.0).abs() < 0.01,
+                "{way:?}: {all:?} for {of_image:?} + {of_lamps:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn light_from_below_does_not_pass_the_floor() {
+    // Nothing is beneath the floor, so that it would cast no shadow of a lamp. The ball's lower half gets light from there alone.
+    let below = image(8, 4, |_, y| [if y > 2 { 5.0 } else { 0.0 }; 3]);
+    let floors = [
+        "type = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
+        "type = 'rectangle'\nmaterial = 'm'\ncenter = [0, 0, 0]\nsize = [1e4, 1e4]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
+        "type = 'disk'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1e4\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]",
+    ];
+    let ball = "camera = { position = [0, -4, 1], look_at = [0, 0, 0.6], fov = 30 }\n\
+                materials.m = { type = 'diffuse', color = [1, 1, 1] }\n\
+                [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0.6]\nradius = 0.5\n";
+    for way in both() {
+        let seen = |floor: &str| {
+            mean(&render(
+                &around(&below, "\nvisible = false", (64, 1), &format!("{ball}{floor}")),
+                way,
+            ))
+        };
+        for floor in floors {
+            assert!(seen(&format!("[[shapes]]\n{floor}\n"))[0] < 1e-3, "{floor}, {way:?}");
+        }
+        assert!(seen("")[0] > 0.1, "the control, {way:?}");
+    }
+}
+
+#[test]
+fn a_hidden_image_lights_and_is_mirrored() {
+    let balls = "camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }\n\
+                 materials.m = { type = 'conductor', color = [1, 1, 1] }\n\
+                 [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 0.7\n";
+    let white = image(4, 2, |_, _| [1.0; 3]);
+    for environment in ["file = 'around'", "color = [1, 1, 1]"] {
+        for way in both() {
+            let picture = |visible: bool| {
+                let keys = format!("{environment}\nvisible = {visible}");
+                render(&described(&keys, Some(&white), (16, 4), balls), way)
+            };
+            let (seen, hidden) = (picture(true), picture(false));
+            let at = |film: &wgray::film::Film, i: usize| film.means().nth(i).unwrap_or_default();
+            assert_eq!(at(&seen, 0), [1.0; 3], "{environment}, {way:?}");
+            assert_eq!(at(&hidden, 0), [0.0; 3], "{environment}, {way:?}");
+            let middle = 8 * 16 + 8;
+            for film in [&seen, &hidden] {
+                let [x, ..] = at(film, middle);
+                assert!((x - 1.0).abs() < 1e-5, "{environment}, {way:?}: {x}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_factor_of_two_doubles_every_bit() {
+    for way in both() {
+        let film = |scale: f64| {
+            render(
+                &around(&noise(16, 8), &format!("\nscale = {scale}"), (16, 3), GROUND),
+                way,
+            )
+        };
+        let (one, two) = (film(1.0), film(2.0));
+        for (one, two) in one.means().zip(two.means()) {
+            assert_eq!(one.map(|x| 2.0 * x), two, "{way:?}");
+        }
+        assert_eq!(mean(&film(0.0)), [0.0; 3]);
+        assert!(mean(&film(1e6)).iter().all(|x| x.is_finite()));
+    }
+}
+
+#[test]
+fn every_way_gives_the_same_bits() {
+    let text = format!("{LAMPS}[[lights]]\ntype = 'point'\nposition = [1, -1, 2]\ncolor = [2, 2, 2]\n");
+    for image in [noise(33, 17), sunny(), image(1, 1, |_, _| [1.0; 3])] {
+        for turn in ["", "\nrotate = [10, 20, 30]"] {
+            let packed = around(&image, turn, (64, 5), &text);
+            let expected = render(&packed, Way::Cpu);
+            for way in exact_ways() {
+                assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
+            }
+        }
+    }
+}
+
+/// Samples of a scene's image.
+fn samples(packed: &Packed, count: u32) -> impl Iterator<Item = Vec3> {
+    let light = packed
+        .lights
+        .iter()
+        .find(|light| light.kind == ENVIRONMENT)
+        .expect("an image around the scene");
+    (0..count).map(move |i| {
+        let u = sobol_sample(i, UVec2::new(5, 6));
+        let sample = sample_environment(packed, light, u);
+        let again = arriving_from(packed, sample.to);
+        assert_eq!((sample.radiance, sample.pdf), (again.radiance, again.pdf));
+        sample.to
+    })
+}
+
+#[test]
+fn directions_are_as_frequent_as_their_density_says() {
+    const COLUMNS: usize = 24;
+    const ROWS: usize = 13;
+    const COUNT: u32 = 1 << 18;
+    let bin = |direction: Vec3| {
+        let d = direction.as_dvec3().normalize();
+        let u = 0.5 - d.y.atan2(d.x) / TAU;
+        let v = d.z.clamp(-1.0, 1.0).acos() / PI;
+        ((v * ROWS as f64) as usize).min(ROWS - 1) * COLUMNS + ((u * COLUMNS as f64) as usize).min(COLUMNS - 1)
+    };
+    for image in [
+        image(1, 1, |_, _| [1.0; 3]),
+        image(2, 1, |x, _| [x as f32; 3]),
+        image(3, 5, |x, y| [(x + 2 * y) as f32; 3]),
+        noise(33, 17),
+        one_bright(16, 8, (3, 0)),
+        sunny(),
+    ] {
+        let packed = around(&image, "", (1, 1), GROUND);
+        let mut counts = vec![0.0; COLUMNS * ROWS];
+        samples(&packed, COUNT).for_each(|direction| counts[bin(direction)] += 1.0);
+        // Of the density by fine sums; far finer than the cells, whose borders are not the bins'.
+        let mut expected = [0.0, 0.08].map(|_| vec![0.0; COLUMNS * ROWS]);
+        let fine = image.width.max(image.height).max(24) * 24;
+        for row in 0..fine {
+            let v = (f64::from(row) + 0.5) / f64::from(fine);
+            let (sine, cosine) = (PI * v).sin_cos();
+            for column in 0..2 * fine {
+                let azimuth = PI - TAU * (f64::from(column) + 0.5) / f64::from(2 * fine);
+                let direction = DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), cosine).as_vec3();
+                let pdf = f64::from(arriving_from(&packed, direction).pdf);
+                let share = pdf * sine * PI / f64::from(fine) * TAU / f64::from(2 * fine) * f64::from(COUNT);
+                let at = bin(direction);
+                expected[0][at] += share;
+                expected[1][at] += share * if direction.x > 0.0 { 1.08 } else { 0.92 };
+            }
+        }
+        let size = (image.width, image.height);
+        let all: f64 = expected[0].iter().sum::<f64>() / f64::from(COUNT);
+        assert!((all - 1.0).abs() < 2e-3, "{size:?}: the density's sum is {all}");
+        let statistic = |expected: &[f64]| {
+            let (mut sum, mut freedom) = (0.0, -1.0_f64);
+            for (count, expected) in counts.iter().zip(expected) {
+                if *expected >= 20.0 {
+                    sum += (count - expected) * (count - expected) / expected;
+                    freedom += 1.0;
+                } else {
+                    assert!(*count < 60.0, "{size:?}: {count} samples where {expected} should be");
+                }
+            }
+            (sum, freedom)
+        };
+        let (sum, freedom) = statistic(&expected[0]);
+        // Six standard deviations, and what the fine sums lose.
+        let most = freedom + 6.0 * (2.0 * freedom).sqrt() + 20.0;
+        assert!(freedom > 2.0 && sum < most, "{size:?}: {sum} of {freedom}");
+        let (wrong, _) = statistic(&expected[1]);
+        assert!(
+            wrong > most,
+            "{size:?}: a wrong density is not seen: {wrong} of {freedom}"
+        );
+    }
+}
+
+#[test]
+fn a_direction_and_its_cell_are_each_others() {
+    use wgray::cpu::surroundings::{cell_towards, direction_in_cell};
+    for (width, height) in [(1, 1), (2, 1), (3, 2), (16, 8), (8192, 4096)] {
+        for column in [0, width / 3, width / 2, width - 1] {
+            for row in [0, 1, height / 3, height / 2, height - 1, height] {
+                if row > height {
+                    continue;
+                }
+                let u = glam::Vec2::new(0.5, 0.5);
+                let d = direction_in_cell(column, row, u, width, height);
+                let cell = cell_towards(d, width, height);
+                assert_eq!((cell.column, cell.row), (column, row), "{width} x {height}: {d}");
+                assert!((d.length() - 1.0).abs() < 1e-6, "{d}");
+            }
+        }
+        for pole in [Vec3::Z, Vec3::NEG_Z, Vec3::ZERO] {
+            let cell = cell_towards(pole, width, height);
+            assert!(cell.column < width && cell.row <= height, "{pole}");
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! Lamps that the camera does not see: it sees what is behind them, and all else sees them.
+
+use glam::UVec2;
+use wgray::cpu::geometry::pixel_first_hit;
+use wgray::pack::{NOTHING, Packed};
+
+use crate::pictures::{both, differing, exact_ways, means, reference, render};
+use crate::scenes;
+
+/// A lamp before a wall, and a mirror behind the camera's side of it.
+fn room(integrator: &str, lamp: &str) -> Packed {
+    let (wall, depth) = match integrator {
+        "path" => ("type = 'diffuse', color = [0.5, 0.5, 0.5]", 4),
+        _ => ("type = 'phong', color = [0.5, 0.5, 0.5]", 4),
+    };
+    scenes::parse(&format!(
+        "image = {{ width = 24, height = 24 }}\ncamera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 50 }}\n\
+         materials.wall = {{ {wall} }}\nmaterials.mirror = {{ type = 'mirror' }}\n{lamp}\n\
+         [[shapes]]\ntype = 'rectangle'\nmaterial = 'wall'\ncenter = [0, 2, 0]\nsize = [6, 6]\nnormal = [0, -1, 0]\ntangent = [1, 0, 0]\n\
+         [[shapes]]\ntype = 'rectangle'\nmaterial = 'mirror'\ncenter = [1.2, 1, 0]\nsize = [1, 1.2]\nnormal = [-1, -2, 0]\ntangent = [2, -1, 0]\n\
+         [render]\nintegrator = '{integrator}'\nmax_depth = {depth}\npixel_samples = {{ count = 64 }}\n"
+    ))
+}
+
+const RECTANGLE: &str = "[[lights]]\ntype = 'rectangle'\ncenter = [0, 0, 0]\nsize = [0.6, 0.6]\nnormal = [0.2, 1, 0]\ntangent = [1, -0.2, 0]\n\
+                         color = [4, 4, 4]\n";
+
+fn sphere(visible: bool) -> String {
+    format!(
+        "materials.lamp = {{ type = 'diffuse', color = [0, 0, 0], emission = [4, 4, 4], visible = {visible} }}\n\
+         [[shapes]]\ntype = 'sphere'\nmaterial = 'lamp'\ncenter = [0, 0, 0]\nradius = 0.3\n"
+    )
+}
+
+#[test]
+fn the_camera_sees_what_is_behind_and_mirrors_see_the_lamp() {
+    let rectangle = |visible: bool| format!("{RECTANGLE}visible = {visible}\n");
+    let cases = [
+        ("path", rectangle as fn(bool) -> String),
+        ("phong", rectangle),
+        ("path", sphere),
+    ];
+    for (integrator, lamp) in cases {
+        let (seen, hidden) = (room(integrator, &lamp(true)), room(integrator, &lamp(false)));
+        let without = room(integrator, "");
+        let same = reference(&hidden);
+        for way in exact_ways() {
+            assert_eq!(differing(&render(&hidden, way), &same), 0, "{way:?}, {integrator}");
+        }
+        for way in both() {
+            let (seen, hidden) = (means(&render(&seen, way)), means(&render(&hidden, way)));
+            // Where the camera does not look at the lamp, nothing changes; there are pixels in the mirror that show it.
+            let covered = |i: usize| (i % 24).abs_diff(12) < 4 && (i / 24).abs_diff(12) < 4;
+            let others = || (0..24 * 24).filter(|i| !covered(*i));
+            assert!(others().all(|i| seen[i] == hidden[i]), "{way:?}, {integrator}");
+            let bright = others().filter(|i| hidden[*i][0] > 3.0).count();
+            assert!(
+                bright > 3,
+                "{way:?}, {integrator}: {bright} pixels of the mirror show the lamp"
+            );
+            // In the middle is the wall.
+            let middle = 12 * 24 + 12;
+            assert!(
+                hidden[middle][0] < 3.9 && hidden[middle][0] > 0.0,
+                "{way:?}: {:?}",
+                hidden[middle]
+            );
+            assert!(seen[middle] != hidden[middle], "{way:?}: the control");
+        }
+        for i in 0..24 * 24 {
+            let pixel = UVec2::new(i % 24, i / 24);
+            let (a, b) = (pixel_first_hit(&hidden, pixel), pixel_first_hit(&without, pixel));
+            assert_eq!(a.shape == NOTHING, b.shape == NOTHING, "{pixel}");
+            assert!(
+                (a.depth - b.depth).abs() < 1e-5 && (a.normal - b.normal).length() < 1e-6,
+                "{pixel}"
+            );
+            assert!((a.uv - b.uv).length() < 1e-5, "{pixel}: {} for {}", a.uv, b.uv);
+        }
+    }
+}
+
+#[test]
+fn the_camera_sees_through_64_hidden_things_and_no_more() {
+    let sheet = |i: u32| {
+        format!(
+            "[[shapes]]\ntype = 'rectangle'\nmaterial = 'h'\ncenter = [0, {}, 0]\nsize = [9, 9]\nnormal = [0, 1, 0]\ntangent = [1, 0, 0]\n",
+            f64::from(i) * 0.01
+        )
+    };
+    for (count, sees_it) in [(64, true), (65, false)] {
+        let sheets: String = (0..count).map(sheet).collect();
+        let packed = scenes::parse(&format!(
+            "image = {{ width = 2, height = 2 }}\ncamera = {{ position = [0, -4, 0], look_at = [0, 0, 0], fov = 20 }}\n\
+             materials.h = {{ type = 'diffuse', color = [0, 0, 0], visible = false }}\nenvironment = {{ color = [1, 1, 1] }}\n\
+             {sheets}[render]\nintegrator = 'path'\npixel_samples = {{ count = 4 }}\n"
+        ));
+        for way in both() {
+            let found = means(&render(&packed, way));
+            let expected = if sees_it { 1.0 } else { 0.0 };
+            assert!(
+                found.iter().all(|pixel| pixel[0] == expected),
+                "{way:?}, {count}: {found:?}"
+            );
+        }
+    }
+}

@@ -1,0 +1,275 @@
+//! Many lamps, which a tree chooses among: each as likely as the tree says, together as bright as one by one, at the ends of all ranges.
+
+use std::fmt::Write as _;
+
+use glam::{UVec2, UVec4, Vec3};
+use wgray::cpu::light_choice::{chosen_light, met_density};
+use wgray::cpu::ray::Hit;
+use wgray::cpu::rng::hash4;
+use wgray::pack::{NOTHING, Packed};
+use wgray::scene::{Description, PointLightDescription};
+
+use super::{mean, scene};
+use crate::pictures::{both, differing, exact_ways, reference, render};
+use crate::random::Random;
+
+const CAMERA: &str = "camera = { position = [0, -3, 1], look_at = [0, 0, 0.3], fov = 50 }\n\
+                      materials.m = { type = 'diffuse', color = [0.7, 0.7, 0.7] }\n\
+                      materials.s = { type = 'diffuse', color = [0.2, 0.2, 0.2], emission = [3, 2, 1] }\n";
+const FLOOR: &str =
+    "[[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n";
+
+/// Lamp number i of a scene of all kinds.
+fn lamp(i: u32, random: &Random) -> String {
+    let coordinate = |scale: f64, from: f64| from + scale * random.unit();
+    let (x, y, z) = (coordinate(2.0, -1.0), coordinate(2.0, -1.0), coordinate(0.8, 0.2));
+    let c = 0.5 + random.unit();
+    match i % 5 {
+        0 => format!("[[lights]]\ntype = 'point'\nposition = [{x}, {y}, {z}]\ncolor = [{c}, {c}, {c}]\n"),
+        1 => format!("[[shapes]]\ntype = 'sphere'\nmaterial = 's'\ncenter = [{x}, {y}, {z}]\nradius = 0.07\n"),
+        2 => format!(
+            "[[lights]]\ntype = 'rectangle'\ncenter = [{x}, {y}, {z}]\nsize = [0.2, 0.1]\nnormal = [{y}, {x}, -1]\n\
+             tangent = [1, 0, 0]\ncolor = [{c}, 3, 2]\n"
+        ),
+        3 => format!(
+            "[[lights]]\ntype = 'spot'\nposition = [{x}, {y}, {z}]\ndirection = [{y}, 0, -1]\ncolor = [{c}, 3, 2]\ncone_angle = 50\n"
+        ),
+        _ => format!(
+            "[[shapes]]\ntype = 'triangle'\nmaterial = 's'\nvertices = [[{x}, {y}, {z}], [{}, {y}, {z}], [{x}, {}, {z}]]\n",
+            x + 0.2,
+            y + 0.1
+        ),
+    }
+}
+
+fn lamps(count: u32) -> Vec<String> {
+    let random = Random::new(5);
+    (0..count).map(|i| lamp(i, &random)).collect()
+}
+
+#[test]
+fn what_is_chosen_is_as_likely_as_the_tree_says_and_known_when_it_is_met() {
+    let sun = "[[lights]]\ntype = 'directional'\ndirection = [0, 1, -1]\ncolor = [1, 1, 1]\n";
+    for far in ["", sun] {
+        let packed = scene(1, 1, &format!("{CAMERA}{FLOOR}{far}{}", lamps(60).concat()));
+        assert_eq!(packed.light_nodes.len(), 2 * 60 - 1);
+        let of_tree = packed.emitters[0];
+        assert_eq!(
+            (packed.emitters.len(), of_tree.index),
+            (1 + usize::from(!far.is_empty()), NOTHING)
+        );
+        let leaves: Vec<usize> = (0..packed.light_nodes.len())
+            .filter(|i| packed.light_nodes[*i].children == NOTHING)
+            .collect();
+        for (p, n) in [
+            (Vec3::new(0.3, 0.2, 0.0), Vec3::Z),
+            (Vec3::new(-0.9, 0.9, 0.5), Vec3::new(0.6, 0.0, -0.8)),
+            (Vec3::new(5.0, 0.2, 0.1), Vec3::ZERO),
+        ] {
+            let calls = 60_000;
+            let mut counts = vec![0_u32; packed.light_nodes.len()];
+            let mut densities = vec![0.0_f32; packed.light_nodes.len()];
+            for i in 0..calls {
+                let key = hash4(UVec4::new(i, 7, 8, 9));
+                let chosen = chosen_light(&packed, of_tree, p, n, UVec2::new(key.x, key.y), i % 64);
+                let place = |leaf: &&usize| {
+                    let node = &packed.light_nodes[**leaf];
+                    (node.instance, node.index) == (chosen.emitter.instance, chosen.emitter.index)
+                };
+                let leaf = *leaves.iter().find(place).expect("a leaf");
+                counts[leaf] += 1;
+                densities[leaf] = chosen.density;
+            }
+            let (mut chi_square, mut kinds) = (0.0, 0.0);
+            for leaf in &leaves {
+                if counts[*leaf] == 0 {
+                    continue;
+                }
+                let node = &packed.light_nodes[*leaf];
+                // With a sun beside it, the tree is chosen by its share, which all leaves' densities have.
+                let primitive = packed.lights[node.index as usize].primitive;
+                if primitive != NOTHING {
+                    let hit = Hit {
+                        t: 1.0,
+                        instance: 0,
+                        primitive,
+                        slot: 0,
+                        barycentric: glam::Vec2::ZERO,
+                    };
+                    let met = met_density(&packed, hit, true, p, n);
+                    assert!(
+                        (met - densities[*leaf]).abs() < 1e-5 * met,
+                        "{met} for {}",
+                        densities[*leaf]
+                    );
+                    assert_eq!(met_density(&packed, hit, false, p, n), 0.0);
+                }
+                let expected = f64::from(densities[*leaf] / node.density) * f64::from(calls);
+                if expected > 5.0 {
+                    chi_square += (f64::from(counts[*leaf]) - expected).powi(2) / expected;
+                    kinds += 1.0;
+                }
+            }
+            // Sets of 64 samples are spread more evenly than chance, so that this is well below what chance gives.
+            assert!(
+                kinds > 5.0 && chi_square < kinds + 6.0 * (2.0_f64 * kinds).sqrt(),
+                "{chi_square} of {kinds}"
+            );
+        }
+    }
+}
+
+#[test]
+fn many_lamps_are_as_bright_as_one_by_one() {
+    let sun = "[[lights]]\ntype = 'directional'\ndirection = [0, 1, -1]\ncolor = [1, 1, 1]\n".to_owned();
+    for others in [vec![], vec![sun]] {
+        let all: Vec<String> = lamps(90)
+            .into_iter()
+            .filter(|lamp| lamp.starts_with("[[lights]]"))
+            .chain(others)
+            .collect();
+        let camera = "camera = { type = 'orthographic', position = [0, 0, 0.05], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }\n\
+                      materials.m = { type = 'diffuse', color = [0.7, 0.7, 0.7] }\n";
+        // Rectangles hide light, so that alone each is as it is among all only without them.
+        let all: Vec<String> = all.into_iter().filter(|lamp| !lamp.contains("rectangle")).collect();
+        let of = |samples: u32, lamps: &[String]| scene(samples, 1, &format!("{camera}{FLOOR}{}", lamps.concat()));
+        let mut expected = [0.0; 3];
+        for lamp in &all {
+            let found = mean(&reference(&of(64, std::slice::from_ref(lamp))));
+            expected = [0, 1, 2].map(|i| expected[i] + found[i]);
+        }
+        let packed = of(4096, &all);
+        assert!(packed.specialization.light_tree == 1 && packed.light_nodes.len() > 32);
+        for way in both() {
+            let found = mean(&render(&packed, way));
+            for i in 0..3 {
+                assert!(
+                    (found[i] - expected[i]).abs() < 1e-2 * expected[i],
+                    "{way:?}: {found:?} for {expected:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn bits_are_the_same_whatever_shines() {
+    for count in [16, 17, 30, 90] {
+        let text = format!("{CAMERA}{FLOOR}{}", lamps(count).concat());
+        let packed = scene(16, 4, &text);
+        assert_eq!(packed.specialization.light_tree, u32::from(count > 16), "{count}");
+        let expected = reference(&packed);
+        for way in exact_ways() {
+            assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}, {count}");
+        }
+    }
+}
+
+#[test]
+fn the_ends_of_ranges_give_numbers() {
+    let mut text =
+        format!("{CAMERA}materials.dark = {{ type = 'diffuse', color = [0, 0, 0], emission = [0, 0, 0] }}\n{FLOOR}");
+    for i in 0..12 {
+        // Twice each: coincident ones; tiny and huge ones, of the least and the most that colours can be; dark ones.
+        let radius = if i % 2 == 0 { 1e-6 } else { 1e6 };
+        let color = [1e-30, 1e6, 0.0, 1.0][i % 4];
+        for _ in 0..2 {
+            let _ = write!(
+                text,
+                "[[shapes]]\ntype = 'sphere'\nmaterial = 's'\ncenter = [0, 0, {}]\nradius = {radius}\n\
+                 [[shapes]]\ntype = 'disk'\nmaterial = 'dark'\ncenter = [0, 0, 1]\nradius = {radius}\nnormal = [0, 0, 1]\n\
+                 [[lights]]\ntype = 'point'\nposition = [0, 0, 0]\ncolor = [{color}, {color}, 0]\n\
+                 [[lights]]\ntype = 'spot'\nposition = [0, 0, 1]\ndirection = [0, 0, -1]\ncolor = [{color}, 1, 1]\ncone_angle = 0.01\n\
+                 [[lights]]\ntype = 'rectangle'\ncenter = [0, 0, 1e-9]\nsize = [1e-9, 1e9]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n\
+                 color = [{color}, {color}, {color}]\n",
+                if radius > 1.0 { -2.0 * radius } else { 0.5 },
+            );
+        }
+    }
+    let packed = scene(64, 6, &text);
+    assert_eq!(packed.specialization.light_tree, 1);
+    for node in &packed.light_nodes {
+        let numbers = [node.radius, node.cosine, node.edge, node.intensity, node.density];
+        assert!(
+            numbers.iter().all(|x| x.is_finite()) && node.center.is_finite() && node.axis.is_finite(),
+            "{node:?}"
+        );
+    }
+    let expected = reference(&packed);
+    for sum in &expected.sums {
+        assert!(sum.is_finite() && sum.min_element() >= 0.0, "{sum}");
+    }
+    for way in exact_ways() {
+        assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
+    }
+}
+
+#[test]
+fn a_hundred_thousand_lamps_render() {
+    let text = format!(
+        "image = {{ width = 16, height = 16 }}\n{CAMERA}{FLOOR}[render]\nintegrator = 'path'\nmax_depth = 2\npixel_samples = {{ count = 4 }}\n"
+    );
+    let mut description = Description::parse(&text, "test").expect("a scene");
+    let random = Random::new(3);
+    for _ in 0..100_000 {
+        let place = [
+            random.unit() * 20.0 - 10.0,
+            random.unit() * 20.0 - 10.0,
+            random.unit() * 2.0 + 0.1,
+        ];
+        description = description.with_light(PointLightDescription::new(place, [1e-3; 3]));
+    }
+    let started = std::time::Instant::now();
+    let packed: Packed = wgray::pack::pack(&description.validate().expect("a sound scene"));
+    println!("100,000 lamps packed in {:?}", started.elapsed());
+    assert_eq!(packed.light_nodes.len(), 199_999);
+    let expected = reference(&packed);
+    assert!(mean(&expected)[0] > 0.0);
+    for way in both() {
+        assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
+    }
+}
+
+#[test]
+fn meshes_that_shine_are_in_the_tree() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ball = crate::meshes::forms::Form::icosphere(1);
+    std::fs::write(folder.path().join("ball.obj"), ball.obj(None, None)).expect("a mesh");
+    let text = |shapes: &str, samples: u32| {
+        format!(
+            "image = {{ width = 16, height = 16 }}\n{CAMERA}{FLOOR}{shapes}\n\
+             [render]\nintegrator = 'path'\nmax_depth = 3\npixel_samples = {{ count = {samples} }}\n"
+        )
+    };
+    let load = |text: &str| {
+        let description = Description::parse(text, "test").expect("a scene");
+        let beside = wgray::scene::Assets::beside(folder.path());
+        wgray::pack::pack(&description.validate_with(&beside).expect("a sound scene"))
+    };
+    // Two of three shine; the ball is nearly the sphere of a radius that gives the same area.
+    let mesh = |material: &str, x: f64| {
+        format!(
+            "[[shapes]]\ntype = 'mesh'\nmaterial = '{material}'\nfile = 'ball.obj'\nscale = 0.3\ntranslate = [{x}, 0, 0.6]\n"
+        )
+    };
+    let packed = load(&text(&[mesh("s", -0.7), mesh("m", 9.0), mesh("s", 0.7)].concat(), 16));
+    assert_eq!(packed.light_nodes.len(), 2 * 160 - 1);
+    let leaves: Vec<u32> = packed.instances.iter().map(|instance| instance.leaves).collect();
+    assert_eq!(leaves[1], NOTHING);
+    assert!(leaves[0] != NOTHING && leaves[2] != NOTHING);
+    let expected = reference(&packed);
+    for way in exact_ways() {
+        assert_eq!(differing(&render(&packed, way), &expected), 0, "{way:?}");
+    }
+    // As bright as found by materials alone: far more samples, without any of light.
+    let packed = load(&text(&[mesh("s", -0.7), mesh("m", 9.0), mesh("s", 0.7)].concat(), 1024));
+    let mut without = packed.clone();
+    without.specialization.emitters = 0;
+    let (found, expected) = (mean(&reference(&packed)), mean(&reference(&without)));
+    for i in 0..3 {
+        assert!(
+            (found[i] - expected[i]).abs() < 1e-2 * expected[i],
+            "{found:?} for {expected:?}"
+        );
+    }
+}

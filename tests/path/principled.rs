@@ -1,0 +1,501 @@
+//! The material `principled` by itself: over a grid of parameters what it gives of light from everywhere, that its samples are worth what it
+//! reflects and come as often as their density says, and that each layer by itself is the material it should be.
+
+use std::f64::consts::{PI, TAU};
+
+use bytemuck::Zeroable;
+use glam::{DVec3, UVec2, UVec4, Vec2, Vec3};
+use wgray::cpu::diffuse::{angles_at, diffuse_eval};
+use wgray::cpu::principled::{Mixture, principled_eval, principled_mixture, principled_pdf, principled_sample};
+use wgray::cpu::rng::{hash4, unit_float};
+use wgray::cpu::sequence::sobol_sample;
+use wgray::pack::{DIFFUSE, Material, PRINCIPLED};
+
+/// All lobes.
+const ALL: u32 = 31;
+
+fn plain() -> Material {
+    Material {
+        kind: PRINCIPLED,
+        diffuse: Vec3::ONE,
+        specular: Vec3::ONE,
+        roughness: 0.5,
+        ior: 1.5,
+        specular_weight: 1.0,
+        thin: 1,
+        opacity: 1.0,
+        ..Material::zeroed()
+    }
+}
+
+fn direction(cosine: f64, longitude: f64) -> Vec3 {
+    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+    DVec3::new(sine * longitude.cos(), sine * longitude.sin(), cosine).as_vec3()
+}
+
+fn viewers() -> [Vec3; 5] {
+    [1.0, 0.9, 0.5, 0.15, 0.02].map(|cosine| direction(cosine, 0.7))
+}
+
+fn mixture(material: &Material, wo: Vec3) -> Mixture {
+    principled_mixture(material, wo, true, Vec3::Z, ALL)
+}
+
+/// A grid of materials with their names.
+fn grid() -> Vec<(String, Material)> {
+    let mut all = Vec::new();
+    let mut add = |name: &str, roughness: f32, change: &dyn Fn(&mut Material)| {
+        let mut material = Material { roughness, ..plain() };
+        change(&mut material);
+        all.push((format!("{name}, roughness {roughness}"), material));
+    };
+    for roughness in [0.15, 0.4, 0.7, 1.0] {
+        add("dielectric", roughness, &|_| {});
+        add("metal", roughness, &|m| m.metallic = 1.0);
+        add("half metal", roughness, &|m| {
+            m.metallic = 0.5;
+            m.diffuse = Vec3::new(0.9, 0.3, 0.1);
+        });
+        add("coated", roughness, &|m| {
+            m.clearcoat = 1.0;
+            m.clearcoat_roughness = 0.3;
+        });
+        add("sheen", roughness, &|m| {
+            m.sheen = Vec3::ONE;
+            m.sheen_roughness = roughness;
+        });
+        add("thin", roughness, &|m| m.transmission = 1.0);
+        add("volume", roughness, &|m| {
+            m.transmission = 1.0;
+            m.thin = 0;
+        });
+        add("anisotropic", roughness, &|m| {
+            m.metallic = 1.0;
+            m.anisotropy = 0.7;
+        });
+        add("all", roughness, &|m| {
+            m.diffuse = Vec3::new(0.8, 0.5, 0.3);
+            m.metallic = 0.3;
+            m.transmission = 0.4;
+            m.thin = 0;
+            m.clearcoat = 0.7;
+            m.clearcoat_roughness = 0.5;
+            m.sheen = Vec3::new(0.2, 0.4, 0.6);
+            m.sheen_roughness = 0.5;
+            m.anisotropy = 0.4;
+        });
+    }
+    all
+}
+
+/// The integral over the sphere of directions, by cells that are fine around the mirrored one and the refracted one.
+fn integral(wo: Vec3, eta: f32, f: impl Fn(Vec3) -> f64) -> f64 {
+    let (rings, spokes) = (900, 240);
+    let mut sum = 0.0;
+    for upper in [true, false] {
+        let sign = if upper { 1.0 } else { -1.0 };
+        let bent = if upper { 1.0 } else { f64::from(eta) };
+        let (x, y) = (-f64::from(wo.x) * bent, -f64::from(wo.y) * bent);
+        let axis = DVec3::new(x, y, sign * (1.0 - x * x - y * y).max(0.0).sqrt()).normalize();
+        let u = axis.any_orthonormal_vector();
+        let v = axis.cross(u);
+        for i in 0..rings {
+            let edge = |i: i32| PI * (f64::from(i) / f64::from(rings)).powi(2);
+            let (inner, outer) = (edge(i), edge(i + 1));
+            let angle = (inner + outer) / 2.0;
+            let area = (inner.cos() - outer.cos()) * TAU / f64::from(spokes);
+            for j in 0..spokes {
+                let longitude = TAU * (f64::from(j) + 0.5) / f64::from(spokes);
+                let d = axis * angle.cos() + (u * longitude.cos() + v * longitude.sin()) * angle.sin();
+                if (d.z > 0.0) == upper {
+                    sum += f(d.as_vec3()) * area;
+                }
+            }
+        }
+    }
+    sum
+}
+
+#[test]
+fn white_furnaces_stay_white_or_get_darker() {
+    for (name, material) in grid() {
+        // Radiance from behind counts without the factor of the indices.
+        for wo in viewers() {
+            let m = mixture(&material, wo);
+            let scale = |wi: Vec3| {
+                if wi.z < 0.0 {
+                    1.0 / f64::from(m.eta * m.eta)
+                } else {
+                    1.0
+                }
+            };
+            let given = integral(wo, m.eta, |wi| {
+                f64::from(principled_eval(&m, wo, wi, ALL).x) * scale(wi)
+            });
+            assert!(given < 1.01 && given > 0.0, "{name}, {wo}: {given}");
+            let keeps = ["dielectric", "coated"].iter().any(|kind| name.starts_with(kind));
+            if keeps || name.starts_with("metal") {
+                assert!((given - 1.0).abs() < 0.02, "{name}, {wo}: {given}");
+            }
+        }
+    }
+    // The control: without what is given back, rough metal is darker.
+    let metal = Material {
+        metallic: 1.0,
+        roughness: 1.0,
+        ..plain()
+    };
+    let wo = direction(0.5, 0.0);
+    let mut m = mixture(&metal, wo);
+    m.gain = Vec3::ONE;
+    let lost = 1.0 - integral(wo, m.eta, |wi| f64::from(principled_eval(&m, wo, wi, ALL).x));
+    assert!(lost > 0.1, "{lost}");
+}
+
+#[test]
+fn densities_integrate_to_what_is_sampled() {
+    for (name, material) in grid() {
+        for wo in [direction(0.95, 0.4), direction(0.3, 2.5)] {
+            let m = mixture(&material, wo);
+            let total = integral(wo, m.eta, |wi| f64::from(principled_pdf(&m, wo, wi, ALL)));
+            let count = 16_384;
+            let useful = (0..count).filter(|i| {
+                let u = sobol_sample(*i, UVec2::new(1, 2));
+                let random = sobol_sample(*i, UVec2::new(3, 4)).x;
+                let sample = principled_sample(&m, wo, u, random, ALL);
+                sample.pdf > 0.0 && (sample.wi.length() - 1.0).abs() < 1e-4
+            });
+            let useful = useful.count() as f64 / f64::from(count);
+            // A coat's directions below the surface have a density, and are worth nothing.
+            assert!((total - useful).abs() < 0.012, "{name}, {wo}: {total} {useful}");
+        }
+    }
+}
+
+#[test]
+fn samples_are_worth_what_is_reflected() {
+    for (name, material) in grid() {
+        for wo in viewers() {
+            let m = mixture(&material, wo);
+            let expected = integral(wo, m.eta, |wi| f64::from(principled_eval(&m, wo, wi, ALL).y));
+            let count = 65_536;
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for i in 0..count {
+                let u = sobol_sample(i, UVec2::new(5, 6));
+                let random = sobol_sample(i, UVec2::new(7, 8)).x;
+                let sample = principled_sample(&m, wo, u, random, ALL);
+                assert!(
+                    sample.weight.is_finite() && sample.weight.min_element() >= 0.0,
+                    "{name}: {sample:?}"
+                );
+                sum += f64::from(sample.weight.y);
+                squares += f64::from(sample.weight.y).powi(2);
+            }
+            let mean = sum / f64::from(count);
+            let error = ((squares / f64::from(count) - mean * mean) / f64::from(count)).sqrt();
+            assert!(
+                (mean - expected).abs() < 6e-3 + 3.0 * error,
+                "{name}, {wo}: {mean} {expected} {error}"
+            );
+        }
+    }
+}
+
+/// Pearson's chi-square of sampled directions against the density, by cells of equal parts of height and longitude.
+fn chi_square(m: &Mixture, wo: Vec3, pdf: impl Fn(Vec3) -> f64) -> (f64, f64) {
+    const SAMPLES: u32 = 100_000;
+    const HEIGHTS: usize = 24;
+    const LONGITUDES: usize = 24;
+    const FINE: usize = 24;
+    let cell = |d: Vec3| {
+        let height = ((f64::from(d.z) + 1.0) / 2.0 * HEIGHTS as f64) as usize;
+        let longitude = f64::from(d.y).atan2(f64::from(d.x)) / TAU + 0.5;
+        height.min(HEIGHTS - 1) * LONGITUDES + ((longitude * LONGITUDES as f64) as usize).min(LONGITUDES - 1)
+    };
+    let mut counts = vec![0.0; HEIGHTS * LONGITUDES];
+    for i in 0..SAMPLES {
+        let bits = hash4(UVec4::new(i, 17, 19, 23));
+        let [a, b, c] = [bits.x, bits.y, bits.z].map(unit_float);
+        let sample = principled_sample(m, wo, Vec2::new(a, b), c, ALL);
+        if sample.pdf > 0.0 {
+            counts[cell(sample.wi)] += 1.0;
+        }
+    }
+    let mut expected = vec![0.0; HEIGHTS * LONGITUDES];
+    let area = 4.0 * PI / (HEIGHTS * FINE * LONGITUDES * FINE) as f64;
+    for i in 0..HEIGHTS * FINE {
+        let z = (i as f64 + 0.5) / (HEIGHTS * FINE) as f64 * 2.0 - 1.0;
+        for j in 0..LONGITUDES * FINE {
+            let d = direction(z, TAU * ((j as f64 + 0.5) / (LONGITUDES * FINE) as f64 - 0.5));
+            expected[cell(d)] += pdf(d) * area * f64::from(SAMPLES);
+        }
+    }
+    let (mut sum, mut cells) = (0.0, -1.0);
+    for (count, expected) in counts.iter().zip(&expected) {
+        if *expected > 20.0 {
+            sum += (count - expected) * (count - expected) / expected;
+            cells += 1.0;
+        }
+    }
+    (sum, cells)
+}
+
+#[test]
+fn directions_are_as_frequent_as_their_density_says() {
+    // Lobes that the cells resolve.
+    for (name, material) in grid().into_iter().filter(|(_, material)| material.roughness >= 0.4) {
+        for wo in [direction(0.9, 0.4), direction(0.4, 2.5)] {
+            let m = mixture(&material, wo);
+            let (sum, freedom) = chi_square(&m, wo, |wi| f64::from(principled_pdf(&m, wo, wi, ALL)));
+            let most = freedom + 7.0 * (2.0 * freedom).sqrt();
+            assert!(freedom > 5.0 && sum < most, "{name}, {wo}: {sum} of {freedom}");
+            let (wrong, _) = chi_square(&m, wo, |wi| {
+                f64::from(principled_pdf(&m, wo, wi, ALL)) * if wi.x > 0.0 { 1.1 } else { 0.9 }
+            });
+            assert!(
+                wrong > most,
+                "{name}: a wrong density is not seen: {wrong} of {freedom}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_layer_by_itself_is_the_material_it_should_be() {
+    for wo in viewers() {
+        for wi in [direction(0.9, 1.0), direction(0.4, 3.0), direction(0.05, 5.0)] {
+            // Neither metal nor anything that is mirrored: the material `diffuse`, to the bit.
+            let color = Vec3::new(0.8, 0.4, 0.1);
+            let matt = Material {
+                diffuse: color,
+                specular_weight: 0.0,
+                ..plain()
+            };
+            let diffuse = Material {
+                kind: DIFFUSE,
+                diffuse: color,
+                ..Material::zeroed()
+            };
+            let found = principled_eval(&mixture(&matt, wo), wo, wi, ALL);
+            assert_eq!(found, diffuse_eval(&diffuse, angles_at(Vec3::Z, wo, wi)));
+            // Metal: GGX with Schlick's reflectance, in f64 by other formulas (Walter et al. 2007, with tangents), but for what is given back.
+            for roughness in [0.3, 0.6, 1.0] {
+                let metal = Material {
+                    metallic: 1.0,
+                    diffuse: color,
+                    roughness,
+                    ..plain()
+                };
+                let mut m = mixture(&metal, wo);
+                m.gain = Vec3::ONE;
+                let found = principled_eval(&m, wo, wi, ALL).as_dvec3();
+                let expected = metal_f64(
+                    color.as_dvec3(),
+                    f64::from(roughness).powi(2),
+                    wo.as_dvec3(),
+                    wi.as_dvec3(),
+                );
+                let error = (found - expected).abs().max_element();
+                assert!(
+                    error < 1e-4 * expected.max_element().max(1.0),
+                    "{roughness} {wo} {wi}: {found} {expected}"
+                );
+            }
+        }
+    }
+}
+
+fn metal_f64(f0: DVec3, alpha: f64, wo: DVec3, wi: DVec3) -> DVec3 {
+    let h = (wo + wi).normalize();
+    let tan2 = |v: DVec3| (1.0 - v.z * v.z).max(0.0) / (v.z * v.z);
+    let d = alpha * alpha / (PI * h.z.powi(4) * (alpha * alpha + tan2(h)).powi(2));
+    let lambda = |v: DVec3| ((1.0 + alpha * alpha * tan2(v)).sqrt() - 1.0) / 2.0;
+    let g = 1.0 / (1.0 + lambda(wo) + lambda(wi));
+    let f = f0 + (DVec3::ONE - f0) * (1.0 - wo.dot(h)).powi(5);
+    f * (d * g / (4.0 * wo.z))
+}
+
+#[test]
+fn flat_lobes_are_deltas_and_nothing_is_ever_no_number() {
+    let smooth = Material {
+        roughness: 0.0,
+        transmission: 1.0,
+        thin: 0,
+        ..plain()
+    };
+    let wo = direction(0.6, 0.3);
+    let m = mixture(&smooth, wo);
+    let mut passed = Vec3::ZERO;
+    let count = 4096;
+    for i in 0..count {
+        let random = (i as f32 + 0.5) / count as f32;
+        let sample = principled_sample(&m, wo, Vec2::new(0.3, 0.8), random, ALL);
+        assert!(sample.pdf == 0.0 || sample.weight == Vec3::ZERO, "{sample:?}");
+        if sample.wi.z < 0.0 {
+            // Snell's law.
+            assert!((sample.wi.truncate() * 1.5 + wo.truncate()).length() < 1e-5);
+            passed += sample.weight / count as f32;
+        }
+    }
+    // All that Schlick's reflectance leaves, as radiance in glass.
+    let left = (1.0 - (0.04 + 0.96 * 0.4f32.powi(5))) / 2.25;
+    assert!((passed.x - left).abs() < 2e-3, "{passed} {left}");
+    let ends = [0.0, 1e-38, 1e-20, 1e-4, 0.5, 1.0];
+    for i in 0..20_000 {
+        let bits = hash4(UVec4::new(i, 1, 2, 3));
+        let pick = |k: u32| ends[(hash4(UVec4::new(i, k, 5, 6)).x % 6) as usize];
+        let material = Material {
+            diffuse: Vec3::new(pick(1), pick(2), pick(3)),
+            specular: Vec3::new(pick(4), 1e6, pick(5)),
+            ior: [1.0, 1.0005, 1.5, 100.0][(bits.x % 4) as usize],
+            roughness: pick(6),
+            metallic: pick(7),
+            anisotropy: pick(8),
+            transmission: pick(9),
+            thin: bits.y % 2,
+            clearcoat: pick(10),
+            clearcoat_roughness: pick(11),
+            sheen: Vec3::splat(pick(12)),
+            sheen_roughness: pick(13),
+            specular_weight: pick(14),
+            ..plain()
+        };
+        let wo = direction([1.0, 0.5, 1e-3, 1e-6][(bits.z % 4) as usize], f64::from(i));
+        let m = principled_mixture(&material, wo, bits.w.is_multiple_of(2), Vec3::Z, ALL);
+        let u = sobol_sample(i, UVec2::new(1, 2));
+        let sample = principled_sample(&m, wo, u, sobol_sample(i, UVec2::new(3, 4)).x, ALL);
+        assert!(
+            sample.weight.is_finite() && sample.wi.is_finite() && sample.pdf.is_finite(),
+            "{material:?} {m:?} {sample:?}"
+        );
+        assert!(
+            sample.weight.min_element() >= 0.0 && sample.pdf >= 0.0,
+            "{material:?} {sample:?}"
+        );
+        for wi in [
+            sample.wi,
+            -wo,
+            Vec3::new(-wo.x, -wo.y, wo.z),
+            Vec3::X,
+            Vec3::Z,
+            Vec3::NEG_Z,
+        ] {
+            let value = principled_eval(&m, wo, wi, ALL);
+            assert!(
+                value.is_finite() && principled_pdf(&m, wo, wi, ALL) >= 0.0,
+                "{material:?} {wo} {wi}: {value}"
+            );
+        }
+    }
+}
+
+/// A sphere of a principled material with these keys, under light from above.
+fn picture_of(keys: &str, textures: &str) -> wgray::pack::Packed {
+    super::scene(
+        16,
+        4,
+        &format!(
+            "camera = {{ position = [0, -4, 1], look_at = [0, 0, 0], fov = 40 }}\nenvironment = {{ color = [0.3, 0.4, 0.5] }}\n\
+             {textures}\n[materials.m]\ntype = 'principled'\n{keys}\n\
+             [[lights]]\ntype = 'point'\nposition = [1, -2, 4]\ncolor = [9, 9, 9]\n\
+             [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n"
+        ),
+    )
+}
+
+#[test]
+fn numbers_come_from_the_channels_of_a_texture() {
+    let texture = |kind: &str| match kind {
+        "constant" => "[textures.t]\ntype = 'constant'\ncolor = [0.75, 0.5, 0.25]",
+        _ => "[textures.t]\ntype = 'checker'\neven = [0.75, 0.5, 0.25]\nodd = [0.75, 0.5, 0.25]",
+    };
+    let plain = picture_of(
+        "metallic = 0.25\nroughness = 0.5\nclearcoat = 0.75\nclearcoat_roughness = 0.5",
+        "",
+    );
+    let textured = "metallic = { texture = 't', channel = 'b' }\nroughness = { texture = 't', channel = 'g' }\n\
+                    clearcoat = { texture = 't' }\nclearcoat_roughness = { texture = 't', channel = 'g' }";
+    let expected = crate::pictures::reference(&plain);
+    for kind in ["constant", "checker"] {
+        let packed = picture_of(textured, texture(kind));
+        // Looked up once for all four, or not at all.
+        assert_eq!(packed.lookups.len(), usize::from(kind == "checker"));
+        for way in crate::pictures::exact_ways() {
+            assert_eq!(
+                crate::pictures::differing(&crate::pictures::render(&packed, way), &expected),
+                0,
+                "{kind} {way:?}"
+            );
+        }
+    }
+    // The control: another channel.
+    let other = picture_of(&textured.replace("'b'", "'g'"), texture("checker"));
+    assert!(crate::pictures::differing(&crate::pictures::reference(&other), &expected) > 20);
+}
+
+#[test]
+fn what_breaks_a_rule_is_told() {
+    let told = |keys: &str| {
+        let text = format!(
+            "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -4, 1], look_at = [0, 0, 0], fov = 40 }}\n\
+             render = {{ integrator = 'path' }}\ntextures.t = {{ type = 'checker', even = [1, 1, 1], odd = [0, 0, 0] }}\n\
+             [materials.m]\ntype = 'principled'\n{keys}\n"
+        );
+        wgray::scene::Scene::parse(&text, "s.toml")
+            .map(|_| ())
+            .map_err(|error| error.to_string())
+    };
+    for (keys, message) in [
+        ("metallic = 1.5", "materials.m.metallic: 1.5 must be"),
+        ("roughness = -0.1", "materials.m.roughness: -0.1 must be"),
+        ("ior = 0.9", "materials.m.ior: 0.9 must be"),
+        ("thickness = -1", "materials.m.thickness: -1 must be finite"),
+        ("thickness = inf", "materials.m.thickness: "),
+        ("base_color = [1.1, 0, 0]", "materials.m.base_color: 1.1 must be"),
+        (
+            "attenuation_color = [0.5, 1, 1]\nthickness = 1",
+            "materials.m.attenuation_distance: is missing",
+        ),
+        (
+            "attenuation_color = [0.5, 1, 1]\nattenuation_distance = 1",
+            "materials.m.attenuation_color: needs a thickness",
+        ),
+        (
+            "attenuation_distance = 0",
+            "materials.m.attenuation_distance: 0 must be greater than 0",
+        ),
+        (
+            "alpha_mode = 'cutout'",
+            "materials.m.alpha_mode: \"cutout\" must be one of",
+        ),
+        ("alpha_cutoff = 2", "materials.m.alpha_cutoff: 2 must be"),
+        (
+            "alpha = { texture = 't', channel = 'x' }",
+            "materials.m.alpha.channel: \"x\" must be one of",
+        ),
+        (
+            "alpha = { texture = 't', channel = 'a' }",
+            "materials.m.alpha.channel: \"t\" must be a texture of type \"image\"",
+        ),
+        (
+            "alpha = { texture = 'u', channel = 'a' }",
+            "materials.m.alpha.texture: \"u\" is no texture",
+        ),
+        (
+            "clearcoat_normal_map = { texture = 't' }",
+            "materials.m.clearcoat_normal_map.texture: \"t\" must be",
+        ),
+        ("coat = 1", "materials.m.coat: unknown key"),
+    ] {
+        let found = told(keys).expect_err(keys);
+        assert!(found.contains(message), "{keys}: {found}");
+    }
+    for keys in [
+        "",
+        "metallic = 0\nroughness = 0\nior = 1\nspecular = 0\ntransmission = 1\nthickness = 1e9\nalpha_mode = 'blend'\nalpha = 0",
+        "attenuation_color = [0, 1, 1e-30]\nattenuation_distance = 1e-6\nthickness = 0.1",
+        "specular_color = [1e6, 0, 0]\nior = 100\nanisotropy = 1\nanisotropy_rotation = -360",
+    ] {
+        assert_eq!(told(keys), Ok(()), "{keys}");
+    }
+}

@@ -1,0 +1,100 @@
+//! Spot lights against closed forms.
+
+use wgray::pack::Packed;
+
+use super::mean;
+use crate::pictures::{both, means, render};
+use crate::scenes;
+
+/// A white floor of 3 x 3 units, seen from above without perspective: 16 x 16 pixels.
+fn floor(integrator: &str, light: &str) -> Packed {
+    let material = match integrator {
+        "path" => "type = 'diffuse', color = [1, 1, 1]",
+        _ => "type = 'phong', diffuse = [1, 1, 1], ambient = [0, 0, 0], specular = [0, 0, 0]",
+    };
+    scenes::parse(&format!(
+        "image = {{ width = 16, height = 16 }}\n\
+         camera = {{ type = 'orthographic', position = [0, 0, 0.5], look_at = [0, 0, 0], up = [0, 1, 0], height = 3 }}\n\
+         materials.m = {{ {material} }}\nrender = {{ integrator = '{integrator}', max_depth = 1, pixel_samples = {{ count = 256 }} }}\n\
+         [[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n{light}\n"
+    ))
+}
+
+/// What a spot of colour 1 above (0.2, 0.1, 0), which shines straight down, sends to a point of the floor: by the page's formula.
+fn expected(at: [f64; 2], height: f64, cone: f64, inner: f64, is_path: bool) -> f64 {
+    let (x, y) = (at[0] - 0.2, at[1] - 0.1);
+    let distance = (x * x + y * y + height * height).sqrt();
+    let cosine = height / distance;
+    let (outer, inner) = (cone.to_radians().cos(), inner.to_radians().cos());
+    let ramp = ((cosine - outer) / (inner - outer)).clamp(0.0, 1.0);
+    let by_distance = if is_path {
+        distance * distance * std::f64::consts::PI
+    } else {
+        1.0
+    };
+    ramp * ramp * cosine / by_distance
+}
+
+#[test]
+fn a_spot_lights_a_floor_as_the_formula_says() {
+    for (integrator, cone, inner) in [
+        ("path", 40.0, 10.0),
+        ("path", 60.0, 0.0),
+        ("path", 120.0, 20.0),
+        ("phong", 40.0, 10.0),
+        ("phong", 60.0, 55.0),
+    ] {
+        let light = format!(
+            "[[lights]]\ntype = 'spot'\nposition = [0.2, 0.1, 0.9]\nlook_at = [0.2, 0.1, 0]\ncolor = [1, 1, 1]\n\
+             cone_angle = {cone}\ninner_angle = {inner}"
+        );
+        let packed = floor(integrator, &light);
+        for way in both() {
+            let found = means(&render(&packed, way));
+            let (mut worst, mut of_wider) = (0.0_f64, 0.0_f64);
+            for (i, pixel) in found.iter().enumerate() {
+                // The mean over the pixel, by 32 x 32 points.
+                let mean = |cone: f64| {
+                    let place = |k: usize, sub: usize| (k as f64 + (sub as f64 + 0.5) / 32.0) * 3.0 / 16.0 - 1.5;
+                    let points = (0..1024).map(|k| [place(i % 16, k % 32), -place(i / 16, k / 32)]);
+                    points
+                        .map(|at| expected(at, 0.9, cone, inner, integrator == "path"))
+                        .sum::<f64>()
+                        / 1024.0
+                };
+                worst = worst.max((pixel[0] - mean(cone)).abs());
+                of_wider = of_wider.max((pixel[0] - mean(cone + 2.0)).abs());
+            }
+            assert!(worst < 4e-3, "{way:?}, {integrator}, {cone}, {inner}: {worst}");
+            assert!(
+                of_wider > worst,
+                "{way:?}: a cone that is wider by 2 degrees is another: {of_wider}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_widest_spot_is_a_point_and_the_narrowest_a_dot() {
+    for integrator in ["path", "phong"] {
+        let of = |light: &str| {
+            floor(
+                integrator,
+                &format!("[[lights]]\nposition = [0.2, 0.1, 0.9]\ncolor = [1, 1, 1]\n{light}"),
+            )
+        };
+        let point = of("type = 'point'");
+        let wide = of("type = 'spot'\ndirection = [1, 2, 3]\ncone_angle = 180\ninner_angle = 180");
+        let narrow = of("type = 'spot'\ndirection = [0, 0, -1]\ncone_angle = 0.01\ninner_angle = 0.01");
+        let away = of("type = 'spot'\ndirection = [0, 0, 1]\ncone_angle = 90");
+        for way in both() {
+            let expected = means(&render(&point, way));
+            for (a, b) in means(&render(&wide, way)).iter().zip(&expected) {
+                assert!((a[0] - b[0]).abs() < 1e-6 && a[0] > 0.0, "{way:?}: {a:?} for {b:?}");
+            }
+            // A radius of 0.00016: a 30 millionth of the floor.
+            assert!(mean(&render(&narrow, way))[0] < 1e-4, "{way:?}");
+            assert_eq!(mean(&render(&away, way)), [0.0; 3], "{way:?}: it looks away");
+        }
+    }
+}
