@@ -69,11 +69,13 @@ def paint(material, traced, exact):
         elif any(material.alpha):
             plugin |= {"type": "roughconductor", "distribution": "ggx"} | microfacets(*material.alpha)
     elif material.kind == "principled":
-        # As much work, and not the same: nearly so is the metal alone, GGX of alpha = roughness^2 with Schlick's formula, but without what
-        # facets reflect more than once. Disney's diffuse term, its specular part, clearcoat and sheen are others than glTF's.
+        # The metal alone is the same where it is so smooth that facets hide little and reflect once: GGX, with Schlick's formula. Disney's
+        # diffuse term, its specular part, its glass, clearcoat and sheen are others than glTF's, and as much work.
+        along, across = (float(alpha) for alpha in material.alpha)
+        streaks = {"anisotropic": (1 - across / along) / 0.9} if along > across else {}
         plugin = {"type": "principled", "base_color": tint(material.color), "metallic": float(material.metallic),
-                  "roughness": float(material.alpha[0]) ** 0.5, "specular": 0.5, "clearcoat": float(material.coat[0]),
-                  "clearcoat_gloss": 1.0 - material.coat[1]}
+                  "roughness": (along * across) ** 0.25, "specular": 0.5, "clearcoat": float(material.coat[0]),
+                  "clearcoat_gloss": 1.0 - material.coat[1]} | streaks
     elif material.thin:
         return {"type": "thindielectric", "int_ior": float(material.ior), "ext_ior": 1.0, "specular_transmittance": tint(material.color)}
     else:

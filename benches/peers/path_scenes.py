@@ -115,6 +115,10 @@ GOLD = "eta = [0.143, 0.375, 1.442]\nk = [3.983, 2.386, 1.603]"
 SKY = '\n[environment]\nfile = "maps/lobes.hdr"\n'
 
 
+NO_MIRROR = 'type = "principled"\nmetallic = 0\nspecular = 0'
+PASSES = "transmission = 1\nroughness = 0\nior = 1"
+
+
 def rough(kind, roughness, keys):
     return f'type = "{kind}"\nroughness = {roughness}\nenergy_compensation = false\n{keys}'
 
@@ -170,6 +174,13 @@ SCENES = {
     "dielectric-rough-color": ball(rough("dielectric", 0.4, "ior = 1.33\ncolor = [0.9, 0.6, 0.3]")),
     "dielectric-rough-air": ball(rough("dielectric", 0.4, "ior = 0.7")),
     "dielectric-thin": ball('type = "dielectric"\nior = 1.5\nthin = true'),
+    # Of `principled` Mitsuba has the same metal where alpha is about 0.01: at 0.04 facets hide each other otherwise there, at the ball's edge,
+    # and 0 is 0.001. Of a dielectric that reflects nothing it has what is left.
+    "principled-metal": ball('type = "principled"\nroughness = 0.1\nbase_color = [0.9, 0.7, 0.4]'),
+    "principled-brushed": ball('type = "principled"\nroughness = 0.1\nanisotropy = 0.15\nbase_color = [0.9, 0.7, 0.4]'),
+    "principled-ground": ball(f'{NO_MIRROR}\nbase_color = [0.8, 0.5, 0.2]'),
+    "principled-sheet": ball(f'{NO_MIRROR}\n{PASSES}\nbase_color = [0.8, 0.5, 0.9]'),
+    "principled-volume": ball(f'{NO_MIRROR}\n{PASSES}\nthickness = 1\nattenuation_color = [0.8, 0.3, 0.9]\nattenuation_distance = 0.6'),
     "lens": head(CAMERA + "\naperture = 0.5\nfocus_distance = 3.2") + ENVIRONMENT + FLOOR + material("ball", GREY) + SHAPES + lamp(),
     "map": head() + SKY + FLOOR + material("ball", 'type = "diffuse"\ncolor = [0.7, 0.7, 0.7]') + SHAPES,
     "map-turned": head() + SKY + "scale = 0.5\nrotate = 130\n" + FLOOR + material("ball", 'type = "conductor"\ncolor = [0.9, 0.8, 0.7]') + SHAPES,

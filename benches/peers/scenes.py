@@ -225,11 +225,14 @@ def material(path, row, textures, traced):
         raise ValueError(f"{path}: the peers compensate for no energy: energy_compensation must be false")
     made = Material(kind, emission=color(path, row, "emission", textures))
     if kind == "principled":
-        other = set(row) - {"type", "base_color", "metallic", "roughness", "clearcoat", "clearcoat_roughness"}
+        made.color, made.metallic = color(path, row, "base_color", textures, [1, 1, 1]), row.get("metallic", 1)
+        if made.metallic == 0 and row.get("specular") == 0:
+            return bare(path, row, made)
+        other = set(row) - {"type", "base_color", "metallic", "roughness", "anisotropy", "clearcoat", "clearcoat_roughness"}
         if other:
             raise ValueError(f"{path}: the peers' principled has no {', '.join(sorted(other))}")
-        made.color, made.metallic = color(path, row, "base_color", textures, [1, 1, 1]), row.get("metallic", 1)
-        made.alpha = (row.get("roughness", 1) ** 2,) * 2
+        across = row.get("roughness", 1) ** 2
+        made.alpha = (across + (1 - across) * row.get("anisotropy", 0) ** 2, across)
         made.coat = (row.get("clearcoat", 0), row.get("clearcoat_roughness", 0))
         return made
     if rough:
@@ -251,6 +254,21 @@ def material(path, row, textures, traced):
         made.ior, made.absorption = row.get("ior", 1), row.get("absorption")
     if not traced and not all(isinstance(c, list) for c in (made.ambient, made.diffuse, made.specular)):
         raise ValueError(f"{path}: the peers' colours are plain")
+    return made
+
+
+def bare(path, row, made):
+    """A `principled` dielectric that reflects nothing is another material: its ground alone, or without a ground what lets all light pass."""
+    known = {"type", "base_color", "metallic", "specular", "transmission", "thickness", "ior", "roughness", "attenuation_color", "attenuation_distance"}
+    passes, thick = row.get("transmission", 0), row.get("thickness", 0) > 0
+    straight = row.get("roughness", 1) == 0 and row.get("ior", 1.5) == 1
+    if set(row) - known or passes not in (0, 1) or (passes and not straight):
+        raise ValueError(f"{path}: the peers know of principled without reflection the ground, and what passes straight on")
+    made.kind = "dielectric" if passes else "diffuse"
+    if passes:
+        made.thin = not thick
+        if "attenuation_color" in row:
+            made.absorption = [-math.log(c) / row["attenuation_distance"] for c in row["attenuation_color"]]
     return made
 
 

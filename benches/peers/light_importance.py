@@ -1,0 +1,136 @@
+#!/usr/bin/env python3
+"""How good the choices of the tree over many lamps are: the variance, over the squared mean, of one sample of direct light without shadows
+at places on the walls of a room, in f64, as a Markdown table: the mean over the places, and the median.
+
+    target/peers/venv/bin/python benches/peers/light_importance.py
+
+The tree is one of halves of the longest side rather than wgray's; the importance of a child is the first paragraph of "The tree over many
+lights" in docs/path-tracing.md, and what it was before. The exact variance follows from each lamp's light and its probability; no sample is taken.
+"""
+import argparse
+
+import numpy as np
+
+import lamps
+
+PLACES = 2000
+DOWN = np.array([0, 0, -1.0])
+
+
+def walls(chance):
+    """Places on the walls of the room of lamps.py, each as likely as any other, and the normals there."""
+    size = np.array([4, 8, 3.0])
+    areas = np.repeat([size[1] * size[2], size[0] * size[2], size[0] * size[1]], 2)
+    wall = chance.choice(6, p=areas / areas.sum(), size=PLACES)
+    axis, side = wall // 2, wall % 2 - 0.5
+    points, normals = (chance.random((PLACES, 3)) - 0.5) * size, np.zeros((PLACES, 3))
+    rows = np.arange(PLACES)
+    points[rows, axis] = side * size[axis]
+    normals[rows, axis] = -2 * side
+    return points + [0, 0, 1.5], normals
+
+
+def split(where, some):
+    box = where[some]
+    axis = np.argmax(box.max(0) - box.min(0))
+    some = some[np.argsort(box[:, axis], kind="stable")]
+    return [some[:len(some) // 2], some[len(some) // 2:]]
+
+
+def tree(where, some, width):
+    """A lamp's number, or pairs of lamps' numbers and the tree of these."""
+    if len(some) == 1:
+        return some[0]
+    parts = [some]
+    while len(parts) < width:
+        cost = [len(part) * np.prod(np.ptp(where[part], axis=0) + 0.01) ** (2 / 3) if len(part) > 1 else 0 for part in parts]
+        worst = int(np.argmax(cost))
+        if cost[worst] == 0:
+            break
+        parts[worst:worst + 1] = split(where, parts[worst])
+    return [(part, tree(where, part, width)) for part in parts]
+
+
+def heights(points, normals, center, flat):
+    """The distance of a sphere's middle, and its height above the planes of lamps and surfaces."""
+    to = center - points
+    distance = np.sqrt((to ** 2).sum(-1))
+    return distance, -(to @ DOWN) if flat else distance, (to * normals).sum(-1)
+
+
+def bounded(points, normals, center, radius, flat):
+    distance, leaving, facing = heights(points, normals, center, flat)
+    cosines = [np.maximum((height + radius) / (distance + radius), 1e-3) for height in (leaving, facing)]
+    value = cosines[0] * cosines[1] / (distance ** 2 + 0.5 * radius ** 2)
+    return np.where((leaving + 1.57 * radius > 0) & (facing + radius > 0), value, 0)
+
+
+def means(points, normals, center, radius, flat):
+    distance, leaving, facing = heights(points, normals, center, flat)
+    square = distance ** 2 + 0.1 * radius ** 2
+
+    def above(height):
+        cut = (height + radius) ** 2 / (4 * max(radius, 1e-9))
+        return np.maximum(np.where(np.abs(height) < radius, cut, np.maximum(height, 0)), 0.03 * radius)
+
+    value = above(leaving) * above(facing) / square ** 2
+    return np.where((leaving + 1.57 * radius > 0) & (facing + radius > 0), value, 0)
+
+
+def probabilities(where, width, importance, points, normals, flat):
+    out = np.zeros((len(points), len(where)))
+
+    def below(node, probability):
+        if not isinstance(node, list):
+            out[:, node] = probability
+            return
+        values = []
+        for some, _ in node:
+            low, high = where[some].min(0), where[some].max(0)
+            radius = np.linalg.norm(high - low) / 2
+            values.append(len(some) * importance(points, normals, (low + high) / 2, radius, flat))
+        shares = np.stack(values, -1)
+        shares = np.where(shares > 0, np.maximum(shares, shares.sum(-1, keepdims=True) / 4096), 0)
+        total = shares.sum(-1, keepdims=True)
+        shares = np.where(total > 0, shares / np.where(total > 0, total, 1), 0)
+        for i, (_, child) in enumerate(node):
+            below(child, probability * shares[:, i])
+
+    below(tree(where, np.arange(len(where)), width), np.ones(len(points)))
+    return out
+
+
+def variance(where, width, importance, points, normals, flat):
+    to = where[None] - points[:, None]
+    squares = (to ** 2).sum(-1)
+    cosines = np.maximum((to * normals[:, None]).sum(-1), 0) / np.sqrt(squares)
+    light = cosines / squares * (np.maximum(-(to @ DOWN), 0) / np.sqrt(squares) if flat else 1)
+    chances = probabilities(where, width, importance, points, normals, flat)
+    if ((light > 1e-12) & (chances == 0)).any():
+        raise SystemExit("a lamp that lights a place is never chosen")
+    second = np.where(light > 0, light ** 2 / np.maximum(chances, 1e-300), 0).sum(1)
+    mean = light.sum(1)
+    lit = mean > 1e-3
+    found = second[lit] / mean[lit] ** 2 - 1
+    return f"{found.mean():.2f} ({np.median(found):.2f})"
+
+
+def main():
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+    chance = np.random.default_rng(1)
+    points, normals = walls(chance)
+    grid = np.meshgrid(np.linspace(-1.9, 1.9, 25), np.linspace(-3.9, 3.9, 40), [2.7])
+    clumps = [(x, y, 1.5) + 0.05 * chance.standard_normal((100, 3)) for x in (-1, 1) for y in (-3, -1.5, 0, 1.5, 3)]
+    places = {"spread over the room": np.array(lamps.places(1000)), "under the ceiling": np.stack(grid, -1).reshape(-1, 3),
+              "in ten clumps": np.concatenate(clumps)}
+    print("| a thousand lamps | two children, bounds of cosines | four children | and means of cosines |")
+    print("| --- | ---: | ---: | ---: |")
+    for name, where in places.items():
+        for kind, flat in (("flat ones that shine downwards", True), ("points", False)):
+            ways = [(2, bounded), (4, bounded), (4, means)]
+            cells = [variance(where, width, importance, points, normals, flat) for width, importance in ways]
+            print(f"| {kind}, {name} | {' | '.join(cells)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
