@@ -14,30 +14,28 @@ fn chosen_light(emitter: Emitter, p: vec3f, n: vec3f, key: vec2u, sample: u32) -
     if emitter.index != NOTHING {
         return chosen;
     }
-    var node = load_light_node(0u);
     var probability = 1.0;
+    var at = 0u;
+    var last = 0u;
+    var child = 0u;
     var level = 0u;
     var bits = vec2u(0u);
-    while node.children != NOTHING {
-        let first = load_light_node(node.children);
-        let second = load_light_node(node.children + 1u);
-        let share = first_share(light_importance(first, p, n), light_importance(second, p, n));
+    while at != NOTHING {
+        last = at;
+        let node = load_light_node(at);
+        let shares = light_shares(light_importances(node, p, n));
         if (level & 1u) == 0u {
             bits = decision_set(hash4(vec4u(key.x, key.y, level, 1u)).xy, sample);
         }
-        let random = unit_float(select(bits.x, bits.y, (level & 1u) == 1u));
-        if random < share {
-            node = first;
-            probability *= share;
-        } else {
-            node = second;
-            probability *= 1.0 - share;
-        }
+        child = light_child(shares, unit_float(select(bits.x, bits.y, (level & 1u) == 1u)));
+        probability *= shares[child];
+        at = node.children[child];
         level++;
     }
-    chosen.emitter.instance = node.instance;
-    chosen.emitter.index = node.index;
-    chosen.density = node.density * probability;
+    let node = load_light_node(last);
+    chosen.emitter.instance = node.instance[child];
+    chosen.emitter.index = node.index[child];
+    chosen.density = node.density[child] * probability;
     return chosen;
 }
 
@@ -50,21 +48,16 @@ fn met_density(hit: Hit, wanted: bool, p: vec3f, n: vec3f) -> f32 {
     if at == NOTHING {
         return 0.0;
     }
-    var node = load_light_node(at);
-    var density = node.density;
-    while node.parent != NOTHING {
-        let own = light_importance(node, p, n);
-        let other = light_importance(load_light_node(light_sibling(at)), p, n);
-        let is_first = (at & 1u) == 1u;
-        let share = first_share(select(other, own, is_first), select(own, other, is_first));
-        density *= select(1.0 - share, share, is_first);
-        at = node.parent;
-        node = load_light_node(at);
+    var density = load_light_node(at / 4u).density[at % 4u];
+    while at != NOTHING {
+        let node = load_light_node(at / 4u);
+        density *= light_shares(light_importances(node, p, n))[at % 4u];
+        at = node.parent.x;
     }
     return density;
 }
 
-// The number of the node that is what was hit, NOTHING if there is none.
+// Which child of which node is what was hit, as `LightNode.parent` has it; NOTHING if there is none.
 fn light_leaf(hit: Hit) -> u32 {
     var place = hit.primitive;
     if (IN_TREE & (1u << INSTANCE)) != 0u {

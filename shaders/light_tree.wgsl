@@ -1,37 +1,52 @@
-// The tree over what shines: how much light of a node may arrive at a point. Conty Estevez and Kulla, "Importance Sampling of Many
-// Lights with Adaptive Tree Splitting", HPG 2018, without the splitting.
+// The tree over what shines: how much light of a node's children may arrive at a point. Conty Estevez and Kulla, "Importance Sampling of Many
+// Lights with Adaptive Tree Splitting", HPG 2018, without the splitting, and with four children.
 
-// How much light of a node may arrive at p, up to a factor: section 4.1, with the cosines as heights over planes, that of a sphere being its
-// middle's and its radius, and the square of the distance that of its middle and half that of its radius. n is the normal of a surface that light from its side alone can reach, or 0. Above 0 where any of it can
-// arrive, with room for all that is rounded.
-fn light_importance(node: LightNode, p: vec3f, n: vec3f) -> f32 {
-    let to = node.center - p;
-    let d2 = dot(to, to);
+// The mean of what is above 0 of a height that is evenly spread from m - r to m + r.
+fn mean_above(m: vec4f, r: vec4f) -> vec4f {
+    return select(max4(m, vec4f(0.0)), 0.25 * (m + r) * ((m + r) / r), abs(m) < r);
+}
+
+// How much light of each child may arrive at p, up to a factor: as section 4.1 has it, but that the cosines there and here are means over the sphere of
+// heights above the lamp's and the surface's planes, by the distance, and no less than 0.03 of the radius, as spheres are wider than what is
+// in them. To the square of the distance a tenth of that of the radius is added. n is the normal of a surface that light from its side
+// alone can reach, or 0. Above 0 where any of it can arrive, with room for all that is rounded.
+fn light_importances(node: LightNode, p: vec3f, n: vec3f) -> vec4f {
+    let x = node.x - p.x;
+    let y = node.y - p.y;
+    let z = node.z - p.z;
+    let d2 = x * x + y * y + z * z;
     let d = sqrt(d2);
-    let along = -dot(node.axis, to);
-    let ahead = select(along, abs(along), node.sides == 2u);
-    let sine = sqrt(max(1.0 - node.cosine * node.cosine, 0.0));
-    let turned = ahead * node.cosine + sqrt(max(d2 - along * along, 0.0)) * sine;
+    let along = -(node.axis_x * x + node.axis_y * y + node.axis_z * z);
+    let ahead = select(along, abs(along), node.sides == vec4u(2u));
+    let sine = sqrt(max4(1.0 - node.cosine * node.cosine, vec4f(0.0)));
+    let turned = ahead * node.cosine + sqrt(max4(d2 - along * along, vec4f(0.0))) * sine;
     let leaving = select(turned, d, ahead >= node.cosine * d); // d times the cosine to the nearest normal
-    let facing = select(dot(n, to), d, dot(n, n) == 0.0);
-    let outer = d + node.radius;
-    let cosines = max((leaving + node.radius) / outer, 1e-3) * max((facing + node.radius) / outer, 1e-3);
-    let value = node.intensity * cosines / max(d2 + 0.5 * node.radius * node.radius, 1e-30);
+    let facing = select(x * n.x + y * n.y + z * n.z, d, vec4<bool>(dot(n, n) == 0.0));
+    let least = 0.03 * node.radius;
+    let leaves_by = max4(mean_above(leaving, node.radius), least);
+    let faces_by = max4(mean_above(facing, node.radius), least);
+    let inverse = 1.0 / max4(sqrt(d2 + 0.1 * node.radius * node.radius), vec4f(1e-15));
+    let value = node.intensity * (leaves_by * inverse) * (faces_by * inverse) * (inverse * inverse);
     // The cosine falls no faster than the angle grows, which the sphere widens by at most pi / 2 times its sine.
     let leaves = leaving + 1.5707964 * node.radius > (node.edge - 1e-3) * d;
-    return select(0.0, max(value, 1e-36), leaves & (facing + node.radius > -1e-3 * d));
+    let arrives = leaves & (facing + node.radius > -1e-3 * d) & (node.intensity > vec4f(0.0));
+    return select(vec4f(0.0), max4(value, vec4f(1e-36)), arrives);
 }
 
-// The probability of the first of two nodes, by what may arrive of them; half where nothing does. None of two that are worth a look
+// The probabilities of the children, by what may arrive of them; that of the first is 1 where nothing does. None that is worth a look
 // is so rare that the grid of random numbers matters.
-fn first_share(first: f32, second: f32) -> f32 {
-    let sum = first + second;
-    let share = min(max(first / sum, 0.00024414063), 0.99975586);
-    let one = select(select(1.0, 0.0, first == 0.0), share, (first > 0.0) & (second > 0.0));
-    return select(one, 0.5, sum == 0.0);
+fn light_shares(importances: vec4f) -> vec4f {
+    let sum = (importances.x + importances.y) + (importances.z + importances.w);
+    let least = select(vec4f(0.0), max4(importances, vec4f(sum * 0.00024414063)), importances > vec4f(0.0));
+    let shares = least / ((least.x + least.y) + (least.z + least.w));
+    return select(shares, vec4f(1.0, 0.0, 0.0, 0.0), vec4<bool>(sum == 0.0));
 }
 
-// The other child of a node's parent: pairs are numbers 1 and 2, 3 and 4 and so on.
-fn light_sibling(i: u32) -> u32 {
-    return ((i - 1u) ^ 1u) + 1u;
+// The child that a random number of [0, 1) chooses: never one whose share is 0.
+fn light_child(shares: vec4f, random: f32) -> u32 {
+    let second = shares.x + shares.y;
+    let third = second + shares.z;
+    let child = select(0u, 1u, random >= shares.x) + select(0u, 1u, random >= second) + select(0u, 1u, random >= third);
+    let last = select(select(select(0u, 1u, shares.y > 0.0), 2u, shares.z > 0.0), 3u, shares.w > 0.0);
+    return select(child, last, child > last);
 }

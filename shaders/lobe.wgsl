@@ -78,8 +78,21 @@ fn facet_weight(alpha: vec2f, wo: vec3f, wi: vec3f) -> f32 {
     return wi.z * (wo.z + length) / max(wo.z * ggx_length(alpha, wi) + wi.z * length, 1e-30);
 }
 
+// Where a direction lies in a table of facets that are rougher along x: by its direction along the surface, from across the streaks, 0, to along
+// them, 1, finer where less and less roughness is seen; and by its cosine, finer near 0 where little is seen.
+fn streak_place(alpha: vec2f, w: vec3f) -> vec2f {
+    let x = alpha.x * w.x;
+    let y = alpha.y * w.y;
+    let square = (x * x + y * y) / max(w.x * w.x + w.y * w.y, 1e-30);
+    let seen = max(sqrt(square), alpha.y);
+    let line = sqrt(min((seen - alpha.y) / max(alpha.x - alpha.y, 1e-6), 1.0));
+    let half_way = 0.5 * sqrt(seen);
+    let cosine = min(max(w.z, 0.0), 1.0);
+    return vec2f(line, 0.5 * (cosine + cosine * (1.0 + half_way) / (cosine + half_way)));
+}
+
 // What facets do not reflect at once, but after further bounces between them, as a multiple of what they do, for light from everywhere.
-// Less by the error of the fit, which so makes no light.
+// Less by the error of the fit, which so makes no light. Where they are rougher along one axis a table knows better.
 fn facet_loss(alpha: vec2f, wo: vec3f) -> f32 {
     let once = ggx_albedo_along(alpha, wo);
     return max(1.0 / (once.x + once.y) - 1.005, 0.0);

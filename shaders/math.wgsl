@@ -18,6 +18,11 @@ fn max(a: f32, b: f32) -> f32 {
     return select(b, a, a > b);
 }
 
+// Each component's.
+fn max4(a: vec4f, b: vec4f) -> vec4f {
+    return select(b, a, a > b);
+}
+
 fn min(a: f32, b: f32) -> f32 {
     return select(b, a, a < b);
 }

@@ -1,31 +1,35 @@
 // The material `principled`: glTF 2.0's metallic-roughness model with its extensions (Khronos, "glTF 2.0 Specification", 2021, appendix B;
 // KHR_materials_anisotropy, _clearcoat, _ior, _sheen, _specular, _transmission, _volume). A coat lies over sheen, which lies over what
-// is metal, or a dielectric with its diffuse ground or the light that it passes. A layer takes of what is below it the share that it
-// reflects by itself towards the viewer, so that no light is made and none is lost. Directions are in a local frame: z is the shading normal on the
+// is metal, or a dielectric with its diffuse ground or the light that it passes. Metal and ground are the same from both sides. A layer takes of what is below it the share that it
+// reflects by itself towards the viewer, so that no light is made and none is lost. Light passes as through the material `dielectric`: by Fresnel's
+// equations, not by Schlick's formula, and with what its facets lose given back. Directions are in a local frame: z is the shading normal on the
 // viewer's side, x the tangent.
 
 // What is there of a material where it is looked at from one direction.
 struct Mixture {
     diffuse: vec3f,        // share of the light that the ground spreads
     alpha: vec2f,          // of the specular lobe, along x and y
-    f0: vec3f,             // its reflectance head-on
-    f90: f32,              // and at grazing angles
-    gain: vec3f,           // its factor, with what is lost between facets given back
-    passed: vec3f,         // factor of the light that passes the surface
-    inner_f0: vec3f,       // the dielectric's reflectance, which such light has lost
-    inner_f90: f32,
-    eta: f32,              // the ratio of the indices before and behind it; 1 where it is thin
+    f0: vec3f,             // what of light it reflects head-on, with what is lost between facets given back
+    f90: vec3f,            // and at grazing angles
+    glass: f32,            // factor of what is glass, with what is lost between its facets given back
+    passed: vec3f,         // the same of the light that passes it
+    glass_f0: vec3f,       // its reflectance head-on
+    glass_f90: f32,        // and at grazing angles
+    head_on: f32,          // that of its index alone, head-on
+    ratio: f32,            // of the indices before and behind it, also where it is thin
+    eta: f32,              // the same for what changes its direction: 1 where it is thin
     thin: bool,            // whether light that passes keeps its direction
     coat: f32,             // factor of the coat's lobe
     coat_alpha: f32,
     coat_normal: vec3f,
     sheen: vec3f,          // factor of the sheen's lobe
     sheen_alpha: f32,
-    chances: vec4f,        // of ground, specular lobe, passing light and coat; the rest is the sheen's
+    chances: vec4f,        // of ground, specular lobe, glass and coat; the rest is the sheen's
 }
 
-// The lobes that a kernel has are bits of `lobes`, so that it computes no others.
-fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal: vec3f, lobes: u32) -> Mixture {
+// The lobes that a kernel has are bits of `lobes`, so that it computes no others. `energy` is what tables know of the facets: of those that are
+// rougher along one axis the two parts of `ggx_albedo`, x and y; of rough glass, z, the share of light that it reflects and lets pass at once.
+fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal: vec3f, lobes: u32, energy: vec3f) -> Mixture {
     var m = Mixture();
     let rough = max(material.roughness * material.roughness, SMALLEST_ALPHA);
     m.alpha = vec2f(rough, rough);
@@ -59,46 +63,59 @@ fn principled_mixture(material: Material, wo: vec3f, outside: bool, coat_normal:
     }
     let base = material.diffuse;
     let dielectric = 1.0 - material.metallic;
+    let ground = dielectric * (1.0 - material.transmission);
+    let ratio = (material.ior - 1.0) / (material.ior + 1.0);
     var reflected = vec3f(0.0);
     var inner = vec3f(0.0);
-    if (lobes & LOBE_SPECULAR) != 0u {
-        let ratio = (material.ior - 1.0) / (material.ior + 1.0);
-        let f0 = material.specular * (ratio * ratio);
-        m.inner_f0 = vec3f(min(f0.x, 1.0), min(f0.y, 1.0), min(f0.z, 1.0)) * material.specular_weight;
-        m.inner_f90 = material.specular_weight;
-        m.f0 = m.inner_f0 * dielectric + base * material.metallic;
-        m.f90 = m.inner_f90 * dielectric + material.metallic;
-        // From inside the angle in the thinner medium counts.
-        let cosine = select(wo.z, refracted_cosine(wo.z, m.eta), m.eta > 1.0);
-        var share = ggx_albedo(m.alpha.y, cosine);
+    var share = vec2f(0.0);
+    var lost = 0.0;
+    if (lobes & (LOBE_SPECULAR | LOBE_TRANSMISSION)) != 0u {
+        share = ggx_albedo(m.alpha.y, wo.z);
+        var certain = 1.005; // beyond the error of the fit
         if (lobes & LOBE_ANISOTROPY) != 0u {
-            // The most of both axes and what lies between: that of streaks is known roughly, and what is below must not get too much.
-            let along = select(share, ggx_albedo_along(m.alpha, wo), m.eta <= 1.0);
-            let other = ggx_albedo(m.alpha.x, cosine);
-            share = vec2f(max(max(share.x, other.x), along.x), max(max(share.y, other.y), along.y));
+            if material.streaks != 0u {
+                share = energy.xy;
+                certain = 1.0;
+            }
         }
-        let whole = max(share.x + share.y, 1e-3);
         // Turquin, "Practical multiple scattering compensation for microfacet models", 2019.
-        // What streaks lose is known roughly, and less of it is given back.
-        let known = select(1.0, 1.0 - material.anisotropy * material.anisotropy, (lobes & LOBE_ANISOTROPY) != 0u);
-        let lost = max(1.0 / whole - 1.005, 0.0) * known;
-        let gain = vec3f(1.0) + m.f0 * lost;
-        m.gain = gain * left;
-        reflected = (m.f0 * share.x + vec3f(m.f90 * share.y)) * gain;
-        inner = m.inner_f0 * share.x + vec3f(m.inner_f90 * share.y);
-        inner *= vec3f(1.0) + m.inner_f0 * lost;
+        lost = max(1.0 / max(share.x + share.y, 1e-3) - certain, 0.0);
+        let inner_f0 = bounded_color(material.specular * (ratio * ratio)) * material.specular_weight;
+        // Where the index is that of air nothing reflects, at no angle: Lagarde and de Rousiers, "Moving Frostbite to Physically Based
+        // Rendering", SIGGRAPH 2014 course, section 3.
+        let inner_f90 = material.specular_weight * min(50.0 * (ratio * ratio), 1.0);
+        let inner_gain = vec3f(1.0) + inner_f0 * lost;
+        let metal_gain = (vec3f(1.0) + base * lost) * (material.metallic * left);
+        m.f0 = inner_f0 * inner_gain * (ground * left) + base * metal_gain;
+        m.f90 = inner_gain * (inner_f90 * (ground * left)) + metal_gain;
+        reflected = m.f0 * share.x + m.f90 * share.y;
+        inner = (inner_f0 * share.x + vec3f(inner_f90 * share.y)) * inner_gain;
     }
-    let ground = dielectric * (1.0 - material.transmission);
     m.diffuse = base * (ground * left * max(1.0 - largest(inner), 0.0));
-    var passing = 0.0;
+    var clear = 0.0;
     if (lobes & LOBE_TRANSMISSION) != 0u {
-        m.passed = base * (dielectric * material.transmission * left);
-        passing = luminance(m.passed) * max(1.0 - largest(inner), 0.0);
+        let head_on = ratio * ratio;
+        m.head_on = select(head_on, 2.0 * head_on / (1.0 + head_on), m.thin);
+        m.glass_f0 = bounded_color(material.specular * m.head_on) * material.specular_weight;
+        m.glass_f90 = material.specular_weight;
+        m.ratio = select(material.ior, 1.0 / material.ior, outside | m.thin);
+        let kept = max(energy.z, 1e-3);
+        let gain = select(1.0, select(1.0 / kept, 1.0 + lost, m.thin), !passes_straight(m));
+        let glass = dielectric * material.transmission * left;
+        m.glass = glass * gain;
+        m.passed = base * m.glass;
+        let mirrored = min(luminance(m.glass_f0 * share.x + vec3f(m.glass_f90 * share.y)), 1.0);
+        clear = glass * (luminance(base) * (1.0 - mirrored) + mirrored);
     }
-    let weights = vec4f(luminance(m.diffuse), luminance(reflected) * left, passing, coat_share);
+    let weights = vec4f(luminance(m.diffuse), luminance(reflected), clear, coat_share);
     let sum = weights.x + weights.y + weights.z + weights.w + sheen_share;
     m.chances = select(vec4f(1.0, 0.0, 0.0, 0.0), weights * (1.0 / max(sum, 1e-30)), sum > 1e-30);
     return m;
+}
+
+// A colour of at most 1.
+fn bounded_color(color: vec3f) -> vec3f {
+    return vec3f(min(color.x, 1.0), min(color.y, 1.0), min(color.z, 1.0));
 }
 
 // How bright a colour is: ITU-R BT.709.
@@ -110,14 +127,27 @@ fn sheen_chance(m: Mixture) -> f32 {
     return max(1.0 - (m.chances.x + m.chances.y + m.chances.z + m.chances.w), 0.0);
 }
 
-// Schlick, "An Inexpensive BRDF Model for Physically-based Rendering", Computer Graphics Forum 13(3), 1994. From inside of a denser medium
-// the angle behind the surface counts, and beyond the critical one all is reflected.
-fn schlick(f0: vec3f, f90: f32, cosine: f32, eta: f32) -> vec3f {
-    let behind = refracted_cosine(cosine, eta);
-    let x = 1.0 - min(select(cosine, behind, eta > 1.0), 1.0);
+// Schlick, "An Inexpensive BRDF Model for Physically-based Rendering", Computer Graphics Forum 13(3), 1994.
+fn schlick(f0: vec3f, f90: vec3f, cosine: f32) -> vec3f {
+    let x = 1.0 - min(cosine, 1.0);
     let x2 = x * x;
-    let f = f0 + (vec3f(f90) - f0) * (x2 * x2 * x);
-    return select(f, vec3f(1.0), (eta > 1.0) & (behind == 0.0));
+    return f0 + (f90 - f0) * (x2 * x2 * x);
+}
+
+// What glass reflects: as its index says, or a sheet's two sides; with another reflectance head-on, or at grazing angles, the same in between.
+fn glass_fresnel(m: Mixture, cosine: f32) -> vec3f {
+    let c = min(max(cosine, 1e-6), 1.0);
+    let behind = refracted_cosine(c, m.ratio);
+    let once = fresnel(c, behind, m.ratio);
+    let exact = select(once, 2.0 * once / (1.0 + once), m.thin);
+    let x = (exact - m.head_on) / max(1.0 - m.head_on, 1e-6);
+    let f = m.glass_f0 + (vec3f(m.glass_f90) - m.glass_f0) * x;
+    return select(bounded_color(vec3f(max(f.x, 0.0), max(f.y, 0.0), max(f.z, 0.0))), vec3f(1.0), behind == 0.0);
+}
+
+// How likely a facet of glass mirrors.
+fn glass_chance(m: Mixture, cosine: f32) -> f32 {
+    return min(luminance(glass_fresnel(m, cosine)), 1.0);
 }
 
 // Whether light passes in one direction alone: where facets are flat, or what is behind the surface bends nothing.
@@ -162,12 +192,12 @@ fn principled_eval(m: Mixture, wo: vec3f, wi: vec3f, lobes: u32) -> vec3f {
     if (lobes & LOBE_SPECULAR) != 0u {
         if (wi.z > 0.0) & !is_flat(m.alpha) {
             let half = half_between(wo, wi);
-            value += schlick(m.f0, m.f90, max(dot(wo, half), 0.0), m.eta) * m.gain * facets_eval(m.alpha, wo, wi, half);
+            value += schlick(m.f0, m.f90, max(dot(wo, half), 0.0)) * facets_eval(m.alpha, wo, wi, half);
         }
     }
     if (lobes & LOBE_TRANSMISSION) != 0u {
-        if (wi.z < 0.0) & !passes_straight(m) {
-            value += passed_eval(m, wo, wi);
+        if !passes_straight(m) {
+            value += glass_eval(m, wo, wi);
         }
     }
     if (lobes & LOBE_COAT) != 0u {
@@ -183,18 +213,34 @@ fn principled_eval(m: Mixture, wo: vec3f, wi: vec3f, lobes: u32) -> vec3f {
     return value;
 }
 
-fn passed_eval(m: Mixture, wo: vec3f, wi: vec3f) -> vec3f {
-    if m.thin {
-        let mirrored = vec3f(wi.x, wi.y, -wi.z);
-        let half = half_between(wo, mirrored);
-        let reflected = schlick(m.inner_f0, m.inner_f90, max(dot(wo, half), 0.0), 1.0);
-        return m.passed * (vec3f(1.0) - reflected) * facets_eval(m.alpha, wo, mirrored, half);
+// What is glass, by the facets of `rough_dielectric.wgsl` and `thin.wgsl`.
+fn glass_eval(m: Mixture, wo: vec3f, wi: vec3f) -> vec3f {
+    let above = wi.z > 0.0;
+    if above | m.thin {
+        let up = vec3f(wi.x, wi.y, abs(wi.z));
+        let half = half_between(wo, up);
+        let reflected = glass_fresnel(m, dot(wo, half));
+        let factor = select(m.passed * (vec3f(1.0) - reflected), reflected * m.glass, above);
+        return factor * facets_eval(m.alpha, wo, up, half);
     }
     let half = refracting_half(wo, wi, m.eta);
-    let o = max(dot(wo, half), 0.0);
-    let reflected = schlick(m.inner_f0, m.inner_f90, o, m.eta);
-    let facets = ggx_d(m.alpha, half) * ggx_g2(m.alpha, wo, vec3f(wi.x, wi.y, -wi.z)) * o / max(wo.z, 1e-6);
-    return m.passed * (vec3f(1.0) - reflected) * (facets * refracting_density(wo, wi, half, m.eta) * (m.eta * m.eta));
+    let reflected = glass_fresnel(m, dot(wo, half));
+    let seen = ggx_pdf(m.alpha, wo, half) * ggx_g1(m.alpha, wi);
+    let density = seen * refracting_density(wo, wi, half, m.eta) * (m.eta * m.eta);
+    return m.passed * (vec3f(1.0) - reflected) * density;
+}
+
+// How densely its samples lie, per solid angle.
+fn glass_pdf(m: Mixture, wo: vec3f, wi: vec3f) -> f32 {
+    let above = wi.z > 0.0;
+    if above | m.thin {
+        let half = half_between(wo, vec3f(wi.x, wi.y, abs(wi.z)));
+        let chance = glass_chance(m, dot(wo, half));
+        return mirrored_pdf(m.alpha, wo, half) * select(1.0 - chance, chance, above);
+    }
+    let half = refracting_half(wo, wi, m.eta);
+    let chance = glass_chance(m, dot(wo, half));
+    return ggx_pdf(m.alpha, wo, half) * refracting_density(wo, wi, half, m.eta) * (1.0 - chance);
 }
 
 fn coat_eval(m: Mixture, wo: vec3f, wi: vec3f) -> f32 {
@@ -205,7 +251,7 @@ fn coat_eval(m: Mixture, wo: vec3f, wi: vec3f) -> f32 {
         return 0.0;
     }
     let half = half_between(o, i);
-    let f = schlick(vec3f(COAT_F0), 1.0, max(dot(o, half), 0.0), 1.0);
+    let f = schlick(vec3f(COAT_F0), vec3f(1.0), max(dot(o, half), 0.0));
     return m.coat * f.x * facets_eval(alpha, o, i, half);
 }
 
@@ -223,16 +269,8 @@ fn principled_pdf(m: Mixture, wo: vec3f, wi: vec3f, lobes: u32) -> f32 {
         }
     }
     if (lobes & LOBE_TRANSMISSION) != 0u {
-        if (wi.z < 0.0) & !passes_straight(m) {
-            let mirrored = vec3f(wi.x, wi.y, -wi.z);
-            var density = 0.0;
-            if m.thin {
-                density = mirrored_pdf(m.alpha, wo, half_between(wo, mirrored));
-            } else {
-                let half = refracting_half(wo, wi, m.eta);
-                density = ggx_pdf(m.alpha, wo, half) * refracting_density(wo, wi, half, m.eta);
-            }
-            pdf += m.chances.z * density;
+        if (m.chances.z > 0.0) & !passes_straight(m) {
+            pdf += m.chances.z * glass_pdf(m, wo, wi);
         }
     }
     if (lobes & LOBE_COAT) != 0u {
@@ -273,7 +311,7 @@ fn principled_sample(m: Mixture, wo: vec3f, u: vec2f, random: f32, lobes: u32) -
             is_delta = is_flat(m.alpha);
             let half = select(ggx_sample(m.alpha, wo, u), vec3f(0.0, 0.0, 1.0), is_delta);
             wi = half * (2.0 * dot(wo, half)) - wo;
-            weight = schlick(m.f0, m.f90, wo.z, m.eta) * m.gain * (1.0 / m.chances.y);
+            weight = schlick(m.f0, m.f90, wo.z) * (1.0 / m.chances.y);
             if wi.z <= 0.0 {
                 return nowhere();
             }
@@ -284,15 +322,20 @@ fn principled_sample(m: Mixture, wo: vec3f, u: vec2f, random: f32, lobes: u32) -
         if (rest >= 0.0) & (rest < m.chances.z) {
             is_delta = passes_straight(m);
             let half = select(ggx_sample(m.alpha, wo, u), vec3f(0.0, 0.0, 1.0), is_delta);
-            let cosine = dot(wo, half);
+            let cosine = max(dot(wo, half), 1e-6);
+            let reflected = glass_fresnel(m, cosine);
+            let chance = glass_chance(m, cosine);
+            let mirrors = rest < m.chances.z * chance;
             let mirrored = half * (2.0 * cosine) - wo;
             let behind = refracted_cosine(cosine, m.eta);
             let bent = refracted_direction(-wo, half, m.eta, cosine, behind);
-            wi = select(bent, vec3f(mirrored.x, mirrored.y, -mirrored.z), m.thin);
-            eta = m.eta;
-            let through = vec3f(1.0) - schlick(m.inner_f0, m.inner_f90, wo.z, m.eta);
-            weight = m.passed * through * (m.eta * m.eta / m.chances.z);
-            if wi.z >= 0.0 {
+            let through = select(bent, vec3f(mirrored.x, mirrored.y, -mirrored.z), m.thin);
+            wi = normalize(select(through, mirrored, mirrors));
+            eta = select(m.eta, 1.0, mirrors);
+            let passing = m.passed * (vec3f(1.0) - reflected) * (m.eta * m.eta);
+            let share = max(m.chances.z * select(1.0 - chance, chance, mirrors), 1e-30);
+            weight = select(passing, reflected * m.glass, mirrors) * (1.0 / share);
+            if wi.z * select(-1.0, 1.0, mirrors) <= 0.0 {
                 return nowhere();
             }
         }
@@ -305,7 +348,7 @@ fn principled_sample(m: Mixture, wo: vec3f, u: vec2f, random: f32, lobes: u32) -
             let o = to_frame_around(m.coat_normal, wo);
             let half = select(ggx_sample(alpha, o, u), vec3f(0.0, 0.0, 1.0), is_delta);
             wi = vector_around(m.coat_normal, half * (2.0 * dot(o, half)) - o);
-            let reflected = schlick(vec3f(COAT_F0), 1.0, o.z, 1.0) * (m.coat / m.chances.w);
+            let reflected = schlick(vec3f(COAT_F0), vec3f(1.0), o.z) * (m.coat / m.chances.w);
             weight = select(vec3f(0.0), reflected, wi.z > 0.0);
         }
         rest -= m.chances.w;

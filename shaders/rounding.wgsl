@@ -71,6 +71,10 @@ fn quotient3(a: vec3f, b: vec3f) -> vec3f {
     return vec3f(quotient2(a.xy, b.xy), quotient(a.z, b.z));
 }
 
+fn quotient4(a: vec4f, b: vec4f) -> vec4f {
+    return vec4f(quotient2(a.xy, b.xy), quotient2(a.zw, b.zw));
+}
+
 fn square_root(x: f32) -> f32 {
     let bits = bitcast<u32>(x);
     if (bits == 0u) | (bits == 0x80000000u) | (bits == INFINITE) {
@@ -96,4 +100,8 @@ fn square_root(x: f32) -> f32 {
         digits += 1;
     }
     return bitcast<f32>(rounded(exponent, u32(digits), rest != 0));
+}
+
+fn square_root4(x: vec4f) -> vec4f {
+    return vec4f(square_root(x.x), square_root(x.y), square_root(x.z), square_root(x.w));
 }

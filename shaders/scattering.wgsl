@@ -134,27 +134,16 @@ fn facets_of(surface: Surface, found: Material) -> Material {
         material.loss = facet_loss(facet_alpha(material), wo);
         if (MATERIALS & (1u << ROUGH_GLASS)) != 0u {
             if material.kind == ROUGH_GLASS {
-                material.loss = 1.0 / energy_kept(material.energy, facet_alpha(material), wo, surface.side) - 1.0;
+                material.loss = 1.0 / glass_kept(material, facet_alpha(material), wo, surface.side) - 1.0;
+            }
+        }
+        if ANISOTROPIC != 0u {
+            if (material.streaks != 0u) & (material.kind != ROUGH_GLASS) {
+                material.loss = 1.0 / streak_energy(material, facet_alpha(material), wo, 0u) - 1.0;
             }
         }
     }
     return material;
-}
-
-// What rough glass reflects and lets pass at once of light from everywhere: from its table (`src/pack/energy.rs`), between rows by
-// roughness and columns by the cosine.
-fn energy_kept(energy: u32, alpha: vec2f, wo: vec3f, side: f32) -> f32 {
-    let last = f32(ENERGY_SIZE - 1u);
-    let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
-    let row = min(sqrt(sqrt(square)), 1.0) * last;
-    let column = min(max(wo.z, 0.0), 1.0) * last;
-    let i = min(floor(row), last - 1.0);
-    let j = min(floor(column), last - 1.0);
-    let start = energy + select(ENERGY_SIZE * ENERGY_SIZE, 0u, side > 0.0) + u32(i) * ENERGY_SIZE + u32(j);
-    let finer = bitcast<vec2f>(vec2u(texel_word(start), texel_word(start + 1u)));
-    let rougher = bitcast<vec2f>(vec2u(texel_word(start + ENERGY_SIZE), texel_word(start + ENERGY_SIZE + 1u)));
-    let both = finer + (rougher - finer) * (row - i);
-    return both.x + (both.y - both.x) * (column - j);
 }
 
 // What facets do with light from wi, in their frame, and how densely they choose that.
@@ -211,7 +200,9 @@ fn mixture_at(surface: Surface, material: Material, coat_normal: vec3f) -> Mixtu
     if ((LOBES & LOBE_COAT) != 0u) & (NORMAL_MAPS == 1u) {
         coat = vector_to_lobe(Tangents(surface.du, surface.dv), surface.shading_normal, usable_normal(surface, coat_normal));
     }
-    return principled_mixture(material, local_wo(surface), surface.side > 0.0, coat, LOBES);
+    let wo = local_wo(surface);
+    let energy = principled_energy(material, wo, surface.side);
+    return principled_mixture(material, wo, surface.side > 0.0, coat, LOBES, energy);
 }
 
 // Whether light may come from wi, by what the surface is and what it is taken for: not where the two are at odds about the side.

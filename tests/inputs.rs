@@ -3,7 +3,7 @@
 //! one another, some are brought to halves, so that what is compared is often equal, and some are of all magnitudes.
 
 use bytemuck::Zeroable as _;
-use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3};
+use glam::{DMat3, DVec2, DVec3, UVec2, UVec4, Vec2, Vec3, Vec4};
 use naga::{Handle, Module, ScalarKind, Type};
 use wgray::cpu::differential::{Arrival, Derivative, Differential};
 use wgray::cpu::diffuse::Angles;
@@ -529,24 +529,33 @@ impl Situation {
         }
     }
 
-    /// About the target, or around the point that light is wanted at.
+    /// Children about the target, or around the point that light is wanted at.
     fn light_node(&self, random: &Random) -> LightNode {
-        let radius = self.direction.length() * random.pick(&[0.0, 0.01, 0.5, 1.0, 2.0]);
+        let children = [(); 4].map(|()| {
+            let center = self.target + vector(random) * random.pick(&[0.0, 0.0, self.direction.length()]);
+            let axis = random.pick(&[vector(random).normalize(), -self.direction.normalize_or(DVec3::X)]);
+            let radius = self.direction.length() * random.pick(&[0.0, 0.01, 0.5, 1.0, 2.0]);
+            (center.as_vec3(), axis.as_vec3(), radius as f32)
+        });
+        let each = |number: &dyn Fn(&(Vec3, Vec3, f32)) -> f32| Vec4::from_array(children.each_ref().map(number));
+        let below = |n: u32| UVec4::from_array([(); 4].map(|()| random.below(n)));
         LightNode {
-            center: self.target.as_vec3(),
-            radius: radius as f32,
-            axis: random
-                .pick(&[vector(random).normalize(), -self.direction.normalize_or(DVec3::X)])
-                .as_vec3(),
-            cosine: random.pick(&[1.0, -1.0, random.between(-1.0, 1.0)]) as f32,
-            intensity: random.magnitude(-9.0, 0.0) as f32,
-            edge: random.pick(&[0.0, random.unit()]) as f32,
-            sides: 1 + random.below(2),
-            parent: random.pick(&[NOTHING, 0]),
-            children: random.pick(&[NOTHING, 1]),
-            density: random.magnitude(-9.0, 9.0) as f32,
-            instance: random.below(2),
-            index: random.below(4),
+            x: each(&|(center, ..)| center.x),
+            y: each(&|(center, ..)| center.y),
+            z: each(&|(center, ..)| center.z),
+            radius: each(&|(.., radius)| *radius),
+            axis_x: each(&|(_, axis, _)| axis.x),
+            axis_y: each(&|(_, axis, _)| axis.y),
+            axis_z: each(&|(_, axis, _)| axis.z),
+            cosine: each(&|_| random.pick(&[1.0, -1.0, random.between(-1.0, 1.0)]) as f32),
+            intensity: each(&|_| random.pick(&[random.magnitude(-9.0, 0.0), 0.0]) as f32),
+            edge: each(&|_| random.pick(&[0.0, random.unit()]) as f32),
+            sides: below(2) + 1,
+            parent: UVec4::new(random.pick(&[NOTHING, 0]), 0, 0, 0),
+            children: UVec4::splat(random.pick(&[NOTHING, 1])),
+            density: each(&|_| random.magnitude(-9.0, 9.0) as f32),
+            instance: below(2),
+            index: below(4),
         }
     }
 
@@ -763,7 +772,17 @@ fn mixture(random: &Random) -> Mixture {
     let wo = vector(random).normalize().as_vec3();
     let normal = random.pick(&[DVec3::Z, vector(random).normalize()]).as_vec3();
     let outside = random.once_in(2);
-    principled_mixture(&material, wo.with_z(wo.z.abs()), outside, normal, random.below(32))
+    // Tables know shares from 0 to 1.
+    let share = || random.pick(&[0.0, 1e-4, 0.3, 0.7, 1.0]) as f32;
+    let energy = Vec3::new(share(), share(), share());
+    principled_mixture(
+        &material,
+        wo.with_z(wo.z.abs()),
+        outside,
+        normal,
+        random.below(32),
+        energy,
+    )
 }
 
 /// Whole numbers are small where they count something.

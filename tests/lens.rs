@@ -274,8 +274,18 @@ fn bad_lenses_are_told() {
             "focus_distance = 0",
             "camera.focus_distance: 0 must be finite and greater than 0, from 1e-9 to 1e9",
         ),
-        ("blades = 2", "camera.blades: 2 must be 0, or from 3 to 16"),
-        ("blades = 17", "camera.blades: 17 must be 0, or from 3 to 16"),
+        (
+            "blades = 2",
+            "camera.blades: 2 must be 0 or a whole number from 3 to 16",
+        ),
+        (
+            "blades = -1",
+            "camera.blades: -1 must be 0 or a whole number from 3 to 16",
+        ),
+        (
+            "blades = 17",
+            "camera.blades: 17 must be 0 or a whole number from 3 to 16",
+        ),
         (
             "blade_rotation = 361",
             "camera.blade_rotation: 361 must be from -360 to 360",

@@ -31,6 +31,7 @@ mod panorama;
 mod path;
 mod patterns;
 mod pictures;
+mod place;
 mod probes;
 mod radiance;
 mod random;

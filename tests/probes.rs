@@ -27,13 +27,13 @@ use wgray::cpu::light::{Segments, segment, segments_to_light, segments_to_local,
 use wgray::cpu::light_sample::{
     ellipsoid_area, ellipsoid_cap, ellipsoid_pdf, ellipsoid_sample, power_heuristic, solid_angle_pdf, whole_below,
 };
-use wgray::cpu::light_tree::{first_share, light_importance, light_sibling};
+use wgray::cpu::light_tree::{light_child, light_importances, light_shares, mean_above};
 use wgray::cpu::lobe::{
     LobeSample, facet_alpha, facet_eval, facet_loss, facet_pdf, facet_weight, half_vector, is_polished, lobe_frame,
-    plain_alpha, vector_from_lobe, vector_to_lobe,
+    plain_alpha, streak_place, vector_from_lobe, vector_to_lobe,
 };
 use wgray::cpu::math::{
-    atan2, cross, dot, exp2, floor, log2, max, min, normalize, positive_zero, power, power_whole, sine,
+    atan2, cross, dot, exp2, floor, log2, max, max4, min, normalize, positive_zero, power, power_whole, sine,
 };
 use wgray::cpu::mesh::{
     Crossing, Shear, Spot, face_arrival, face_bulge, face_first_hit, face_footprint, face_frame, face_lets_pass,
@@ -62,9 +62,10 @@ use wgray::cpu::primitive::{
     primitive_uv, uv_derivative,
 };
 use wgray::cpu::principled::{
-    Mixture, coat_eval, facets_eval, half_between, is_flat, luminance, mirrored_pdf, passed_eval, passes_straight,
-    principled_eval, principled_mixture, principled_pdf, principled_sample, refracting_density, refracting_half,
-    schlick, sheen_albedo, sheen_chance, sheen_lobe, to_frame_around,
+    Mixture, bounded_color, coat_eval, facets_eval, glass_chance, glass_eval, glass_fresnel, glass_pdf, half_between,
+    is_flat, luminance, mirrored_pdf, passes_straight, principled_eval, principled_mixture, principled_pdf,
+    principled_sample, refracting_density, refracting_half, schlick, sheen_albedo, sheen_chance, sheen_lobe,
+    to_frame_around,
 };
 use wgray::cpu::procedural::{
     along_edge, around_footprint, far_product, nearest_step, phase, procedural_share, sine_ratio, wave_integral,
@@ -212,9 +213,11 @@ probes! {
     first_hit(q: &Primitive, ray: Ray, t: f32) -> FirstHit;
     segments_to_light(light: &Light, p: Vec3) -> Segments;
     spot_falloff(light: &Light, to: Vec3) -> f32;
-    light_importance(node: &LightNode, p: Vec3, n: Vec3) -> f32;
-    first_share(first: f32, second: f32) -> f32;
-    light_sibling(i: u32) -> u32;
+    max4(a: Vec4, b: Vec4) -> Vec4;
+    mean_above(m: Vec4, r: Vec4) -> Vec4;
+    light_importances(node: &LightNode, p: Vec3, n: Vec3) -> Vec4;
+    light_shares(importances: Vec4) -> Vec4;
+    light_child(shares: Vec4, random: f32) -> u32;
     segments_to_local(q: &Primitive, to: Segments) -> Segments;
     segment(to: Segments, at: Vec2) -> Vec3;
     shadow_bits(kind: u32, q: &Primitive, p: Vec3, wall: bool, light: &Light, block: Block) -> u32;
@@ -274,10 +277,15 @@ probes! {
     eta_of(surface: &Surface, material: &Material) -> f32;
     refracts_inwards(surface: &Surface, material: &Material, normal: Vec3) -> bool;
     dielectric_sample(path: Path, surface: Surface, at: Arrival, material: &Material, random: f32) -> Passage;
-    principled_mixture(material: &Material, wo: Vec3, outside: bool, coat_normal: Vec3, lobes: u32) -> Mixture;
+    principled_mixture(
+        material: &Material, wo: Vec3, outside: bool, coat_normal: Vec3, lobes: u32, energy: Vec3,
+    ) -> Mixture;
+    bounded_color(color: Vec3) -> Vec3;
+    glass_fresnel(m: &Mixture, cosine: f32) -> Vec3;
+    glass_chance(m: &Mixture, cosine: f32) -> f32;
     luminance(color: Vec3) -> f32;
     sheen_chance(m: &Mixture) -> f32;
-    schlick(f0: Vec3, f90: f32, cosine: f32, eta: f32) -> Vec3;
+    schlick(f0: Vec3, f90: Vec3, cosine: f32) -> Vec3;
     passes_straight(m: &Mixture) -> bool;
     is_flat(alpha: Vec2) -> bool;
     facets_eval(alpha: Vec2, wo: Vec3, wi: Vec3, half: Vec3) -> f32;
@@ -285,7 +293,8 @@ probes! {
     refracting_half(wo: Vec3, wi: Vec3, eta: f32) -> Vec3;
     refracting_density(wo: Vec3, wi: Vec3, half: Vec3, eta: f32) -> f32;
     principled_eval(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> Vec3;
-    passed_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> Vec3;
+    glass_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> Vec3;
+    glass_pdf(m: &Mixture, wo: Vec3, wi: Vec3) -> f32;
     coat_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> f32;
     to_frame_around(n: Vec3, v: Vec3) -> Vec3;
     principled_pdf(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> f32;
@@ -312,6 +321,7 @@ probes! {
     facet_eval(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32;
     facet_pdf(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32;
     facet_weight(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32;
+    streak_place(alpha: Vec2, w: Vec3) -> Vec2;
     facet_loss(alpha: Vec2, wo: Vec3) -> f32;
     conductor_fresnel(eta: f32, k: f32, cosine: f32) -> f32;
     metal_fresnel(material: &Material, cosine: f32) -> Vec3;

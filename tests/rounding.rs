@@ -48,7 +48,11 @@ fn poor_device() -> String {
     "fn quotient(a: f32, b: f32) -> f32 { return nudged(a / b); }
     fn quotient2(a: vec2f, b: vec2f) -> vec2f { return vec2f(quotient(a.x, b.x), quotient(a.y, b.y)); }
     fn quotient3(a: vec3f, b: vec3f) -> vec3f { return vec3f(quotient2(a.xy, b.xy), quotient(a.z, b.z)); }
+    fn quotient4(a: vec4f, b: vec4f) -> vec4f { return vec4f(quotient2(a.xy, b.xy), quotient2(a.zw, b.zw)); }
     fn square_root(x: f32) -> f32 { return nudged(sqrt(x)); }
+    fn square_root4(x: vec4f) -> vec4f {
+        return vec4f(square_root(x.x), square_root(x.y), square_root(x.z), square_root(x.w));
+    }
     "
     .to_string()
         + NUDGED

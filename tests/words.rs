@@ -114,8 +114,8 @@ records! {
     Angles { wi, wo, between }
     LobeSample { wi, weight, pdf, eta }
     Mixture {
-        diffuse, alpha, f0, f90, gain, passed, inner_f0, inner_f90, eta, thin, coat, coat_alpha, coat_normal, sheen,
-        sheen_alpha, chances,
+        diffuse, alpha, f0, f90, glass, passed, glass_f0, glass_f90, head_on, ratio, eta, thin, coat, coat_alpha,
+        coat_normal, sheen, sheen_alpha, chances,
     }
     PhongFactors { diffuse, specular, diffuse_share }
     Segments { towards, u, v }

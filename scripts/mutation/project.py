@@ -34,6 +34,7 @@ ANSWERS = [
     ["main", "textures::", "against_oracle::", "radiance::", "culling::", "--skip", "is_found", "--skip", "textures::agreement"],
     ["main", "bounds::", "analytic::", "statistics::", "robust::", "--skip", "is_found"],
     ["main", "sampling::", "--skip", "is_found"],
+    ["main", "path::", "lens::", "panorama::", "--skip", "is_found"],
     ["main", "meshes::", "--skip", "is_found", "--skip", "meshes::bad_input", "--skip", "meshes::readers"],
 ]
 # What else there is, of the command line and of how work is cut.

@@ -16,7 +16,7 @@ struct PathState {
     described: bool,       // whether they have the albedo
     start: vec3f,          // where the path was last scattered, if a tree chooses lights
     start_normal: vec3f,   // the normal there, or 0 where light may come from both sides
-    way: f32,              // from the last bounce to the ray's start, past surfaces that are not there
+    way: f32,              // from the last bounce to the ray's start, past surfaces that are not there, or that the camera does not see
     passed: u32,           // how many of these there were
 }
 
@@ -24,11 +24,13 @@ struct PathState {
 fn begin_path(pixel: vec2u, sample: u32) -> PathState {
     let start = camera_sample(pixel, sample);
     var path = Path(start.ray, start.differential, vec3f(1.0), 0u, 0u, NOWHERE, NOWHERE);
+    var way = 0.0;
     if HIDDEN != 0u {
         path = seen_path(path);
+        way = dot(path.ray.origin - start.ray.origin, path.ray.direction);
     }
     return PathState(path, vec3f(0.0), 0.0, 1.0, vec3f(0.0), sample, start.weight, false, Layers(), false,
-                     vec3f(0.0), vec3f(0.0), 0.0, 0u);
+                     vec3f(0.0), vec3f(0.0), way, 0u);
 }
 
 // The path after one more surface. What comes of a path that ends here is computed and not taken, where that is short: software
@@ -57,16 +59,16 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     let at = arrival_of(spot, hit, surface, path.ray, path.differential);
     let look = appearance(spot, hit, material_of(spot), surface, at, LOOKUPS);
     var material = bounded(look.material);
-    if ABSORPTION != 0u {
-        // What may not be there says nothing of what is behind it.
-        let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
-        let absorption = select(state.absorption, material.absorption, inside);
-        state.path.throughput *= transmittance(absorption, hit.t);
-    }
     if SEES_THROUGH != 0u {
         if met & !is_there(material, pixel, state.sample, path.depth, ONWARD, hit, surface.side) {
             return past(state, surface, at, hit.t);
         }
+    }
+    if ABSORPTION != 0u {
+        // What may not be there says nothing of what is behind it. What is there tells of the whole way to it.
+        let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
+        let absorption = select(state.absorption, material.absorption, inside);
+        state.path.throughput *= transmittance(absorption, hit.t + state.way);
     }
     if SHINES != 0u {
         state = with_emission(state, spot, hit, surface, material, met);
@@ -209,7 +211,9 @@ fn past(before: PathState, surface: Surface, at: Arrival, t: f32) -> PathState {
     state.path = passed_path(before.path, surface, at);
     if HIDDEN != 0u {
         if before.path.depth == 0u {
+            let start = state.path.ray;
             state.path = seen_path(state.path);
+            state.way += dot(state.path.ray.origin - start.origin, start.direction);
         }
     }
     state.way += t;

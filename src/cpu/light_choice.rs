@@ -3,7 +3,7 @@
 use glam::{UVec2, UVec4, Vec3};
 
 use super::integrators::path::decision_set;
-use super::light_tree::{first_share, light_importance, light_sibling};
+use super::light_tree::{light_child, light_importances, light_shares};
 use super::ray::Hit;
 use super::rng::{hash4, unit_float};
 use crate::pack::{Emitter, NOTHING, Packed};
@@ -19,32 +19,27 @@ pub fn chosen_light(scene: &Packed, emitter: Emitter, p: Vec3, n: Vec3, key: UVe
     if emitter.index != NOTHING {
         return chosen;
     }
-    let nodes = &scene.light_nodes;
-    let mut node = &nodes[0];
     let mut probability = 1.0;
+    let mut at = 0;
+    let mut node = &scene.light_nodes[0];
+    let mut child = 0;
     let mut level = 0;
     let mut bits = UVec2::ZERO;
-    while node.children != NOTHING {
-        let first = &nodes[node.children as usize];
-        let second = &nodes[node.children as usize + 1];
-        let share = first_share(light_importance(first, p, n), light_importance(second, p, n));
+    while at != NOTHING {
+        node = &scene.light_nodes[at as usize];
+        let shares = light_shares(light_importances(node, p, n));
         if level & 1 == 0 {
             let level_key = hash4(UVec4::new(key.x, key.y, level, 1));
             bits = decision_set(scene, UVec2::new(level_key.x, level_key.y), sample);
         }
-        let random = unit_float(if level & 1 == 1 { bits.y } else { bits.x });
-        if random < share {
-            node = first;
-            probability *= share;
-        } else {
-            node = second;
-            probability *= 1.0 - share;
-        }
+        child = light_child(shares, unit_float(if level & 1 == 1 { bits.y } else { bits.x })) as usize;
+        probability *= shares.as_ref()[child];
+        at = node.children.as_ref()[child];
         level += 1;
     }
-    chosen.emitter.instance = node.instance;
-    chosen.emitter.index = node.index;
-    chosen.density = node.density * probability;
+    chosen.emitter.instance = node.instance[child];
+    chosen.emitter.index = node.index[child];
+    chosen.density = node.density[child] * probability;
     chosen
 }
 
@@ -57,20 +52,11 @@ pub fn met_density(scene: &Packed, hit: Hit, wanted: bool, p: Vec3, n: Vec3) -> 
         return 0.0;
     }
     let nodes = &scene.light_nodes;
-    let mut node = &nodes[at as usize];
-    let mut density = node.density;
-    while node.parent != NOTHING {
-        let own = light_importance(node, p, n);
-        let other = light_importance(&nodes[light_sibling(at) as usize], p, n);
-        let is_first = at & 1 == 1;
-        let share = if is_first {
-            first_share(own, other)
-        } else {
-            first_share(other, own)
-        };
-        density *= if is_first { share } else { 1.0 - share };
-        at = node.parent;
-        node = &nodes[at as usize];
+    let mut density = nodes[at as usize / 4].density[at as usize % 4];
+    while at != NOTHING {
+        let node = &nodes[at as usize / 4];
+        density *= light_shares(light_importances(node, p, n))[at as usize % 4];
+        at = node.parent.x;
     }
     density
 }

@@ -1,43 +1,64 @@
 //! Twin of `shaders/light_tree.wgsl`: the tree over what shines.
 
-use glam::Vec3;
+use glam::{BVec4A, Vec3, Vec4};
 
-use super::math::{dot, max, min};
+use super::math::{dot, max4};
 use crate::pack::LightNode;
 
 #[inline(always)]
-pub fn light_importance(node: &LightNode, p: Vec3, n: Vec3) -> f32 {
-    let to = node.center - p;
-    let d2 = dot(to, to);
+pub fn mean_above(m: Vec4, r: Vec4) -> Vec4 {
+    Vec4::select(m.abs().cmplt(r), 0.25 * (m + r) * ((m + r) / r), max4(m, Vec4::ZERO))
+}
+
+#[inline(always)]
+pub fn light_importances(node: &LightNode, p: Vec3, n: Vec3) -> Vec4 {
+    let x = node.x - p.x;
+    let y = node.y - p.y;
+    let z = node.z - p.z;
+    let d2 = x * x + y * y + z * z;
     let d = d2.sqrt();
-    let along = -dot(node.axis, to);
-    let ahead = if node.sides == 2 { along.abs() } else { along };
-    let sine = max(1.0 - node.cosine * node.cosine, 0.0).sqrt();
-    let turned = ahead * node.cosine + max(d2 - along * along, 0.0).sqrt() * sine;
-    let leaving = if ahead >= node.cosine * d { d } else { turned };
-    let facing = if dot(n, n) == 0.0 { d } else { dot(n, to) };
-    let outer = d + node.radius;
-    let cosines = max((leaving + node.radius) / outer, 1e-3) * max((facing + node.radius) / outer, 1e-3);
-    let value = node.intensity * cosines / max(d2 + 0.5 * node.radius * node.radius, 1e-30);
-    let leaves = leaving + 1.5707964 * node.radius > (node.edge - 1e-3) * d;
-    if leaves & (facing + node.radius > -1e-3 * d) {
-        max(value, 1e-36)
+    let along = -(node.axis_x * x + node.axis_y * y + node.axis_z * z);
+    let is_two_sided = BVec4A::from(node.sides.to_array().map(|sides| sides == 2));
+    let ahead = Vec4::select(is_two_sided, along.abs(), along);
+    let sine = max4(1.0 - node.cosine * node.cosine, Vec4::ZERO).sqrt();
+    let turned = ahead * node.cosine + max4(d2 - along * along, Vec4::ZERO).sqrt() * sine;
+    let leaving = Vec4::select(ahead.cmpge(node.cosine * d), d, turned);
+    let facing = if dot(n, n) == 0.0 {
+        d
     } else {
-        0.0
-    }
+        x * n.x + y * n.y + z * n.z
+    };
+    let least = 0.03 * node.radius;
+    let leaves_by = max4(mean_above(leaving, node.radius), least);
+    let faces_by = max4(mean_above(facing, node.radius), least);
+    let inverse = 1.0 / max4((d2 + 0.1 * node.radius * node.radius).sqrt(), Vec4::splat(1e-15));
+    let value = node.intensity * (leaves_by * inverse) * (faces_by * inverse) * (inverse * inverse);
+    let leaves = (leaving + 1.5707964 * node.radius).cmpgt((node.edge - 1e-3) * d);
+    let arrives = leaves & (facing + node.radius).cmpgt(-1e-3 * d) & node.intensity.cmpgt(Vec4::ZERO);
+    Vec4::select(arrives, max4(value, Vec4::splat(1e-36)), Vec4::ZERO)
 }
 
-pub fn first_share(first: f32, second: f32) -> f32 {
-    let sum = first + second;
+#[inline(always)]
+pub fn light_shares(importances: Vec4) -> Vec4 {
+    let sum = (importances.x + importances.y) + (importances.z + importances.w);
     if sum == 0.0 {
-        return 0.5;
+        return Vec4::X;
     }
-    if (first > 0.0) & (second > 0.0) {
-        return min(max(first / sum, 0.00024414063), 0.99975586);
-    }
-    if first == 0.0 { 0.0 } else { 1.0 }
+    let wanted = importances.cmpgt(Vec4::ZERO);
+    let least = Vec4::select(wanted, max4(importances, Vec4::splat(sum * 0.00024414063)), Vec4::ZERO);
+    least / ((least.x + least.y) + (least.z + least.w))
 }
 
-pub fn light_sibling(i: u32) -> u32 {
-    ((i - 1) ^ 1) + 1
+#[inline(always)]
+pub fn light_child(shares: Vec4, random: f32) -> u32 {
+    let second = shares.x + shares.y;
+    let third = second + shares.z;
+    let child = u32::from(random >= shares.x) + u32::from(random >= second) + u32::from(random >= third);
+    let last = match shares {
+        _ if shares.w > 0.0 => 3,
+        _ if shares.z > 0.0 => 2,
+        _ if shares.y > 0.0 => 1,
+        _ => 0,
+    };
+    child.min(last)
 }

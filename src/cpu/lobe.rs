@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::ggx::{ggx_albedo_along, ggx_d, ggx_length};
-use super::math::{cross, dot, max, normalize, sine};
+use super::math::{cross, dot, max, min, normalize, sine};
 use super::primitive::Tangents;
 use super::surface::Surface;
 use super::warp::frame_around;
@@ -81,6 +81,17 @@ pub fn facet_pdf(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
 pub fn facet_weight(alpha: Vec2, wo: Vec3, wi: Vec3) -> f32 {
     let length = ggx_length(alpha, wo);
     wi.z * (wo.z + length) / max(wo.z * ggx_length(alpha, wi) + wi.z * length, 1e-30)
+}
+
+pub fn streak_place(alpha: Vec2, w: Vec3) -> Vec2 {
+    let x = alpha.x * w.x;
+    let y = alpha.y * w.y;
+    let square = (x * x + y * y) / max(w.x * w.x + w.y * w.y, 1e-30);
+    let seen = max(square.sqrt(), alpha.y);
+    let line = min((seen - alpha.y) / max(alpha.x - alpha.y, 1e-6), 1.0).sqrt();
+    let half_way = 0.5 * seen.sqrt();
+    let cosine = min(max(w.z, 0.0), 1.0);
+    Vec2::new(line, 0.5 * (cosine + cosine * (1.0 + half_way) / (cosine + half_way)))
 }
 
 pub fn facet_loss(alpha: Vec2, wo: Vec3) -> f32 {

@@ -2,7 +2,7 @@
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 pub fn dot(a: Vec3, b: Vec3) -> f32 {
     a.x * b.x + a.y * b.y + a.z * b.z
@@ -18,6 +18,11 @@ pub fn normalize(v: Vec3) -> Vec3 {
 
 pub fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
+}
+
+#[inline(always)]
+pub fn max4(a: Vec4, b: Vec4) -> Vec4 {
+    Vec4::select(a.cmpgt(b), a, b)
 }
 
 pub fn min(a: f32, b: f32) -> f32 {

@@ -13,6 +13,7 @@ pub mod diffuse;
 pub mod disk;
 pub mod ellipsoid;
 pub mod emitter;
+pub mod energy;
 pub mod environment;
 pub mod filter;
 pub mod footprint;

@@ -1,11 +1,11 @@
 //! Twin of `shaders/principled.wgsl`: the material `principled`.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec3Swizzles as _, Vec4};
 
-use super::ggx::{ggx_albedo, ggx_albedo_along, ggx_d, ggx_g2, ggx_pdf, ggx_sample};
+use super::ggx::{ggx_albedo, ggx_d, ggx_g1, ggx_g2, ggx_pdf, ggx_sample};
 use super::lobe::LobeSample;
-use super::math::{dot, exp2, max, min, power};
-use super::specular::{refracted_cosine, refracted_direction};
+use super::math::{dot, exp2, max, min, normalize, power};
+use super::specular::{fresnel, refracted_cosine, refracted_direction};
 use super::surface::largest;
 use super::warp::{disk_sample, frame_around, vector_around};
 use crate::pack::{
@@ -18,11 +18,13 @@ pub struct Mixture {
     pub diffuse: Vec3,
     pub alpha: Vec2,
     pub f0: Vec3,
-    pub f90: f32,
-    pub gain: Vec3,
+    pub f90: Vec3,
+    pub glass: f32,
     pub passed: Vec3,
-    pub inner_f0: Vec3,
-    pub inner_f90: f32,
+    pub glass_f0: Vec3,
+    pub glass_f90: f32,
+    pub head_on: f32,
+    pub ratio: f32,
     pub eta: f32,
     pub thin: bool,
     pub coat: f32,
@@ -33,7 +35,14 @@ pub struct Mixture {
     pub chances: Vec4,
 }
 
-pub fn principled_mixture(material: &Material, wo: Vec3, outside: bool, coat_normal: Vec3, lobes: u32) -> Mixture {
+pub fn principled_mixture(
+    material: &Material,
+    wo: Vec3,
+    outside: bool,
+    coat_normal: Vec3,
+    lobes: u32,
+    energy: Vec3,
+) -> Mixture {
     let mut m = Mixture::default();
     let rough = max(material.roughness * material.roughness, SMALLEST_ALPHA);
     m.alpha = Vec2::new(rough, rough);
@@ -78,51 +87,61 @@ pub fn principled_mixture(material: &Material, wo: Vec3, outside: bool, coat_nor
     }
     let base = material.diffuse;
     let dielectric = 1.0 - material.metallic;
+    let ground = dielectric * (1.0 - material.transmission);
+    let ratio = (material.ior - 1.0) / (material.ior + 1.0);
     let mut reflected = Vec3::ZERO;
     let mut inner = Vec3::ZERO;
-    if lobes & LOBE_SPECULAR != 0 {
-        let ratio = (material.ior - 1.0) / (material.ior + 1.0);
-        let f0 = material.specular * (ratio * ratio);
-        m.inner_f0 = Vec3::new(min(f0.x, 1.0), min(f0.y, 1.0), min(f0.z, 1.0)) * material.specular_weight;
-        m.inner_f90 = material.specular_weight;
-        m.f0 = m.inner_f0 * dielectric + base * material.metallic;
-        m.f90 = m.inner_f90 * dielectric + material.metallic;
-        let cosine = if m.eta > 1.0 {
-            refracted_cosine(wo.z, m.eta)
-        } else {
-            wo.z
-        };
-        let mut share = ggx_albedo(m.alpha.y, cosine);
-        if lobes & LOBE_ANISOTROPY != 0 {
-            let along = if m.eta <= 1.0 {
-                ggx_albedo_along(m.alpha, wo)
-            } else {
-                share
-            };
-            let other = ggx_albedo(m.alpha.x, cosine);
-            share = Vec2::new(max(max(share.x, other.x), along.x), max(max(share.y, other.y), along.y));
+    let mut share = Vec2::ZERO;
+    let mut lost = 0.0;
+    if lobes & (LOBE_SPECULAR | LOBE_TRANSMISSION) != 0 {
+        share = ggx_albedo(m.alpha.y, wo.z);
+        let mut certain = 1.005;
+        if lobes & LOBE_ANISOTROPY != 0 && material.streaks != 0 {
+            share = energy.xy();
+            certain = 1.0;
         }
-        let whole = max(share.x + share.y, 1e-3);
-        let known = if lobes & LOBE_ANISOTROPY != 0 {
-            1.0 - material.anisotropy * material.anisotropy
-        } else {
-            1.0
-        };
-        let lost = max(1.0 / whole - 1.005, 0.0) * known;
-        let gain = Vec3::ONE + m.f0 * lost;
-        m.gain = gain * left;
-        reflected = (m.f0 * share.x + Vec3::splat(m.f90 * share.y)) * gain;
-        inner = m.inner_f0 * share.x + Vec3::splat(m.inner_f90 * share.y);
-        inner *= Vec3::ONE + m.inner_f0 * lost;
+        lost = max(1.0 / max(share.x + share.y, 1e-3) - certain, 0.0);
+        let inner_f0 = bounded_color(material.specular * (ratio * ratio)) * material.specular_weight;
+        let inner_f90 = material.specular_weight * min(50.0 * (ratio * ratio), 1.0);
+        let inner_gain = Vec3::ONE + inner_f0 * lost;
+        let metal_gain = (Vec3::ONE + base * lost) * (material.metallic * left);
+        m.f0 = inner_f0 * inner_gain * (ground * left) + base * metal_gain;
+        m.f90 = inner_gain * (inner_f90 * (ground * left)) + metal_gain;
+        reflected = m.f0 * share.x + m.f90 * share.y;
+        inner = (inner_f0 * share.x + Vec3::splat(inner_f90 * share.y)) * inner_gain;
     }
-    let ground = dielectric * (1.0 - material.transmission);
     m.diffuse = base * (ground * left * max(1.0 - largest(inner), 0.0));
-    let mut passing = 0.0;
+    let mut clear = 0.0;
     if lobes & LOBE_TRANSMISSION != 0 {
-        m.passed = base * (dielectric * material.transmission * left);
-        passing = luminance(m.passed) * max(1.0 - largest(inner), 0.0);
+        let head_on = ratio * ratio;
+        m.head_on = if m.thin {
+            2.0 * head_on / (1.0 + head_on)
+        } else {
+            head_on
+        };
+        m.glass_f0 = bounded_color(material.specular * m.head_on) * material.specular_weight;
+        m.glass_f90 = material.specular_weight;
+        m.ratio = if outside | m.thin {
+            1.0 / material.ior
+        } else {
+            material.ior
+        };
+        let kept = max(energy.z, 1e-3);
+        let gain = match (passes_straight(&m), m.thin) {
+            (true, _) => 1.0,
+            (_, true) => 1.0 + lost,
+            (_, false) => 1.0 / kept,
+        };
+        let glass = dielectric * material.transmission * left;
+        m.glass = glass * gain;
+        m.passed = base * m.glass;
+        let mirrored = min(
+            luminance(m.glass_f0 * share.x + Vec3::splat(m.glass_f90 * share.y)),
+            1.0,
+        );
+        clear = glass * (luminance(base) * (1.0 - mirrored) + mirrored);
     }
-    let weights = Vec4::new(luminance(m.diffuse), luminance(reflected) * left, passing, coat_share);
+    let weights = Vec4::new(luminance(m.diffuse), luminance(reflected), clear, coat_share);
     let sum = weights.x + weights.y + weights.z + weights.w + sheen_share;
     m.chances = if sum > 1e-30 {
         weights * (1.0 / max(sum, 1e-30))
@@ -130,6 +149,10 @@ pub fn principled_mixture(material: &Material, wo: Vec3, outside: bool, coat_nor
         Vec4::X
     };
     m
+}
+
+pub fn bounded_color(color: Vec3) -> Vec3 {
+    Vec3::new(min(color.x, 1.0), min(color.y, 1.0), min(color.z, 1.0))
 }
 
 pub fn luminance(color: Vec3) -> f32 {
@@ -140,12 +163,28 @@ pub fn sheen_chance(m: &Mixture) -> f32 {
     max(1.0 - (m.chances.x + m.chances.y + m.chances.z + m.chances.w), 0.0)
 }
 
-pub fn schlick(f0: Vec3, f90: f32, cosine: f32, eta: f32) -> Vec3 {
-    let behind = refracted_cosine(cosine, eta);
-    let x = 1.0 - min(if eta > 1.0 { behind } else { cosine }, 1.0);
+pub fn schlick(f0: Vec3, f90: Vec3, cosine: f32) -> Vec3 {
+    let x = 1.0 - min(cosine, 1.0);
     let x2 = x * x;
-    let f = f0 + (Vec3::splat(f90) - f0) * (x2 * x2 * x);
-    if (eta > 1.0) & (behind == 0.0) { Vec3::ONE } else { f }
+    f0 + (f90 - f0) * (x2 * x2 * x)
+}
+
+pub fn glass_fresnel(m: &Mixture, cosine: f32) -> Vec3 {
+    let c = min(max(cosine, 1e-6), 1.0);
+    let behind = refracted_cosine(c, m.ratio);
+    let once = fresnel(c, behind, m.ratio);
+    let exact = if m.thin { 2.0 * once / (1.0 + once) } else { once };
+    let x = (exact - m.head_on) / max(1.0 - m.head_on, 1e-6);
+    let f = m.glass_f0 + (Vec3::splat(m.glass_f90) - m.glass_f0) * x;
+    if behind == 0.0 {
+        Vec3::ONE
+    } else {
+        bounded_color(Vec3::new(max(f.x, 0.0), max(f.y, 0.0), max(f.z, 0.0)))
+    }
+}
+
+pub fn glass_chance(m: &Mixture, cosine: f32) -> f32 {
+    min(luminance(glass_fresnel(m, cosine)), 1.0)
 }
 
 pub fn passes_straight(m: &Mixture) -> bool {
@@ -183,10 +222,10 @@ pub fn principled_eval(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> Vec3 {
     let mut value = m.diffuse * (max(wi.z, 0.0) * std::f32::consts::FRAC_1_PI);
     if (lobes & LOBE_SPECULAR != 0) && (wi.z > 0.0) & !is_flat(m.alpha) {
         let half = half_between(wo, wi);
-        value += schlick(m.f0, m.f90, max(dot(wo, half), 0.0), m.eta) * m.gain * facets_eval(m.alpha, wo, wi, half);
+        value += schlick(m.f0, m.f90, max(dot(wo, half), 0.0)) * facets_eval(m.alpha, wo, wi, half);
     }
-    if (lobes & LOBE_TRANSMISSION != 0) && (wi.z < 0.0) & !passes_straight(m) {
-        value += passed_eval(m, wo, wi);
+    if lobes & LOBE_TRANSMISSION != 0 && !passes_straight(m) {
+        value += glass_eval(m, wo, wi);
     }
     if (lobes & LOBE_COAT != 0) && (wi.z > 0.0) & (m.coat > 0.0) {
         value += Vec3::splat(coat_eval(m, wo, wi));
@@ -197,18 +236,36 @@ pub fn principled_eval(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> Vec3 {
     value
 }
 
-pub fn passed_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> Vec3 {
-    if m.thin {
-        let mirrored = Vec3::new(wi.x, wi.y, -wi.z);
-        let half = half_between(wo, mirrored);
-        let reflected = schlick(m.inner_f0, m.inner_f90, max(dot(wo, half), 0.0), 1.0);
-        return m.passed * (Vec3::ONE - reflected) * facets_eval(m.alpha, wo, mirrored, half);
+pub fn glass_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> Vec3 {
+    let above = wi.z > 0.0;
+    if above | m.thin {
+        let up = Vec3::new(wi.x, wi.y, wi.z.abs());
+        let half = half_between(wo, up);
+        let reflected = glass_fresnel(m, dot(wo, half));
+        let factor = if above {
+            reflected * m.glass
+        } else {
+            m.passed * (Vec3::ONE - reflected)
+        };
+        return factor * facets_eval(m.alpha, wo, up, half);
     }
     let half = refracting_half(wo, wi, m.eta);
-    let o = max(dot(wo, half), 0.0);
-    let reflected = schlick(m.inner_f0, m.inner_f90, o, m.eta);
-    let facets = ggx_d(m.alpha, half) * ggx_g2(m.alpha, wo, Vec3::new(wi.x, wi.y, -wi.z)) * o / max(wo.z, 1e-6);
-    m.passed * (Vec3::ONE - reflected) * (facets * refracting_density(wo, wi, half, m.eta) * (m.eta * m.eta))
+    let reflected = glass_fresnel(m, dot(wo, half));
+    let seen = ggx_pdf(m.alpha, wo, half) * ggx_g1(m.alpha, wi);
+    let density = seen * refracting_density(wo, wi, half, m.eta) * (m.eta * m.eta);
+    m.passed * (Vec3::ONE - reflected) * density
+}
+
+pub fn glass_pdf(m: &Mixture, wo: Vec3, wi: Vec3) -> f32 {
+    let above = wi.z > 0.0;
+    if above | m.thin {
+        let half = half_between(wo, Vec3::new(wi.x, wi.y, wi.z.abs()));
+        let chance = glass_chance(m, dot(wo, half));
+        return mirrored_pdf(m.alpha, wo, half) * if above { chance } else { 1.0 - chance };
+    }
+    let half = refracting_half(wo, wi, m.eta);
+    let chance = glass_chance(m, dot(wo, half));
+    ggx_pdf(m.alpha, wo, half) * refracting_density(wo, wi, half, m.eta) * (1.0 - chance)
 }
 
 pub fn coat_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> f32 {
@@ -219,7 +276,7 @@ pub fn coat_eval(m: &Mixture, wo: Vec3, wi: Vec3) -> f32 {
         return 0.0;
     }
     let half = half_between(o, i);
-    let f = schlick(Vec3::splat(COAT_F0), 1.0, max(dot(o, half), 0.0), 1.0);
+    let f = schlick(Vec3::splat(COAT_F0), Vec3::ONE, max(dot(o, half), 0.0));
     m.coat * f.x * facets_eval(alpha, o, i, half)
 }
 
@@ -233,15 +290,8 @@ pub fn principled_pdf(m: &Mixture, wo: Vec3, wi: Vec3, lobes: u32) -> f32 {
     if (lobes & LOBE_SPECULAR != 0) && (wi.z > 0.0) & !is_flat(m.alpha) {
         pdf += m.chances.y * mirrored_pdf(m.alpha, wo, half_between(wo, wi));
     }
-    if (lobes & LOBE_TRANSMISSION != 0) && (wi.z < 0.0) & !passes_straight(m) {
-        let mirrored = Vec3::new(wi.x, wi.y, -wi.z);
-        let density = if m.thin {
-            mirrored_pdf(m.alpha, wo, half_between(wo, mirrored))
-        } else {
-            let half = refracting_half(wo, wi, m.eta);
-            ggx_pdf(m.alpha, wo, half) * refracting_density(wo, wi, half, m.eta)
-        };
-        pdf += m.chances.z * density;
+    if lobes & LOBE_TRANSMISSION != 0 && (m.chances.z > 0.0) & !passes_straight(m) {
+        pdf += m.chances.z * glass_pdf(m, wo, wi);
     }
     if lobes & LOBE_COAT != 0 {
         let o = to_frame_around(m.coat_normal, wo);
@@ -291,7 +341,7 @@ pub fn principled_sample(m: &Mixture, wo: Vec3, u: Vec2, random: f32, lobes: u32
             is_delta = is_flat(m.alpha);
             let half = if is_delta { Vec3::Z } else { ggx_sample(m.alpha, wo, u) };
             wi = half * (2.0 * dot(wo, half)) - wo;
-            weight = schlick(m.f0, m.f90, wo.z, m.eta) * m.gain * (1.0 / m.chances.y);
+            weight = schlick(m.f0, m.f90, wo.z) * (1.0 / m.chances.y);
             if wi.z <= 0.0 {
                 return nowhere();
             }
@@ -302,19 +352,24 @@ pub fn principled_sample(m: &Mixture, wo: Vec3, u: Vec2, random: f32, lobes: u32
         if (rest >= 0.0) & (rest < m.chances.z) {
             is_delta = passes_straight(m);
             let half = if is_delta { Vec3::Z } else { ggx_sample(m.alpha, wo, u) };
-            let cosine = dot(wo, half);
+            let cosine = max(dot(wo, half), 1e-6);
+            let reflected = glass_fresnel(m, cosine);
+            let chance = glass_chance(m, cosine);
+            let mirrors = rest < m.chances.z * chance;
             let mirrored = half * (2.0 * cosine) - wo;
             let behind = refracted_cosine(cosine, m.eta);
             let bent = refracted_direction(-wo, half, m.eta, cosine, behind);
-            wi = if m.thin {
+            let through = if m.thin {
                 Vec3::new(mirrored.x, mirrored.y, -mirrored.z)
             } else {
                 bent
             };
-            eta = m.eta;
-            let through = Vec3::ONE - schlick(m.inner_f0, m.inner_f90, wo.z, m.eta);
-            weight = m.passed * through * (m.eta * m.eta / m.chances.z);
-            if wi.z >= 0.0 {
+            wi = normalize(if mirrors { mirrored } else { through });
+            eta = if mirrors { 1.0 } else { m.eta };
+            let passing = m.passed * (Vec3::ONE - reflected) * (m.eta * m.eta);
+            let share = max(m.chances.z * if mirrors { chance } else { 1.0 - chance }, 1e-30);
+            weight = if mirrors { reflected * m.glass } else { passing } * (1.0 / share);
+            if wi.z * if mirrors { 1.0 } else { -1.0 } <= 0.0 {
                 return nowhere();
             }
         }
@@ -327,7 +382,7 @@ pub fn principled_sample(m: &Mixture, wo: Vec3, u: Vec2, random: f32, lobes: u32
             let o = to_frame_around(m.coat_normal, wo);
             let half = if is_delta { Vec3::Z } else { ggx_sample(alpha, o, u) };
             wi = vector_around(m.coat_normal, half * (2.0 * dot(o, half)) - o);
-            let reflected = schlick(Vec3::splat(COAT_F0), 1.0, o.z, 1.0) * (m.coat / m.chances.w);
+            let reflected = schlick(Vec3::splat(COAT_F0), Vec3::ONE, o.z) * (m.coat / m.chances.w);
             weight = if wi.z > 0.0 { reflected } else { Vec3::ZERO };
         }
         rest -= m.chances.w;

@@ -4,8 +4,9 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::dielectric::{eta_of, refracts_inwards};
 use super::diffuse::{angles_at, diffuse_eval, diffuse_pdf, rough_diffuse_eval};
+use super::energy::{glass_kept, principled_energy, streak_energy};
 use super::lobe::{LobeSample, facet_alpha, facet_loss, is_polished, lobe_frame, vector_to_lobe};
-use super::math::{dot, floor, max, min};
+use super::math::{dot, max, min};
 use super::mesh::{Spot, face_lets_pass};
 use super::metal::{metal_eval, metal_fresnel, metal_pdf, metal_sample};
 use super::modified_phong::{modified_phong_eval, modified_phong_pdf, phong_factors};
@@ -18,8 +19,8 @@ use super::surface::Surface;
 use super::thin::{thin_eval, thin_pdf, thin_sample};
 use super::warp::frame_around;
 use crate::pack::{
-    DIFFUSE, ENERGY_SIZE, FACET_KINDS, GLASS, INSTANCE, LOBE_COAT, METAL, Material, NOTHING, PASSING_KINDS, PHONG,
-    PRINCIPLED, Packed, ROUGH_GLASS, THIN,
+    DIFFUSE, FACET_KINDS, GLASS, INSTANCE, LOBE_COAT, METAL, Material, NOTHING, PASSING_KINDS, PHONG, PRINCIPLED,
+    Packed, ROUGH_GLASS, THIN,
 };
 
 /// What a material has that is none of that kind.
@@ -27,11 +28,13 @@ pub static NO_MIXTURE: Mixture = Mixture {
     diffuse: Vec3::ZERO,
     alpha: Vec2::ZERO,
     f0: Vec3::ZERO,
-    f90: 0.0,
-    gain: Vec3::ZERO,
+    f90: Vec3::ZERO,
+    glass: 0.0,
     passed: Vec3::ZERO,
-    inner_f0: Vec3::ZERO,
-    inner_f90: 0.0,
+    glass_f0: Vec3::ZERO,
+    glass_f90: 0.0,
+    head_on: 0.0,
+    ratio: 0.0,
     eta: 0.0,
     thin: false,
     coat: 0.0,
@@ -188,28 +191,14 @@ pub fn facets_of(scene: &Packed, surface: &Surface, found: Material) -> Material
     }
     if material.energy != NOTHING {
         material.loss = if material.kind == ROUGH_GLASS {
-            1.0 / energy_kept(scene, material.energy, facet_alpha(&material), wo, surface.side) - 1.0
+            1.0 / glass_kept(scene, &material, facet_alpha(&material), wo, surface.side) - 1.0
+        } else if material.streaks != 0 {
+            1.0 / streak_energy(scene, &material, facet_alpha(&material), wo, 0) - 1.0
         } else {
             facet_loss(facet_alpha(&material), wo)
         };
     }
     material
-}
-
-pub fn energy_kept(scene: &Packed, energy: u32, alpha: Vec2, wo: Vec3, side: f32) -> f32 {
-    let last = (ENERGY_SIZE - 1) as f32;
-    let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
-    let row = min(square.sqrt().sqrt(), 1.0) * last;
-    let column = min(max(wo.z, 0.0), 1.0) * last;
-    let i = min(floor(row), last - 1.0);
-    let j = min(floor(column), last - 1.0);
-    let table = if side > 0.0 { 0 } else { ENERGY_SIZE * ENERGY_SIZE };
-    let start = energy + table + i as u32 * ENERGY_SIZE + j as u32;
-    let word = |i: u32| f32::from_bits(scene.texels[i as usize]);
-    let finer = Vec2::new(word(start), word(start + 1));
-    let rougher = Vec2::new(word(start + ENERGY_SIZE), word(start + ENERGY_SIZE + 1));
-    let both = finer + (rougher - finer) * (row - i);
-    both.x + (both.y - both.x) * (column - j)
 }
 
 #[inline(always)]
@@ -253,7 +242,9 @@ pub fn mixture_at(scene: &Packed, surface: &Surface, material: &Material, coat_n
         };
         coat = vector_to_lobe(frame, surface.shading_normal, usable_normal(*surface, coat_normal));
     }
-    principled_mixture(material, local_wo(surface), surface.side > 0.0, coat, s.lobes)
+    let wo = local_wo(surface);
+    let energy = principled_energy(scene, material, wo, surface.side);
+    principled_mixture(material, wo, surface.side > 0.0, coat, s.lobes, energy)
 }
 
 #[inline(always)]

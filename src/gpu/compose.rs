@@ -85,6 +85,7 @@ static PATH: &[File] = files![
     "environment.wgsl",
     "light_choice.wgsl",
     "emitter.wgsl",
+    "energy.wgsl",
     "scattering.wgsl",
     "integrators/path.wgsl"
 ];

@@ -49,7 +49,7 @@ fn rounds_of_sample(packed: &Packed, baked: bool) -> f64 {
         let passing = if s.sees_through == 0 { 1.0 } else { ROUNDS_OF_PASSING };
         let bounces = f64::from(s.bounces.min(s.rr_depth.saturating_add(LONGEST_ROULETTE)));
         // Down the tree over what shines, and up from what a ray has met.
-        let levels = 2.0 * f64::from(2 * packed.light_nodes.len().max(1).ilog2());
+        let levels = 2.0 * f64::from(packed.light_nodes.len().max(1).ilog2());
         let of_bounce = 1.0 + of_hit + to_light + levels + f64::from(s.lookups) * ROUNDS_OF_LOOKUP;
         return of_start + (bounces + 1.0) * passing * of_bounce;
     }

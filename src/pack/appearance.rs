@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec2, Vec3};
 
-use super::energy::energy_table;
+use super::energy::{Parts, energy_table, streak_table};
 use super::pyramid::pyramid;
 use super::*;
 use crate::cpu::lobe::{facet_alpha, is_polished};
@@ -30,6 +30,8 @@ pub struct Appearances {
     records: BTreeMap<(usize, Option<u64>), u32>,
     /// The tables of rough glass, by its index and alpha where that is one.
     energies: BTreeMap<(u32, Option<u32>), u32>,
+    /// Those of facets that are rougher along one axis, by what is in them, roughness and anisotropy.
+    streaks: BTreeMap<(Parts, Option<u32>, Option<u32>), u32>,
 }
 
 /// A record of facets; `texture` gives the roughness of one.
@@ -203,11 +205,23 @@ impl Appearances {
             },
         };
         record.emission = found(&material.emission, FOR_EMISSION, None);
-        let textured = lookups.0.iter().any(|lookup| lookup.purposes & FOR_ROUGHNESS != 0);
+        let has = |purpose: u32| lookups.0.iter().any(|lookup| lookup.purposes & purpose != 0);
+        let textured = has(FOR_ROUGHNESS);
         let mut record = simplest(record, textured);
         record.hidden = (!material.visible).into();
-        if record.kind == ROUGH_GLASS && record.energy != NOTHING {
-            record.energy = self.energy(&record, textured);
+        let passes = record.thin == 0 && (record.transmission > 0.0 || has(FOR_TRANSMISSION));
+        let parts = match record.kind {
+            METAL | THIN if record.energy != NOTHING => Some(Parts::Mirror),
+            ROUGH_GLASS if record.energy != NOTHING => Some(Parts::Glass(record.ior.to_bits())),
+            PRINCIPLED => Some(Parts::Mixture(passes.then_some(record.ior.to_bits()))),
+            _ => None,
+        };
+        if let Some(parts) = parts {
+            if record.anisotropy > 0.0 || has(FOR_ANISOTROPY) {
+                record.streaks = 1 + self.streaks(&record, parts, textured, has(FOR_ANISOTROPY));
+            } else if record.kind == ROUGH_GLASS || record.kind == PRINCIPLED && passes {
+                record.energy = self.energy(&record, textured);
+            }
         }
         if let Some(map) = material.normal_map {
             lookups.add(self.texture(scene, map.texture, Some(map.strength)), FOR_NORMAL, None);
@@ -235,6 +249,19 @@ impl Appearances {
         *self.energies.entry(key).or_insert_with(|| {
             let start = texels.len() as u32;
             texels.extend(energy_table(record.ior, alpha).iter().map(|x| x.to_bits()));
+            start
+        })
+    }
+
+    /// The same of facets that are rougher along one axis; textures may give roughness and anisotropy.
+    fn streaks(&mut self, record: &Material, parts: Parts, rough: bool, long: bool) -> u32 {
+        let known = |number: f32, textured: bool| (!textured).then_some(number);
+        let (roughness, anisotropy) = (known(record.roughness, rough), known(record.anisotropy, long));
+        let key = (parts, roughness.map(f32::to_bits), anisotropy.map(f32::to_bits));
+        let texels = &mut self.texels;
+        *self.streaks.entry(key).or_insert_with(|| {
+            let start = texels.len() as u32;
+            texels.extend(streak_table(parts, roughness, anisotropy));
             start
         })
     }

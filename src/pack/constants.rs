@@ -66,6 +66,10 @@ constants! {
     pub const PASSING_KINDS: u32 = 1 << ROUGH_GLASS | 1 << THIN;
     /// Rows and columns of a table of [`Material::energy`], for each side.
     pub const ENERGY_SIZE: u32 = 32;
+    /// Lines of a table of [`Material::streaks`], by the direction along the surface.
+    pub const STREAK_LINES: u32 = 49;
+    /// Its columns, by the cosine.
+    pub const STREAK_COLUMNS: u32 = 48;
     /// A microfacet lobe whose alpha are all below this is a delta; each of any other is at least this.
     pub const SMALLEST_ALPHA: f32 = 1e-3;
     /// [`Material::kind`]: glTF's material.

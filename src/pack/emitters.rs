@@ -31,7 +31,7 @@ pub struct Shining {
 
 /// So many things that shine are chosen by their power alone, at most.
 pub const MOST_LISTED: usize = 16;
-/// So many have a tree, at most: its nodes are 128 bytes for each of them. More are chosen by their power alone.
+/// So many have a tree, at most: its nodes are some 100 bytes for each of them. More are chosen by their power alone.
 const MOST_IN_TREE: usize = 500_000;
 
 /// All that shines, of primitives with their materials, lights without extent and meshes. The materials are told how densely samples lie on
@@ -273,13 +273,18 @@ fn with_tree(
             shining.leaves.resize(shining.leaves.len() + triangles, NOTHING);
         }
     }
-    for (i, node) in (0..).zip(&shining.nodes).filter(|(_, node)| node.children == NOTHING) {
-        let place = match node.instance {
-            0 => shining.lights[node.index as usize].primitive,
-            number => shining.of_instances[number as usize - 1] + node.index,
-        };
-        if place != NOTHING {
-            shining.leaves[place as usize] = i;
+    for (number, node) in (0..).zip(&shining.nodes) {
+        for (i, child) in (4 * number..).zip(0..4) {
+            if node.children[child] != NOTHING || node.intensity[child] == 0.0 {
+                continue;
+            }
+            let place = match node.instance[child] {
+                0 => shining.lights[node.index[child] as usize].primitive,
+                number => shining.of_instances[number as usize - 1] + node.index[child],
+            };
+            if place != NOTHING {
+                shining.leaves[place as usize] = i;
+            }
         }
     }
     for (material, strength) in materials.iter_mut().zip(&found.strengths) {

@@ -1,11 +1,11 @@
-//! How much light rough glass reflects and lets pass at once, as a table: what further bounces between its facets bring is as much
-//! as is missing. By an integral over the facets that are seen.
+//! How much light rough glass reflects and lets pass at once, and facets that are rougher along one axis, as tables: what further bounces
+//! between them bring is as much as is missing. By an integral over the facets that are seen.
 
-use glam::{UVec2, Vec2, Vec3};
+use glam::{DVec2, UVec2, Vec2, Vec3};
 
-use super::{ENERGY_SIZE, SMALLEST_ALPHA};
+use super::{ENERGY_SIZE, Material, SMALLEST_ALPHA, STREAK_COLUMNS, STREAK_LINES};
 use crate::cpu::ggx::{ggx_g1, ggx_sample};
-use crate::cpu::lobe::facet_weight;
+use crate::cpu::lobe::{facet_alpha, facet_weight};
 use crate::cpu::math::{dot, max};
 use crate::cpu::sequence::sobol_sample;
 use crate::cpu::specular::{fresnel, refracted_cosine};
@@ -19,7 +19,7 @@ const FACETS: (u32, u32) = (4096, 1024);
 pub fn energy_table(ior: f32, alpha: Option<f32>) -> Vec<f32> {
     let last = (ENERGY_SIZE - 1) as f32;
     let wanted = |row: u32| alpha.is_none_or(|alpha| (row as f32 - alpha.sqrt() * last).abs() < 1.0);
-    let facets = if alpha.is_some() { FACETS.0 } else { FACETS.1 };
+    let facets = points(if alpha.is_some() { FACETS.0 } else { FACETS.1 });
     let mut table = Vec::new();
     for index in [ior, 1.0 / ior] {
         for row in 0..ENERGY_SIZE {
@@ -28,7 +28,7 @@ pub fn energy_table(ior: f32, alpha: Option<f32>) -> Vec<f32> {
             for column in 0..ENERGY_SIZE {
                 let cosine = max(column as f32 / last, 0.002);
                 table.push(if wanted(row) {
-                    kept(index, alpha, cosine, facets)
+                    kept(index, alpha, cosine, &facets)
                 } else {
                     1.0
                 });
@@ -38,14 +38,23 @@ pub fn energy_table(ior: f32, alpha: Option<f32>) -> Vec<f32> {
     table
 }
 
+/// Where facets are looked for: so many points of Sobol's sequence.
+fn points(count: u32) -> Vec<Vec2> {
+    (0..count).map(|i| sobol_sample(i, UVec2::new(1, 2))).collect()
+}
+
 /// The share of light from everywhere that comes to the viewer, in whose direction the normal has this cosine, by one bounce.
-fn kept(index: f32, alpha: f32, cosine: f32, facets: u32) -> f32 {
-    let alpha = Vec2::splat(alpha);
+fn kept(index: f32, alpha: f32, cosine: f32, facets: &[Vec2]) -> f32 {
     let wo = Vec3::new(max(1.0 - cosine * cosine, 0.0).sqrt(), 0.0, cosine);
+    glass_keeps(index, Vec2::splat(alpha), wo, facets)
+}
+
+/// The same in any direction, where facets may be rougher along one axis.
+fn glass_keeps(index: f32, alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> f32 {
     let eta = 1.0 / index;
     let mut sum = 0.0;
-    for i in 0..facets {
-        let m = ggx_sample(alpha, wo, sobol_sample(i, UVec2::new(1, 2)));
+    for u in facets {
+        let m = ggx_sample(alpha, wo, *u);
         let c = max(dot(wo, m), 1e-6);
         let t = refracted_cosine(c, eta);
         let reflected = fresnel(c, t, eta);
@@ -58,5 +67,114 @@ fn kept(index: f32, alpha: f32, cosine: f32, facets: u32) -> f32 {
             sum += f64::from((1.0 - reflected) * ggx_g1(alpha, below));
         }
     }
-    (sum / f64::from(facets)) as f32
+    (sum / facets.len() as f64) as f32
+}
+
+/// What facets mirror of light from everywhere, by the Fresnel term of Schlick, as `ggx_albedo` has it: F0 x + F90 y.
+fn mirrors(alpha: Vec2, wo: Vec3, facets: &[Vec2]) -> DVec2 {
+    let mut sum = DVec2::ZERO;
+    for u in facets {
+        let m = ggx_sample(alpha, wo, *u);
+        let c = dot(wo, m);
+        let wi = m * (2.0 * c) - wo;
+        if wi.z > 0.0 {
+            let edge = f64::from(max(1.0 - c, 0.0)).powi(5);
+            sum += DVec2::new(1.0 - edge, edge) * f64::from(facet_weight(alpha, wo, wi));
+        }
+    }
+    sum / facets.len() as f64
+}
+
+/// What of the facets of a material gets a table, part after part, as they lie in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Parts {
+    /// All that they mirror.
+    Mirror,
+    /// What rough glass of the index with these bits lets pass and mirrors: from outside, from inside.
+    Glass(u32),
+    /// The two parts of what they mirror by Schlick's formula and, where there is an index, those of glass.
+    Mixture(Option<u32>),
+}
+
+/// Rows of a table by roughness, and by anisotropy, where a texture gives it.
+const ROWS: (u32, u32) = (10, 6);
+
+/// Inside glass all light is mirrored from some directions on. The tables' straight lines cut that corner, and so much more counts as kept.
+const CUT: f32 = 1.004;
+
+/// The table of facets that are rougher along one axis, for `streak_energy`: how many rows there are by roughness and by anisotropy, one where
+/// it is known; then for each part the rows, each of lines by the direction along the surface of columns by the cosine.
+pub fn streak_table(parts: Parts, roughness: Option<f32>, anisotropy: Option<f32>) -> Vec<u32> {
+    let rows = [
+        if roughness.is_none() { ROWS.0 } else { 1 },
+        if anisotropy.is_none() { ROWS.1 } else { 1 },
+    ];
+    let facets = points(match (roughness, anisotropy) {
+        (Some(_), Some(_)) if parts == Parts::Mirror => 1024,
+        (Some(_), Some(_)) => 2048,
+        (None, None) => 64,
+        _ => 128,
+    });
+    let at = |known: Option<f32>, row: u32, rows: u32| known.unwrap_or(row as f32 / max(rows as f32 - 1.0, 1.0));
+    let mut nodes = Vec::new();
+    for r in 0..rows[0] {
+        for s in 0..rows[1] {
+            let alpha = facet_alpha(&Material {
+                roughness: at(roughness, r, rows[0]),
+                anisotropy: at(anisotropy, s, rows[1]),
+                ..bytemuck::Zeroable::zeroed()
+            });
+            for line in 0..STREAK_LINES {
+                for column in 0..STREAK_COLUMNS {
+                    let place = Vec2::new(
+                        line as f32 / (STREAK_LINES - 1) as f32,
+                        column as f32 / (STREAK_COLUMNS - 1) as f32,
+                    );
+                    nodes.push((alpha, streak_direction(alpha, place)));
+                }
+            }
+        }
+    }
+    let mut words = rows.to_vec();
+    let glass = |words: &mut Vec<u32>, index: u32| {
+        let ior = f32::from_bits(index);
+        for index in [ior, 1.0 / ior] {
+            words.extend(
+                nodes
+                    .iter()
+                    .map(|(alpha, wo)| (glass_keeps(index, *alpha, *wo, &facets) * CUT).to_bits()),
+            );
+        }
+    };
+    match parts {
+        Parts::Glass(index) => glass(&mut words, index),
+        Parts::Mirror => words.extend(nodes.iter().map(|(alpha, wo)| {
+            let both = mirrors(*alpha, *wo, &facets);
+            ((both.x + both.y) as f32).to_bits()
+        })),
+        Parts::Mixture(index) => {
+            let both: Vec<DVec2> = nodes.iter().map(|(alpha, wo)| mirrors(*alpha, *wo, &facets)).collect();
+            words.extend(both.iter().map(|both| (both.x as f32).to_bits()));
+            words.extend(both.iter().map(|both| (both.y as f32).to_bits()));
+            if let Some(index) = index {
+                glass(&mut words, index);
+            }
+        }
+    }
+    words
+}
+
+/// The direction that is at a place of the table: what `streak_place` inverts.
+fn streak_direction(alpha: Vec2, place: Vec2) -> Vec3 {
+    let seen = alpha.y + (alpha.x - alpha.y) * (place.x * place.x);
+    let between = (seen * seen - alpha.y * alpha.y) / max(alpha.x * alpha.x - alpha.y * alpha.y, 1e-12);
+    let along = max(0.0, if between > 1.0 { 1.0 } else { between });
+    let half_way = 0.5 * seen.sqrt();
+    // The cosine of a place is the root of a square equation.
+    let b = 1.0 + 2.0 * half_way - 2.0 * place.y;
+    let root = (b * b + 8.0 * half_way * place.y).sqrt();
+    let cosine = max(0.5 * (root - b), 1e-3);
+    let cosine = if cosine > 1.0 { 1.0 } else { cosine };
+    let sine = max(1.0 - cosine * cosine, 0.0).sqrt();
+    Vec3::new(sine * along.sqrt(), sine * (1.0 - along).sqrt(), cosine)
 }

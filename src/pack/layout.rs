@@ -131,7 +131,7 @@ records! {
         pub roughness: f32,
         /// Its lookups in textures: the first, x, and how many there are, y.
         pub lookups: UVec2,
-        /// [`ROUGH_GLASS`]: the texel where the table of what it lets pass and reflects at once starts. Of [`METAL`] and [`THIN`], too, [`NOTHING`]
+        /// [`ROUGH_GLASS`], and [`PRINCIPLED`] with a volume: the texel where the table of what it lets pass and reflects at once starts. Of [`METAL`] and [`THIN`], too, [`NOTHING`]
         /// where light that bounces between facets is lost.
         pub energy: u32,
         /// 0 here; of a surface that was met what facets lose at once, as a multiple of what they do not.
@@ -168,8 +168,10 @@ records! {
         pub thin: u32,
         /// Of any kind: 1 where the camera's rays go through it, else 0.
         pub hidden: u32,
+        /// Of any kind with facets: the texel where the table of those that are rougher along one axis starts, plus one; 0 where there is none.
+        pub streaks: u32,
         /// 0.
-        pub unused: UVec2,
+        pub unused: u32,
     }
 
     /// A lookup in a texture, whatever a material wants it for.
@@ -258,33 +260,41 @@ records! {
         pub index: u32,
     }
 
-    /// A node of the tree over much that shines (`light_tree.rs`).
+    /// A node of the tree over much that shines (`light_tree.rs`): up to four children, one to each component.
     pub struct LightNode {
-        /// The middle of a sphere around what is in it.
-        pub center: Vec3,
-        /// The sphere's radius.
-        pub radius: f32,
-        /// The axis of a cone around the normals of what is in it; unit length.
-        pub axis: Vec3,
-        /// The cosine of the angle between the axis and any of these normals.
-        pub cosine: f32,
-        /// The share of all nodes' light that it sends in its brightest direction, 0 to 1.
-        pub intensity: f32,
-        /// The cosine of the angle to a normal beyond which there is no light.
-        pub edge: f32,
+        /// The middles of spheres around what is in the children: x.
+        pub x: Vec4,
+        /// y.
+        pub y: Vec4,
+        /// z.
+        pub z: Vec4,
+        /// The spheres' radii.
+        pub radius: Vec4,
+        /// The axes of cones around the normals of what is in the children, of unit length: x.
+        pub axis_x: Vec4,
+        /// y.
+        pub axis_y: Vec4,
+        /// z.
+        pub axis_z: Vec4,
+        /// The cosines of the angles between the axes and any of these normals.
+        pub cosine: Vec4,
+        /// The shares of all nodes' light that they send in their brightest direction, 0 to 1; 0 where there is no child.
+        pub intensity: Vec4,
+        /// The cosines of the angles to normals beyond which there is no light.
+        pub edge: Vec4,
         /// 1, or 2 where the opposite directions get light too.
-        pub sides: u32,
-        /// The node that it is a child of, [`NOTHING`] for the first one of all.
-        pub parent: u32,
-        /// The first of its two children, which lie together; [`NOTHING`] for one thing that shines. What follows is of such.
-        pub children: u32,
+        pub sides: UVec4,
+        /// The children that are nodes; [`NOTHING`] for one thing that shines, and where there is no child. What follows is of such things.
+        pub children: UVec4,
         /// How densely samples of light lie on it once it is chosen, per area; 1 for what has no extent. Of these samples those of the tree
         /// alone, whose share it is multiplied by.
-        pub density: f32,
+        pub density: Vec4,
         /// 0 for a light, else one more than the number of a mesh's instance.
-        pub instance: u32,
+        pub instance: UVec4,
         /// The number of the light, or where the triangle is in its mesh.
-        pub index: u32,
+        pub index: UVec4,
+        /// x: which child it is of which node, four times the node's number and 0 to 3; [`NOTHING`] for the first one of all. The rest is 0.
+        pub parent: UVec4,
     }
 
     /// How many records a scene has, and where they are; read where the scene is in buffers.

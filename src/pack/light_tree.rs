@@ -1,9 +1,9 @@
-//! The tree over what shines, built in f64. Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree
+//! The tree over what shines, of four children a node, built in f64. Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree
 //! Splitting", HPG 2018: sections and equations are those of that paper.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec3, UVec4};
 
 use super::{LightNode, NOTHING};
 
@@ -155,18 +155,21 @@ impl Bounds {
     }
 }
 
-/// Builds the tree. The root is node 0; a node's children lie together, the first with an odd number.
+/// Children of a node, at most.
+const WIDTH: usize = 4;
+
+/// Builds the tree. The root is node 0.
 pub fn build(lamps: &[Lamp]) -> Vec<LightNode> {
     let mut order: Vec<u32> = (0..lamps.len() as u32).collect();
-    let mut nodes = Vec::with_capacity((2 * lamps.len()).saturating_sub(1));
-    let total: f64 = lamps.iter().map(|lamp| lamp.intensity).sum();
-    if !lamps.is_empty() {
-        nodes.push(bytemuck::Zeroable::zeroed());
-        let mut builder = Builder { lamps, total, nodes };
-        builder.fill(0, NOTHING, &mut order, 0);
-        return builder.nodes;
+    let mut builder = Builder {
+        lamps,
+        total: lamps.iter().map(|lamp| lamp.intensity).sum(),
+        nodes: Vec::with_capacity(lamps.len() / 2 + 1),
+    };
+    if let Some(part) = builder.part(&mut order, 0) {
+        builder.fill(NOTHING, part);
     }
-    nodes
+    builder.nodes
 }
 
 struct Builder<'a> {
@@ -176,54 +179,79 @@ struct Builder<'a> {
     nodes: Vec<LightNode>,
 }
 
+/// Some lamps, which are a node's child.
+struct Part<'a> {
+    order: &'a mut [u32],
+    bounds: Bounds,
+    /// How many times lamps were split up to here.
+    level: u32,
+}
+
 impl Builder<'_> {
-    /// Makes the node of some lamps, and all below it.
-    fn fill(&mut self, place: u32, parent: u32, order: &mut [u32], level: u32) -> Bounds {
-        if let [lamp] = order {
-            let lamp = &self.lamps[*lamp as usize];
-            let bounds = Bounds::of(lamp);
-            self.nodes[place as usize] = LightNode {
-                parent,
-                children: NOTHING,
-                density: lamp.density as f32,
-                instance: lamp.instance,
-                index: lamp.index,
-                ..self.node(&bounds)
-            };
-            return bounds;
-        }
-        let middle = self.split(order, level);
-        let children = self.nodes.len() as u32;
-        let empty: LightNode = bytemuck::Zeroable::zeroed();
-        self.nodes.extend([empty, empty]);
-        let (first, second) = order.split_at_mut(middle);
-        let first = self.fill(children, place, first, level + 1);
-        let second = self.fill(children + 1, place, second, level + 1);
-        let bounds = first.with(&second);
-        self.nodes[place as usize] = LightNode {
-            parent,
-            children,
-            ..self.node(&bounds)
-        };
-        bounds
+    fn part<'a>(&self, order: &'a mut [u32], level: u32) -> Option<Part<'a>> {
+        let bounds = Bounds::of_all(order.iter().map(|i| Bounds::of(&self.lamps[*i as usize])))?;
+        Some(Part { order, bounds, level })
     }
 
-    /// The part of a node that says where and how bright it is.
-    fn node(&self, bounds: &Bounds) -> LightNode {
+    /// Makes the node of some lamps, and all below it, and gives its number.
+    fn fill(&mut self, parent: u32, all: Part) -> u32 {
+        let number = self.nodes.len() as u32;
+        let size = (all.bounds.high - all.bounds.low).max_element();
+        let room = if size > 0.0 { 1e-3 * size } else { 1.0 };
+        let mut parts = vec![all];
+        // The one that costs most is split, as long as there is room.
+        while parts.len() < WIDTH {
+            let costs = parts.iter().enumerate().filter(|(_, part)| part.order.len() > 1);
+            let worst = costs.max_by(|(_, a), (_, b)| a.bounds.cost(room).total_cmp(&b.bounds.cost(room)));
+            let Some((i, _)) = worst else {
+                break;
+            };
+            let Part { order, level, .. } = parts.swap_remove(i);
+            let middle = self.split(order, level);
+            let (first, second) = order.split_at_mut(middle);
+            parts.extend(
+                [first, second]
+                    .into_iter()
+                    .filter_map(|order| self.part(order, level + 1)),
+            );
+        }
+        let mut node = LightNode {
+            children: UVec4::splat(NOTHING),
+            parent: UVec4::new(parent, 0, 0, 0),
+            ..bytemuck::Zeroable::zeroed()
+        };
+        for (i, part) in parts.iter().enumerate() {
+            self.describe(&mut node, i, &part.bounds);
+            if let [lamp] = *part.order {
+                let lamp = &self.lamps[lamp as usize];
+                node.density[i] = lamp.density as f32;
+                node.instance[i] = lamp.instance;
+                node.index[i] = lamp.index;
+            }
+        }
+        self.nodes.push(node);
+        for (i, part) in parts.into_iter().enumerate().filter(|(_, part)| part.order.len() > 1) {
+            let child = self.fill(4 * number + i as u32, part);
+            self.nodes[number as usize].children[i] = child;
+        }
+        number
+    }
+
+    /// Writes down where and how bright a node's child is.
+    fn describe(&self, node: &mut LightNode, i: usize, bounds: &Bounds) {
         let center = (0.5 * (bounds.low + bounds.high)).as_vec3();
         // Around the box from the centre as it is rounded, and a bit more.
         let far = (bounds.high - center.as_dvec3()).max(center.as_dvec3() - bounds.low);
         let radius = far.length() * (1.0 + 1e-6);
-        LightNode {
-            center,
-            radius: radius as f32,
-            axis: bounds.cone.axis.as_vec3(),
-            cosine: bounds.cone.spread.cos() as f32,
-            edge: bounds.cone.edge.cos() as f32,
-            sides: if bounds.cone.two_sided { 2 } else { 1 },
-            intensity: (bounds.intensity / self.total) as f32,
-            ..bytemuck::Zeroable::zeroed()
-        }
+        let axis = bounds.cone.axis.as_vec3();
+        (node.x[i], node.y[i], node.z[i]) = center.into();
+        node.radius[i] = radius as f32;
+        (node.axis_x[i], node.axis_y[i], node.axis_z[i]) = axis.into();
+        node.cosine[i] = bounds.cone.spread.cos() as f32;
+        node.edge[i] = bounds.cone.edge.cos() as f32;
+        node.sides[i] = if bounds.cone.two_sided { 2 } else { 1 };
+        // Above 0, which says that there is a child.
+        node.intensity[i] = ((bounds.intensity / self.total) as f32).max(f32::MIN_POSITIVE);
     }
 
     /// Orders some lamps so that the first ones, whose number it gives, go to one side: where that costs least, by the heuristic of

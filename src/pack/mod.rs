@@ -3,58 +3,53 @@
 mod appearance;
 mod blocking;
 mod bounds;
+mod camera;
 mod constants;
 mod emitters;
-mod energy;
+pub mod energy;
 mod extent_tree;
 pub mod filter;
 mod geometry;
+mod kinds;
 mod layout;
+mod light;
 pub mod light_tree;
 mod mesh;
 mod origin;
 mod pyramid;
 mod record;
+mod shape;
 mod specialization;
 mod surroundings;
 pub mod tree;
 
-use std::collections::BTreeMap;
-use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
-use glam::{DMat3, DVec3, UVec2, UVec4, Vec3, Vec4};
+use glam::{DVec3, UVec2, UVec4, Vec3, Vec4};
 
 use self::appearance::Appearances;
+pub use self::camera::pack_camera;
 pub use self::constants::*;
 use self::emitters::Shining;
 pub use self::geometry::MOST_OUTSIDE;
+use self::kinds::{exponent_bits, is_specular, of_paths};
 pub use self::layout::*;
+use self::light::{DISTANT, connect_lights, pack_light, reach};
 pub use self::mesh::PackedMesh;
 pub use self::record::{Field, Record};
+#[cfg(test)]
+pub(crate) use self::shape::primitive;
+use self::shape::{pack_shapes, parallelogram};
 pub use self::specialization::Specialization;
 use self::surroundings::Surroundings;
-use crate::cpu::lobe::is_polished;
 use crate::film::Form;
-use crate::scene::{
-    self, Geometry, Integrator, Parallelogram, Pattern, PixelFilter, PixelFilterKind, Projection, Reflection, Samples,
-    Scene,
-};
-
-/// How far shadow rays to a directional light go: beyond any scene, yet small enough to be squared.
-const DISTANT: f32 = 1e10;
+use crate::scene::{self, Integrator, Pattern, PixelFilter, PixelFilterKind, Projection, Samples, Scene};
 
 /// Rays start at least so far above a surface, relative to the largest coordinate, 32 units of rounding: what the
 /// surface's own arithmetic and a neighbour's lose together (`docs/decisions/shadow-rays.md`).
 const LEAST_EPSILON: f64 = 32.0 / 16_777_216.0;
-
-/// Shadow rays end at least so far before a light's sample, as a part of the way: a light may lie on a surface.
-const BEFORE_LIGHT: f64 = 1e-5;
-
-/// A spot's light falls off over at least so much of the cosine.
-const LEAST_FALLOFF: f64 = 1e-12;
 
 /// A scene as both backends read it.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,7 +86,7 @@ pub struct Packed {
     pub emitters: Vec<Emitter>,
     /// The tree over what shines where that is much, which is then one of the emitters.
     pub light_nodes: Vec<LightNode>,
-    /// Of each primitive, and of each triangle of the instances of meshes that shine, the number of its node in that tree, else [`NOTHING`].
+    /// Of each primitive, and of each triangle of the instances of meshes that shine, which child of which node of that tree it is, as [`LightNode::parent`] has it, else [`NOTHING`].
     pub light_leaves: Vec<u32>,
     /// How many there are of all these, and where.
     pub counts: Counts,
@@ -422,20 +417,6 @@ fn counts(
     }
 }
 
-/// Tells the lights that have an area which primitives shine.
-fn connect_lights(lights: &mut [Light], order: &[(Primitive, bool)], shapes: usize) {
-    let mut of_number: BTreeMap<u32, u32> = BTreeMap::new();
-    for (i, light) in (0..).zip(&*lights) {
-        of_number.insert(light.number, i);
-    }
-    for (i, (primitive, _)) in (0..).zip(order) {
-        let number = primitive.shape.checked_sub(shapes as u32);
-        if let Some(light) = number.and_then(|number| of_number.get(&number)) {
-            lights[*light as usize].primitive = i;
-        }
-    }
-}
-
 /// The samples that adaptive sampling gives all pixels before it decides on more: a round, or as many as it takes for an
 /// estimate of the variance. Where light bounces, some of it is rarely found, and few samples do not know of it.
 fn first_look(integrator: Integrator, round: u32, most: u32) -> u32 {
@@ -468,257 +449,5 @@ fn side(samples: Samples) -> u32 {
         samples.count.isqrt()
     } else {
         samples.count
-    }
-}
-
-/// A camera for a picture of `width` x `height` pixels, by coordinates from `origin`.
-pub fn pack_camera(camera: &scene::Camera, origin: DVec3, width: u32, height: u32, seed: u32) -> Camera {
-    let aspect = match camera.projection {
-        Projection::Panorama => 1.0, // right and up are unit vectors
-        _ => f64::from(width) / f64::from(height),
-    };
-    let (projection, half_height) = match camera.projection {
-        Projection::Perspective { fov } => (PERSPECTIVE, (fov / 2.0).tan()),
-        Projection::Orthographic { height } => (ORTHOGRAPHIC, height / 2.0),
-        Projection::Panorama => (PANORAMA, 1.0),
-    };
-    let lens = camera.lens;
-    // A polygon's first corner is at its top.
-    let (sin, cos) = lens
-        .filter(|lens| lens.blades > 0)
-        .map_or((0.0, 1.0), |lens| (FRAC_PI_2 + lens.rotation).sin_cos());
-    let radius = lens.map_or(0.0, |lens| lens.radius);
-    Camera {
-        position: (camera.position - origin).as_vec3(),
-        projection,
-        right: (camera.right * half_height * aspect).as_vec3(),
-        width,
-        up: (camera.up * half_height).as_vec3(),
-        height,
-        forward: camera.forward.as_vec3(),
-        seed,
-        lens_u: ((camera.right * cos + camera.up * sin) * radius).as_vec3(),
-        blades: lens.map_or(0, |lens| lens.blades),
-        lens_v: ((camera.up * cos - camera.right * sin) * radius).as_vec3(),
-        inverse_focus: lens.map_or(0.0, |lens| 1.0 / lens.focus) as f32,
-    }
-}
-
-fn is_specular(material: &scene::Material) -> bool {
-    match material.reflection {
-        Reflection::Phong { .. } | Reflection::Diffuse { .. } => false,
-        Reflection::Mirror { .. } | Reflection::Glass { .. } => true,
-        Reflection::Conductor { .. } | Reflection::Dielectric { .. } => true,
-        Reflection::Principled(_) => false,
-    }
-}
-
-/// Bits of the largest shininess, if all are whole numbers so small that squaring beats the general power.
-fn exponent_bits(described: &[scene::Material], packed: &[Material]) -> u32 {
-    let whole = described.iter().all(|material| {
-        if let Reflection::Phong { shininess, .. } = &material.reflection {
-            return shininess.fract() == 0.0 && *shininess <= 4096.0;
-        }
-        true
-    });
-    let largest = packed.iter().map(|material| material.exponent).max().unwrap_or(1);
-    if whole { u32::BITS - largest.leading_zeros() } else { 0 }
-}
-
-/// Bits of the kinds of materials that may mirror or refract alone.
-fn delta_kinds(materials: &[Material], appearances: &Appearances) -> u32 {
-    let may = |material: &&Material| {
-        let textured = appearances.has_lookup(material, FOR_ROUGHNESS);
-        let faceted = FACET_KINDS >> material.kind & 1 != 0;
-        SPECULAR_KINDS >> material.kind & 1 != 0 || faceted && (textured || is_polished(material))
-    };
-    materials
-        .iter()
-        .filter(may)
-        .fold(0, |bits, material| bits | 1 << material.kind)
-}
-
-/// What the integrator `path` takes as constants, of itself.
-fn of_paths(
-    scene: &Scene,
-    materials: &[Material],
-    appearances: &Appearances,
-    shining: &Shining,
-    lights: &[Light],
-) -> Specialization {
-    let any = |test: fn(&Material) -> bool| u32::from(materials.iter().any(test));
-    let has_lookup = |purpose: u32| u32::from(appearances.have_lookup(purpose));
-    let emitters = &shining.emitters;
-    let meshes_shine =
-        emitters.iter().any(|emitter| emitter.instance != 0) || shining.nodes.iter().any(|node| node.instance != 0);
-    Specialization {
-        materials: materials.iter().fold(0, |bits, material| bits | 1 << material.kind),
-        rough: any(|material| material.kind == DIFFUSE && material.roughness > 0.0) | has_lookup(FOR_ROUGHNESS),
-        delta_kinds: delta_kinds(materials, appearances),
-        anisotropic: any(|material| material.anisotropy > 0.0) | has_lookup(FOR_ANISOTROPY),
-        lobes: lobes(materials, appearances),
-        sees_through: any(|material| material.alpha_mode != OPAQUE),
-        absorption: any(|material| material.absorption != Vec3::ZERO),
-        shines: any(|material| material.density > 0.0),
-        emitters: emitters.len().min(2) as u32,
-        light_tree: (!shining.nodes.is_empty()).into(),
-        emitter_kinds: lights.iter().fold(u32::from(meshes_shine) << INSTANCE, |bits, light| {
-            bits | 1 << light.kind
-        }),
-        emission_textures: has_lookup(FOR_EMISSION),
-        rr_depth: scene.render.rr_depth,
-        most_indirect: scene.render.clamp.map_or(0, |clamp| (clamp as f32).to_bits()),
-        alpha: scene.render.alpha.into(),
-        layers: scene.render.alpha.into(),
-        ..Specialization::default()
-    }
-}
-
-/// The lobes that any principled material has.
-fn lobes(materials: &[Material], appearances: &Appearances) -> u32 {
-    let principled = || materials.iter().filter(|material| material.kind == PRINCIPLED);
-    let lobe = |lobe: u32, textured: u32, has: fn(&Material) -> bool| {
-        let there = principled().any(has) || principled().next().is_some() && appearances.have_lookup(textured);
-        if there { lobe } else { 0 }
-    };
-    lobe(LOBE_SPECULAR, FOR_METALLIC | FOR_WEIGHT, |m| {
-        m.metallic > 0.0 || m.specular_weight > 0.0
-    }) | lobe(LOBE_TRANSMISSION, FOR_TRANSMISSION, |m| m.transmission > 0.0)
-        | lobe(LOBE_COAT, FOR_COAT, |m| m.clearcoat > 0.0)
-        | lobe(LOBE_SHEEN, FOR_SHEEN, |m| m.sheen != Vec3::ZERO)
-        | lobe(LOBE_ANISOTROPY, FOR_ANISOTROPY, |m| m.anisotropy > 0.0)
-}
-
-/// Where shadow rays to a point of a light end, as a multiple of the way.
-fn reach(shadow_epsilon: f64) -> f32 {
-    (1.0 - shadow_epsilon.max(BEFORE_LIGHT)) as f32
-}
-
-fn pack_light(light: &scene::Light, number: u32, shadow_epsilon: f64) -> Light {
-    let reach = reach(shadow_epsilon);
-    let unit = Light {
-        finite: 1.0,
-        reach,
-        primitive: NOTHING,
-        number,
-        ..Light::zeroed()
-    };
-    match light {
-        scene::Light::Rectangle { rectangle, color, .. } => Light {
-            center: rectangle.center.as_vec3(),
-            u: rectangle.u.as_vec3(),
-            v: rectangle.v.as_vec3(),
-            color: color.as_vec3(),
-            ..unit
-        },
-        scene::Light::Point { position, color } => Light {
-            center: position.as_vec3(),
-            color: color.as_vec3(),
-            kind: POINT,
-            ..unit
-        },
-        scene::Light::Directional { direction, color } => Light {
-            center: -direction.as_vec3(),
-            finite: 0.0,
-            reach: DISTANT,
-            color: color.as_vec3(),
-            kind: DIRECTIONAL,
-            ..unit
-        },
-        scene::Light::Spot {
-            position,
-            direction,
-            color,
-            cone,
-            inner,
-        } => Light {
-            center: position.as_vec3(),
-            color: color.as_vec3(),
-            normal: direction.as_vec3(),
-            kind: SPOT,
-            cone: below_one(*cone) as f32,
-            falloff: (1.0 / (below_one(*cone) - below_one(*inner)).max(LEAST_FALLOFF)) as f32,
-            ..unit
-        },
-    }
-}
-
-/// 1 minus the cosine of an angle, without what that loses of small ones.
-pub(crate) fn below_one(angle: f64) -> f64 {
-    2.0 * (angle / 2.0).sin().powi(2)
-}
-
-fn pack_shapes(scene: &Scene) -> Vec<Primitive> {
-    let mut primitives = Vec::new();
-    for (number, shape) in scene.shapes.iter().enumerate() {
-        let (material, number) = (shape.material as u32, number as u32);
-        match &shape.geometry {
-            Geometry::Rectangle(rectangle) => {
-                primitives.push(parallelogram(RECTANGLE, rectangle, material, number));
-            }
-            Geometry::Disk(disk) => primitives.push(parallelogram(DISK, disk, material, number)),
-            Geometry::Ellipsoid { center, axes } => {
-                let [a, b, c] = *axes;
-                primitives.push(primitive(
-                    ELLIPSOID,
-                    *center,
-                    DMat3::from_cols(a, b, c),
-                    material,
-                    number,
-                ));
-            }
-            Geometry::Triangles(triangles) => {
-                for &[v0, v1, v2] in triangles {
-                    let (a, b) = (v1 - v0, v2 - v0);
-                    let columns = DMat3::from_cols(a, b, a.cross(b).normalize());
-                    primitives.push(primitive(TRIANGLE, v0, columns, material, number));
-                }
-            }
-            Geometry::Mesh { .. } => {}
-            Geometry::Plane {
-                point,
-                tangent,
-                bitangent,
-            } => {
-                let columns = DMat3::from_cols(*tangent, *bitangent, tangent.cross(*bitangent));
-                primitives.push(primitive(PLANE, *point, columns, material, number));
-            }
-        }
-    }
-    primitives
-}
-
-fn parallelogram(kind: u32, p: &Parallelogram, material: u32, shape: u32) -> Primitive {
-    primitive(
-        kind,
-        p.center,
-        DMat3::from_cols(p.u, p.v, p.u.cross(p.v).normalize()),
-        material,
-        shape,
-    )
-}
-
-/// The primitive whose local space is mapped to the world by `columns` and then `center`. An ellipsoid's anchor is the
-/// point of it on the way from its centre to the origin.
-pub(crate) fn primitive(kind: u32, center: DVec3, columns: DMat3, material: u32, shape: u32) -> Primitive {
-    let to_local = columns.inverse();
-    let rows = to_local.transpose();
-    let (mut anchor, mut middle) = (center.as_vec3(), DVec3::ZERO);
-    if kind == ELLIPSOID {
-        let outwards = (to_local * -center).normalize_or(DVec3::X);
-        anchor = (center + columns * outwards).as_vec3();
-        middle = to_local * (center - anchor.as_dvec3());
-    }
-    Primitive {
-        anchor,
-        material,
-        x: rows.x_axis.as_vec3(),
-        shape,
-        y: rows.y_axis.as_vec3(),
-        kind,
-        z: rows.z_axis.as_vec3(),
-        determinant: rows.determinant() as f32,
-        middle: middle.as_vec3(),
-        level: (middle.length_squared() - 1.0) as f32,
     }
 }

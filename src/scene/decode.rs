@@ -39,6 +39,16 @@ pub(super) enum Refused {
     Image(ImageError),
     /// By a rule, which is told.
     Rule(String),
+    /// It has other channels than those that are read.
+    Channels(Channels),
+}
+
+/// What an EXR file has that is not read.
+pub(super) struct Channels {
+    /// The channels of all its layers.
+    pub names: Vec<String>,
+    /// Whether their pixels hold any number of values each.
+    pub are_deep: bool,
 }
 
 impl From<ImageError> for Refused {

@@ -1,4 +1,5 @@
-//! EXR files of one channel, whatever its name, as gray: the image library reads such of red, green and blue alone.
+//! EXR files of one channel, whatever its name, as gray: the image library reads such of red, green and blue alone. What has
+//! neither is refused here, as only here its channels are known.
 
 use std::io::Cursor;
 
@@ -7,7 +8,10 @@ use exr::prelude::{ReadChannels as _, ReadLayers as _};
 use image::error::DecodingError;
 use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat};
 
-use super::decode::{Header, Refused};
+use super::decode::{Channels, Header, Refused};
+
+/// What a file of colours has.
+const COLORS: [&str; 3] = ["R", "G", "B"];
 
 /// The image, if the file has one layer with one channel, and perhaps an opacity `A`, which is ignored. `check` is asked
 /// before anything but the header is read.
@@ -17,14 +21,34 @@ pub(super) fn gray_exr(
 ) -> Result<Option<DynamicImage>, Refused> {
     let damaged = |error: Error| ImageError::Decoding(DecodingError::new(ImageFormat::OpenExr.into(), error));
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
-    let [header] = meta.headers.as_slice() else {
-        return Ok(None);
+    let names = |header: &exr::meta::header::Header| -> Vec<String> {
+        (header.channels.list.iter())
+            .map(|channel| channel.name.to_string())
+            .collect()
     };
-    let names = header.channels.list.iter().map(|channel| channel.name.to_string());
-    let names: Vec<String> = names.filter(|name| name != "A").collect();
-    let [name] = names.as_slice() else { return Ok(None) };
-    if header.deep {
+    let has_colors = |header: &exr::meta::header::Header| {
+        let names = names(header);
+        !header.deep && COLORS.iter().all(|color| names.iter().any(|name| name == color))
+    };
+    if meta.headers.iter().any(has_colors) {
         return Ok(None);
+    }
+    let refused = || {
+        Refused::Channels(Channels {
+            names: meta.headers.iter().flat_map(names).collect(),
+            are_deep: meta.headers.iter().all(|header| header.deep),
+        })
+    };
+    let [header] = meta.headers.as_slice() else {
+        return Err(refused());
+    };
+    let mut names = names(header);
+    names.retain(|name| name != "A");
+    let [name] = names.as_slice() else {
+        return Err(refused());
+    };
+    if header.deep {
+        return Err(refused());
     }
     let size = header.layer_size;
     let side = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);

@@ -9,7 +9,8 @@ use std::sync::Arc;
 use image::error::LimitErrorKind;
 use image::{DynamicImage, ImageError, ImageFormat};
 
-use super::decode::{Header, LONGEST_SIDE, Refused, decode};
+use super::decode::{Channels, Header, LONGEST_SIDE, Refused, decode};
+use super::parse::list;
 use super::texture::{Encoding, Image, Texels};
 
 /// The largest file, in bytes.
@@ -129,6 +130,7 @@ impl Assets {
         }
         let decoded = decode(&bytes, format, fits).map_err(|refused| match refused {
             Refused::Rule(rule) => rule,
+            Refused::Channels(channels) => format!("{file:?} {}", refused_channels(&channels)),
             Refused::Image(error) => format!("{file:?} {}", refused_image(&error)),
         })?;
         drop(bytes);
@@ -277,6 +279,17 @@ fn refused_image(error: &ImageError) -> String {
         ImageError::Limits(_) => "takes more memory when it is read than its header tells".to_string(),
         ImageError::Unsupported(_) => format!("must be of a kind that can be read: {error}"),
         _ => format!("is damaged or cut short: {error}"),
+    }
+}
+
+/// What is told of an EXR file that has no channels to be read, behind its name.
+fn refused_channels(channels: &Channels) -> String {
+    match channels.are_deep {
+        true => "must have one value for each pixel and channel; it is deep".to_owned(),
+        false => format!(
+            "must have the channels \"R\", \"G\" and \"B\", or one alone; it has {}",
+            list(&channels.names)
+        ),
     }
 }
 

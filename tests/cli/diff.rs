@@ -280,6 +280,11 @@ fn what_is_no_picture_exits_with_1() {
             assert_eq!(ran.stdout, "", "{name}");
         }
     }
+    // the cause is told once
+    for arguments in [["diff", "absent.png", "a.png"], ["diff", "a.png", "absent.png"]] {
+        let told = "error: absent.png: cannot be read: No such file or directory (os error 2)\n";
+        assert_eq!(place.run(&arguments).stderr, told);
+    }
     // the name's end says nothing
     png(&place, "a.exr", (4, 2), &a);
     says(&place.run(&["diff", "a.exr", "a.png"]), 0, "the same\n");

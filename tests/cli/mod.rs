@@ -13,20 +13,19 @@ mod output;
 mod outputs;
 mod pictures;
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use tempfile::TempDir;
-
+use crate::place::Place;
 use crate::sources::path as project;
 
-/// Lets the programs that this process starts be interrupted. A shell starts jobs in the background so that they ignore it,
-/// and so would the programs.
+/// Lets the programs that this process starts be interrupted, and told that their terminal is gone. A shell starts jobs in the background so
+/// that they ignore the one, `nohup` starts them so that they ignore the other, and so would the programs.
 #[cfg(unix)]
 pub fn heed_interrupts() {
     // SAFETY: setting the default action of a signal has no precondition; no handler of this process is lost.
     unsafe {
         libc::signal(libc::SIGINT, libc::SIG_DFL);
+        libc::signal(libc::SIGHUP, libc::SIG_DFL);
     }
 }
 
@@ -35,11 +34,6 @@ struct Ran {
     code: i32,
     stdout: String,
     stderr: String,
-}
-
-/// A folder of its own to run the program in, with a small scene in it.
-struct Place {
-    folder: TempDir,
 }
 
 /// 10 x 6 pixels, in which everything random differs from pixel to pixel.
@@ -74,31 +68,14 @@ tangent = [1, 0, 0]
 "#;
 
 impl Place {
+    /// A folder with a small scene in it.
     fn new() -> Place {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        fs::write(folder.path().join("small.toml"), SCENE).expect("a scene");
-        Place { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn read(&self, name: &str) -> Vec<u8> {
-        fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        fs::write(self.path(name), text).expect("a file");
+        Place::with_file("small.toml", SCENE)
     }
 
     /// The names of the files, hidden ones too, but for the small scene.
     fn files(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.folder.path()).expect("the folder");
-        let names = entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
-        let mut names: Vec<String> = names.filter(|name| name != "small.toml").collect();
-        names.sort();
-        names
+        self.files_but(|name| name == "small.toml")
     }
 
     fn run(&self, arguments: &[&str]) -> Ran {
@@ -109,7 +86,7 @@ impl Place {
     fn run_with(&self, arguments: &[&str], variables: &[(&str, &str)]) -> Ran {
         let mut command = assert_cmd::Command::new(program());
         command
-            .current_dir(self.folder.path())
+            .current_dir(self.folder())
             .args(arguments)
             .envs(variables.iter().copied());
         let output = command
@@ -127,7 +104,7 @@ impl Place {
     #[cfg(unix)]
     fn shell(&self, shell: &str, line: &str) -> Ran {
         let output = std::process::Command::new(shell)
-            .current_dir(self.folder.path())
+            .current_dir(self.folder())
             .args(["-c", line])
             .arg(program())
             .output()

@@ -6,8 +6,7 @@ use std::sync::OnceLock;
 use std::time::Duration;
 use std::{env, fs};
 
-use tempfile::TempDir;
-
+use crate::place::Place;
 use crate::sources::path as project;
 
 /// A scene of 40 x 30 pixels in which everything random differs from pixel to pixel.
@@ -140,27 +139,17 @@ impl Ran {
     }
 }
 
-/// A folder of its own with a scene in it.
-pub struct Place {
-    folder: TempDir,
-}
-
 impl Place {
-    pub fn new(scene: &str) -> Place {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        fs::write(folder.path().join("scene.toml"), scene).expect("a scene");
-        Place { folder }
-    }
-
-    pub fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+    /// A folder with a scene in it.
+    pub fn of(scene: &str) -> Place {
+        Place::with_file("scene.toml", scene)
     }
 
     /// The program, on the driver that has these faults.
-    pub fn command(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Command {
+    pub fn command_on(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_wgray"));
         command
-            .current_dir(self.folder.path())
+            .current_dir(self.folder())
             .args(["render", "scene.toml", "-o", "out.exr", "--aov", "normal"])
             .args(arguments)
             .envs(driver.environment(&self.path("log")))
@@ -169,20 +158,18 @@ impl Place {
     }
 
     /// Runs the program, which leaves nothing but a picture.
-    pub fn run(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Ran {
+    pub fn run_on(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Ran {
         let out = self.path("out.exr");
         for name in ["out.exr", "log"] {
             let _ = fs::remove_file(self.path(name)); // of the run before, if there was one
         }
-        let mut command = assert_cmd::Command::from_std(self.command(driver, arguments, faults));
+        let mut command = assert_cmd::Command::from_std(self.command_on(driver, arguments, faults));
         let output = command
             .timeout(Duration::from_secs(120))
             .output()
             .expect("the program runs");
-        let entries = fs::read_dir(self.folder.path()).expect("the folder");
-        let names = entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
-        let known = |name: &String| ["scene.toml", "log", "out.exr"].contains(&name.as_str()) || name.ends_with(".png");
-        let strange: Vec<String> = names.filter(|name| !known(name)).collect();
+        let known = |name: &str| ["scene.toml", "log", "out.exr"].contains(&name) || name.ends_with(".png");
+        let strange = self.files_but(known);
         assert_eq!(strange, [""; 0], "a part of a file");
         let stderr = String::from_utf8(output.stderr).expect("UTF-8");
         assert!(
@@ -200,14 +187,14 @@ impl Place {
 
     /// The picture by the CPU, which has no driver.
     pub fn expected(&self, driver: &Driver, arguments: &[&str]) -> Picture {
-        let ran = self.run(driver, &[arguments, &["--device", "cpu"]].concat(), &[]);
+        let ran = self.run_on(driver, &[arguments, &["--device", "cpu"]].concat(), &[]);
         assert_eq!((ran.code, ran.stderr.as_str(), ran.log.len()), (0, "", 0));
         ran.picture.expect("a picture")
     }
 
     /// Starts the program.
     pub fn start(&self, driver: &Driver, arguments: &[&str], faults: &[(&str, &str)]) -> Child {
-        let mut command = self.command(driver, arguments, faults);
+        let mut command = self.command_on(driver, arguments, faults);
         command.stderr(Stdio::piped()).spawn().expect("the program starts")
     }
 }

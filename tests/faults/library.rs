@@ -5,7 +5,9 @@ use std::process::Command;
 
 use wgray::{Device, Options, Picture, Scene};
 
-use super::driver::{Place, SCENE, driver};
+use crate::place::Place;
+
+use super::driver::{SCENE, driver};
 
 /// Set for the process that renders: to its scene file.
 const FILE: &str = "WGRAY_TEST_FAULTS_SCENE";
@@ -45,7 +47,7 @@ fn in_a_process_of_its_own() {
 #[test]
 fn pictures_survive() {
     let Some(driver) = driver() else { return };
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     // Of the first picture the samples; of the second, which has 6 submits before it, the samples and a look at them.
     for (lose, losses) in [("2", 1), ("2,7,10", 3), ("999", 0)] {
         let log = place.path("log");

@@ -5,7 +5,9 @@ use std::io::{Read as _, Write as _};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use super::driver::{Place, Ran, SCENE, driver};
+use crate::place::Place;
+
+use super::driver::{Ran, SCENE, driver};
 
 /// What may tell of a loss first.
 const WAYS: [&str; 3] = ["submit", "status", "wait"];
@@ -33,10 +35,10 @@ fn warned(ran: &Ran, anew: usize, rest: &[&str]) {
 #[test]
 fn without_faults_the_driver_renders_as_lavapipe_does() {
     let Some(driver) = driver() else { return };
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let expected = place.expected(driver, &[]);
     for device in [GPU, AUTO, ["--device", "llvmpipe"]] {
-        let ran = place.run(driver, &device, &[]);
+        let ran = place.run_on(driver, &device, &[]);
         assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{device:?}");
         assert_eq!(
             (ran.count("device"), ran.count("submit")),
@@ -47,19 +49,19 @@ fn without_faults_the_driver_renders_as_lavapipe_does() {
         assert!(ran.picture == Some(expected.clone()), "{device:?}");
     }
     // Bits are compared: another seed is another picture.
-    let other = place.run(driver, &["--device", "gpu", "--seed", "7"], &[]);
+    let other = place.run_on(driver, &["--device", "gpu", "--seed", "7"], &[]);
     assert!(other.code == 0 && other.picture != Some(expected));
 }
 
 #[test]
 fn a_device_that_is_lost_anywhere_is_opened_anew() {
     let Some(driver) = driver() else { return };
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let expected = place.expected(driver, &[]);
     for way in WAYS {
         for submit in 1..=SUBMITS {
             let at = submit.to_string();
-            let ran = place.run(driver, &GPU, &[("FAULTS_LOSE", &at), ("FAULTS_LOSE_IN", way)]);
+            let ran = place.run_on(driver, &GPU, &[("FAULTS_LOSE", &at), ("FAULTS_LOSE_IN", way)]);
             assert_eq!(ran.code, 0, "{way} {submit}: {}", ran.stderr);
             warned(&ran, 1, &[]);
             let happened = (
@@ -76,9 +78,9 @@ fn a_device_that_is_lost_anywhere_is_opened_anew() {
 #[test]
 fn a_device_that_is_lost_several_times_is_opened_as_often() {
     let Some(driver) = driver() else { return };
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let expected = place.expected(driver, &[]);
-    let twice = place.run(driver, &GPU, &[("FAULTS_LOSE", "2,4")]);
+    let twice = place.run_on(driver, &GPU, &[("FAULTS_LOSE", "2,4")]);
     assert_eq!((twice.code, twice.count("lost")), (0, 2), "{}", twice.stderr);
     warned(&twice, 2, &[]);
     assert!(twice.picture == Some(expected.clone()));
@@ -87,7 +89,7 @@ fn a_device_that_is_lost_several_times_is_opened_as_often() {
     let hits = twice.count("submit") - 1;
     let lose = format!("2,4,{hits},{}", hits + 2);
     // How many submits there are before them is a matter of time: on a busy machine the aim may be missed.
-    let mut runs = (0..5).map(|_| place.run(driver, &GPU, &[("FAULTS_LOSE", &lose)]));
+    let mut runs = (0..5).map(|_| place.run_on(driver, &GPU, &[("FAULTS_LOSE", &lose)]));
     let ran = runs.find(|ran| (ran.code, ran.count("lost")) == (0, 4));
     let ran = ran.unwrap_or_else(|| panic!("{lose}: no run of five survived four losses"));
     warned(&ran, 4, &[]);
@@ -98,11 +100,11 @@ fn a_device_that_is_lost_several_times_is_opened_as_often() {
 #[test]
 fn a_long_render_survives() {
     let Some(driver) = driver() else { return };
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let size = ["--size", "512x512", "--spp", "16"];
     let expected = place.expected(driver, &size);
     for way in WAYS {
-        let ran = place.run(
+        let ran = place.run_on(
             driver,
             &[&size[..], &GPU].concat(),
             &[("FAULTS_LOSE", "4"), ("FAULTS_LOSE_IN", way)],
@@ -116,19 +118,19 @@ fn a_long_render_survives() {
 #[test]
 fn a_device_that_never_comes_back_is_an_error_or_leaves_the_work_to_the_cpu() {
     let Some(driver) = driver() else { return };
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let expected = place.expected(driver, &[]);
     // Each waits for some seconds, so they do so together.
     let never = |lose: &str, device: &str| {
-        let place = Place::new(SCENE);
+        let place = Place::of(SCENE);
         let faults = [("FAULTS_LOSE", lose), ("FAULTS_REFUSE", "99")];
-        let ran = place.run(driver, &["--device", device], &faults);
+        let ran = place.run_on(driver, &["--device", device], &faults);
         assert_eq!((ran.code, ran.picture.is_some()), (6, false), "{lose}");
         warned(&ran, 1, &["error: llvmpipe"]);
         let end = "; it did not come back: its driver does not open it";
         assert!(ran.stderr.trim_end().ends_with(end), "{}", ran.stderr);
         assert_eq!((ran.count("device refused"), ran.count("lost")), (3, 1));
-        let ran = place.run(driver, &AUTO, &faults);
+        let ran = place.run_on(driver, &AUTO, &faults);
         assert_eq!(ran.code, 0, "{lose}: {}", ran.stderr);
         warned(&ran, 1, &["warning: rendering on the CPU: llvmpipe"]);
         assert!(ran.picture == Some(expected.clone()), "{lose}");
@@ -140,12 +142,12 @@ fn a_device_that_never_comes_back_is_an_error_or_leaves_the_work_to_the_cpu() {
         }
     });
     let faults = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "99")];
-    let ran = place.run(driver, &["--device", "auto", "--quiet"], &faults);
+    let ran = place.run_on(driver, &["--device", "auto", "--quiet"], &faults);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     assert!(ran.picture == Some(expected.clone()));
     // One that comes back late is waited for.
     let late = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "2")];
-    let ran = place.run(driver, &GPU, &late);
+    let ran = place.run_on(driver, &GPU, &late);
     assert_eq!((ran.code, ran.count("device refused")), (0, 2), "{}", ran.stderr);
     warned(&ran, 1, &[]);
     assert!(ran.picture == Some(expected));
@@ -154,12 +156,12 @@ fn a_device_that_never_comes_back_is_an_error_or_leaves_the_work_to_the_cpu() {
 #[test]
 fn a_device_that_is_lost_again_and_again_is_given_up() {
     let Some(driver) = driver() else { return };
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let expected = place.expected(driver, &[]);
     // In the warm-up it never becomes ready; in the samples it does, and is told of each time.
     let again = |lose: &str, told: usize| {
-        let place = Place::new(SCENE);
-        let ran = place.run(driver, &GPU, &[("FAULTS_LOSE", lose)]);
+        let place = Place::of(SCENE);
+        let ran = place.run_on(driver, &GPU, &[("FAULTS_LOSE", lose)]);
         assert_eq!((ran.code, ran.picture.is_some()), (6, false), "{lose}");
         assert_eq!(
             (ran.count("lost"), ran.count("device")),
@@ -168,7 +170,7 @@ fn a_device_that_is_lost_again_and_again_is_given_up() {
             ran.log
         );
         warned(&ran, told, &["error: llvmpipe"]);
-        let ran = place.run(driver, &AUTO, &[("FAULTS_LOSE", lose)]);
+        let ran = place.run_on(driver, &AUTO, &[("FAULTS_LOSE", lose)]);
         assert_eq!((ran.code, ran.count("lost")), (0, 4), "{lose}: {}", ran.stderr);
         warned(&ran, told, &["warning: rendering on the CPU: llvmpipe"]);
         assert!(ran.picture == Some(expected.clone()), "{lose}");
@@ -185,12 +187,12 @@ fn a_device_that_is_lost_again_and_again_is_given_up() {
 #[test]
 fn a_lost_device_that_cannot_be_given_back_is_no_end() {
     let Some(driver) = driver() else { return };
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let expected = place.expected(driver, &[]);
     for code in ["-1", "-2", "-13"] {
         for way in WAYS {
             let faults = [("FAULTS_LOSE", "2"), ("FAULTS_LOSE_IN", way), ("FAULTS_IDLE", code)];
-            let ran = place.run(driver, &GPU, &faults);
+            let ran = place.run_on(driver, &GPU, &faults);
             assert_eq!((ran.code, ran.count("lost")), (0, 1), "{code} {way}: {}", ran.stderr);
             assert!(ran.count("idle") > 0, "the driver was asked: {:?}", ran.log);
             warned(&ran, 1, &[]);
@@ -203,14 +205,14 @@ fn a_lost_device_that_cannot_be_given_back_is_no_end() {
 #[test]
 fn a_device_that_cannot_be_opened_is_tried_again_if_it_was_asked_for() {
     let Some(driver) = driver() else { return };
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let expected = place.expected(driver, &[]);
-    let ran = place.run(driver, &GPU, &[("FAULTS_REFUSE_FIRST", "2")]);
+    let ran = place.run_on(driver, &GPU, &[("FAULTS_REFUSE_FIRST", "2")]);
     assert_eq!((ran.code, ran.count("device refused")), (0, 2), "{}", ran.stderr);
     assert!(ran.picture == Some(expected.clone()));
-    let ran = place.run(driver, &GPU, &[("FAULTS_REFUSE_FIRST", "99")]);
+    let ran = place.run_on(driver, &GPU, &[("FAULTS_REFUSE_FIRST", "99")]);
     assert_eq!((ran.code, ran.picture.is_some()), (6, false), "{}", ran.stderr);
-    let ran = place.run(driver, &AUTO, &[("FAULTS_REFUSE_FIRST", "99")]);
+    let ran = place.run_on(driver, &AUTO, &[("FAULTS_REFUSE_FIRST", "99")]);
     assert_eq!(
         (ran.code, ran.count("device refused")),
         (0, 1),
@@ -223,10 +225,10 @@ fn a_device_that_cannot_be_opened_is_tried_again_if_it_was_asked_for() {
 #[test]
 fn a_slow_call_changes_nothing() {
     let Some(driver) = driver() else { return };
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let size = ["--size", "256x256"];
     let expected = place.expected(driver, &size);
-    let ran = place.run(driver, &[&size[..], &GPU].concat(), &[("FAULTS_SLEEP", "2:1500")]);
+    let ran = place.run_on(driver, &[&size[..], &GPU].concat(), &[("FAULTS_SLEEP", "2:1500")]);
     assert_eq!((ran.code, ran.stderr.as_str(), ran.count("sleep")), (0, "", 1));
     assert!(ran.picture == Some(expected));
 }
@@ -235,7 +237,7 @@ fn a_slow_call_changes_nothing() {
 fn waiting_for_a_device_can_be_interrupted() {
     let Some(driver) = driver() else { return };
     crate::cli::heed_interrupts();
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let faults = [("FAULTS_LOSE", "2"), ("FAULTS_REFUSE", "99")];
     let mut child = place.start(driver, &GPU, &faults);
     // Two devices were refused: the longest pause, of two seconds, has begun.
@@ -270,14 +272,14 @@ fn faults_at_random_change_nothing() {
     let cases = asked
         .as_ref()
         .map_or(4, |n| n.parse().expect("WGRAY_TEST_FAULTS is a number"));
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let size = ["--size", "320x240", "--spp", "16"];
     let expected = place.expected(driver, &size);
     let (mut losses, mut refused, mut on_cpu) = (0, 0, 0);
     for case in 0..cases {
         let faults = at_random(&mut Draws::new(case));
         let faults: Vec<(&str, &str)> = faults.iter().map(|(name, value)| (*name, value.as_str())).collect();
-        let ran = place.run(driver, &[&size[..], &AUTO].concat(), &faults);
+        let ran = place.run_on(driver, &[&size[..], &AUTO].concat(), &faults);
         assert_eq!(ran.code, 0, "{faults:?}: {}", ran.stderr);
         assert!(ran.picture.as_ref() == Some(&expected), "{faults:?}");
         losses += ran.count("lost");

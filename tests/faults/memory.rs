@@ -1,6 +1,8 @@
 //! A device that has no memory for what is asked: a message with the sizes, or the CPU.
 
-use super::driver::{Place, Ran, SCENE, driver};
+use crate::place::Place;
+
+use super::driver::{Ran, SCENE, driver};
 
 const ADVICE: &str = "; a crop or a smaller picture takes less there, and the CPU has the machine's own memory \
                       (--crop, --size, --device cpu)\n";
@@ -18,10 +20,10 @@ fn told(ran: &Ran, parts: &[&str]) {
 #[test]
 fn a_film_that_does_not_fit_tells_its_size() {
     let Some(driver) = driver() else { return };
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let (large, gpu) = (["--size", "1024x1024"], ["--device", "gpu"]);
     let expected = place.expected(driver, &large);
-    let ran = place.run(driver, &[large, gpu].concat(), &[("FAULTS_LARGEST", "8388608")]);
+    let ran = place.run_on(driver, &[large, gpu].concat(), &[("FAULTS_LARGEST", "8388608")]);
     let parts = [
         ": out of memory: its driver has no 16.0 MiB for a film of 1024 x 1024 pixels",
         ADVICE,
@@ -30,12 +32,12 @@ fn a_film_that_does_not_fit_tells_its_size() {
     assert!(ran.count("allocation") > 0 && ran.log.iter().any(|line| line.ends_with("of 16777216 refused")));
     // A part of it does fit, and so does everything in what is enough.
     let crop = ["--size", "1024x1024", "--crop", "0,0,1024,64", "--device", "gpu"];
-    let ran = place.run(driver, &crop, &[("FAULTS_LARGEST", "8388608")]);
+    let ran = place.run_on(driver, &crop, &[("FAULTS_LARGEST", "8388608")]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
-    let ran = place.run(driver, &[large, gpu].concat(), &[("FAULTS_LARGEST", "67108864")]);
+    let ran = place.run_on(driver, &[large, gpu].concat(), &[("FAULTS_LARGEST", "67108864")]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     assert!(ran.picture.as_ref() == Some(&expected));
-    let ran = place.run(
+    let ran = place.run_on(
         driver,
         &[large, ["--device", "auto"]].concat(),
         &[("FAULTS_LARGEST", "8388608")],
@@ -53,17 +55,17 @@ fn a_film_that_does_not_fit_tells_its_size() {
 #[test]
 fn memory_that_runs_out_anywhere_is_told_or_leaves_the_work_to_the_cpu() {
     let Some(driver) = driver() else { return };
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let large = ["--size", "1024x1024"];
     let expected = place.expected(driver, &large);
-    let free = place.run(driver, &[large, ["--device", "gpu"]].concat(), &[]);
+    let free = place.run_on(driver, &[large, ["--device", "gpu"]].concat(), &[]);
     let allocations = free.count("allocation");
     assert!((2..100).contains(&allocations), "{:?}", free.log);
     let mut refused = 0;
     for from in 1..=allocations {
         let from = from.to_string();
         let faults = [("FAULTS_NO_MEMORY_FROM", from.as_str())];
-        let ran = place.run(driver, &[large, ["--device", "gpu"]].concat(), &faults);
+        let ran = place.run_on(driver, &[large, ["--device", "gpu"]].concat(), &faults);
         // How many there are depends on how fast it goes.
         if ran.log.iter().any(|line| line.ends_with("refused")) {
             told(&ran, &[": out of memory: its driver has n"]);
@@ -71,7 +73,7 @@ fn memory_that_runs_out_anywhere_is_told_or_leaves_the_work_to_the_cpu() {
         } else {
             assert_eq!(ran.code, 0, "{from}: {}", ran.stderr);
         }
-        let ran = place.run(driver, &[large, ["--device", "auto"]].concat(), &faults);
+        let ran = place.run_on(driver, &[large, ["--device", "auto"]].concat(), &faults);
         assert_eq!(ran.code, 0, "{from}: {}", ran.stderr);
         assert!(ran.picture.as_ref() == Some(&expected), "{from}");
     }
@@ -83,17 +85,17 @@ fn a_scene_that_does_not_fit_tells_its_size() {
     let Some(driver) = driver() else { return };
     let textured = SCENE.replace("color = [0.5, 0.4, 0.3]", "color = { texture = \"large\" }")
         + "[textures.large]\ntype = \"image\"\nfile = \"large.png\"\n";
-    let place = Place::new(&textured);
+    let place = Place::of(&textured);
     // 4 MiB of texels, and a third of that of smaller copies.
     let large = image::RgbImage::from_fn(1024, 1024, |x, y| image::Rgb([x as u8, y as u8, (x * y) as u8]));
     large.save(place.path("large.png")).expect("an image");
     let limit = [("FAULTS_LARGEST", "4194304")];
-    let ran = place.run(driver, &["--device", "gpu"], &limit);
+    let ran = place.run_on(driver, &["--device", "gpu"], &limit);
     told(
         &ran,
         &[": out of memory: its driver has no 5.3 MiB for the scene; ", ADVICE],
     );
-    let ran = place.run(driver, &["--device", "gpu"], &[]);
+    let ran = place.run_on(driver, &["--device", "gpu"], &[]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
 }
 
@@ -101,17 +103,17 @@ fn a_scene_that_does_not_fit_tells_its_size() {
 #[test]
 fn a_call_that_has_no_memory_is_no_loss() {
     let Some(driver) = driver() else { return };
-    let place = Place::new(SCENE);
+    let place = Place::of(SCENE);
     let expected = place.expected(driver, &[]);
     for submit in ["1", "2", "3", "4", "5"] {
         let faults = [("FAULTS_NO_MEMORY_IN", submit)];
-        let ran = place.run(driver, &["--device", "gpu"], &faults);
+        let ran = place.run_on(driver, &["--device", "gpu"], &faults);
         told(&ran, &[": out of memory: its driver has no "]);
-        let ran = place.run(driver, &["--device", "auto"], &faults);
+        let ran = place.run_on(driver, &["--device", "auto"], &faults);
         assert_eq!((ran.code, ran.lines().len()), (0, 1), "{submit}: {}", ran.stderr);
         assert!(ran.picture.as_ref() == Some(&expected), "{submit}");
     }
     let refused = [("FAULTS_REFUSE_FIRST", "1"), ("FAULTS_REFUSE_WITH", "-2")];
-    let ran = place.run(driver, &["--device", "gpu"], &refused);
+    let ran = place.run_on(driver, &["--device", "gpu"], &refused);
     told(&ran, &[": out of memory: its driver has none to open it with; "]);
 }

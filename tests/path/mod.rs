@@ -3,6 +3,7 @@
 
 mod alpha;
 mod ends;
+mod energy;
 mod environment;
 mod environment_files;
 mod forms;

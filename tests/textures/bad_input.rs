@@ -3,9 +3,11 @@
 use std::path::Path;
 use std::process::Command;
 
-use wgray::scene::{Overrides, Scene};
+use wgray::scene::{Overrides, Scene, Texels, TextureKind};
 
 use super::{write_exr, write_png};
+
+const PAGE: &str = include_str!("../../docs/scene-format.md");
 
 const START: &str = "\
 image = { width = 4, height = 4 }
@@ -350,15 +352,15 @@ fn bad_values_are_told() {
         ),
         (
             "[materials.m]\ntype = 'glass'\nior = 0".into(),
-            "5: materials.m.ior: 0 must be greater than 0, from 0.01 to 100",
+            "5: materials.m.ior: 0 must be from 0.01 to 100",
         ),
         (
             "[materials.m]\ntype = 'glass'\nior = -1.5".into(),
-            "5: materials.m.ior: -1.5 must be greater than 0, from 0.01 to 100",
+            "5: materials.m.ior: -1.5 must be from 0.01 to 100",
         ),
         (
             "[materials.m]\ntype = 'glass'\nior = nan".into(),
-            "5: materials.m.ior: nan must be greater than 0, from 0.01 to 100",
+            "5: materials.m.ior: nan must be from 0.01 to 100",
         ),
         ("[materials.m]\ntype = 'glass'".into(), "3: materials.m.ior: is missing"),
         (
@@ -419,4 +421,63 @@ fn the_command_line_ends_with_exit_code_3() {
     );
     let good = check("[textures.t]\ntype = 'image'\nfile = 'good.png'");
     assert_eq!(good.status.code(), Some(0), "{good:?}");
+}
+
+/// Whatever key takes a texture's channel, as the page says: what is no image has no alpha, and an image's is that of its file.
+#[test]
+fn alpha_is_that_of_an_image() {
+    let folder = tempfile::tempdir().unwrap();
+    image::GrayAlphaImage::from_fn(4, 4, |x, _| image::LumaA([60 * x as u8, 255 - x as u8]))
+        .save(folder.path().join("a.png"))
+        .unwrap();
+    write_png(&folder.path().join("opaque.png"), 4, 4, |x, _| [x as u8 * 60; 3]);
+    let mut keys = Vec::new();
+    for part in PAGE.split("\n### `[materials.NAME]` of type `\"").skip(1) {
+        let (kind, part) = part.split_once('"').unwrap();
+        let part = part.split("\n#").next().unwrap();
+        let needed = match kind {
+            "diffuse" => "color = [1, 1, 1]",
+            "dielectric" => "ior = 1.5",
+            _ => "",
+        };
+        for row in part.lines().filter(|row| row.contains("number or texture")) {
+            let key = row.split('`').nth(1).unwrap();
+            let scene = |texture: &str| {
+                let text = format!(
+                    "render.integrator = 'path'\n[materials.m]\ntype = '{kind}'\n{needed}\n\
+                     {key} = {{ texture = 't', channel = 'a' }}\n[textures.t]\n{texture}\n"
+                );
+                load(folder.path(), &text)
+            };
+            let told = |rule: &str| format!("7: materials.m.{key}.channel: {rule}");
+            for texture in [
+                "type = 'constant'\ncolor = [1, 1, 1]",
+                "type = 'checker'\neven = [0, 0, 0]\nodd = [1, 1, 1]",
+                "type = 'grid'\ncell = [0, 0, 0]\nline = [1, 1, 1]\nline_width = 0.1",
+            ] {
+                let rule = "\"t\" must be a texture of type \"image\" to have alpha";
+                assert_eq!(scene(texture).unwrap_err(), told(rule), "{kind}");
+            }
+            let rule = "\"opaque.png\" must have an alpha channel";
+            let message = scene("type = 'image'\nfile = 'opaque.png'").unwrap_err();
+            assert_eq!(message, told(rule), "{kind}");
+            let scene = scene("type = 'image'\nfile = 'a.png'").unwrap();
+            let TextureKind::Image { image, .. } = &scene.textures[1].kind else {
+                panic!("{kind}.{key}: no image");
+            };
+            let Texels::Bytes(_, texels) = &image.texels else {
+                panic!("{kind}.{key}: no bytes");
+            };
+            assert_eq!(texels[..4], [[255; 3], [254; 3], [253; 3], [252; 3]], "{kind}.{key}");
+            keys.push(format!("{kind}.{key}"));
+        }
+    }
+    for key in [
+        "diffuse.roughness",
+        "conductor.roughness",
+        "dielectric.roughness",
+        "principled.alpha",
+    ] {
+        assert!(keys.iter().any(|known| known == key), "{key} is not among {keys:?}");
+    }
 }

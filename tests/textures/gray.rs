@@ -53,9 +53,24 @@ fn one_channel_is_gray_whatever_its_name_and_type() {
 fn two_channels_that_are_no_colour_are_refused_and_damage_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.exr");
-    write(&path, &["U", "V"], FlatSamples::F32);
-    let message = load(folder.path()).unwrap_err();
-    assert!(message.contains("textures.t.file: \"t.exr\" "), "{message}");
+    for (names, told) in [
+        (vec!["U", "V"], "\"U\", \"V\""),
+        (vec!["G", "B"], "\"B\", \"G\""),
+        (vec!["A"], "\"A\""),
+        (vec!["A", "G", "R"], "\"A\", \"G\", \"R\""),
+        (
+            vec!["light.R", "light.G", "light.B"],
+            "\"light.B\", \"light.G\", \"light.R\"",
+        ),
+    ] {
+        write(&path, &names, FlatSamples::F32);
+        let message = load(folder.path()).unwrap_err();
+        let rule = "\"t.exr\" must have the channels \"R\", \"G\" and \"B\", or one alone; it has";
+        assert!(
+            message.ends_with(&format!(":5: textures.t.file: {rule} {told}")),
+            "{message}"
+        );
+    }
     write(&path, &["Y"], FlatSamples::F32);
     let bytes = std::fs::read(&path).unwrap();
     for length in [20, bytes.len() / 2, bytes.len() - 1] {

@@ -19,8 +19,9 @@ const PIXELS_OF_JPEG: u64 = 8 * 32 * 32;
 #[derive(Debug, thiserror::Error)]
 pub enum Unreadable {
     /// The file cannot be opened or read.
+    // Its text is in the message, so it is not named as the source, and is told once.
     #[error("cannot be read: {0}")]
-    Io(#[from] io::Error),
+    Io(io::Error),
     /// It is a folder.
     #[error("is a folder; a picture is a file")]
     Folder,
@@ -114,6 +115,12 @@ pub(super) fn room<T>(width: u64, height: u64, count: u64) -> Result<Vec<T>, Unr
     match usize::try_from(count) {
         Ok(count) if values.try_reserve_exact(count).is_ok() => Ok(values),
         _ => Err(refused),
+    }
+}
+
+impl From<io::Error> for Unreadable {
+    fn from(error: io::Error) -> Self {
+        Unreadable::Io(error)
     }
 }
 

@@ -65,8 +65,10 @@ pub fn begin_path(scene: &Packed, pixel: UVec2, sample: u32) -> PathState {
         left: NOWHERE,
         wall: NOWHERE,
     };
+    let mut way = 0.0;
     if scene.specialization.hidden != 0 {
         path = seen_path(scene, path);
+        way = dot(path.ray.origin - start.ray.origin, path.ray.direction);
     }
     PathState {
         path,
@@ -81,7 +83,7 @@ pub fn begin_path(scene: &Packed, pixel: UVec2, sample: u32) -> PathState {
         described: false,
         start: Vec3::ZERO,
         start_normal: Vec3::ZERO,
-        way: 0.0,
+        way,
         passed: 0,
     }
 }
@@ -116,11 +118,6 @@ pub fn advance(scene: &Packed, before: PathState, pixel: UVec2) -> PathState {
         looked = bounded(look.material);
         (&looked, look.normal, look.coat_normal)
     };
-    if s.absorption != 0 {
-        let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
-        let absorption = if inside { material.absorption } else { state.absorption };
-        state.path.throughput *= transmittance(absorption, hit.t);
-    }
     if s.sees_through != 0
         && !is_there(
             scene,
@@ -134,6 +131,11 @@ pub fn advance(scene: &Packed, before: PathState, pixel: UVec2) -> PathState {
         )
     {
         return past(scene, state, surface, at, hit.t);
+    }
+    if s.absorption != 0 {
+        let inside = has_inside(material) & (surface.side < 0.0) & (material.alpha_mode == OPAQUE);
+        let absorption = if inside { material.absorption } else { state.absorption };
+        state.path.throughput *= transmittance(absorption, hit.t + state.way);
     }
     if s.shines != 0 {
         state = with_emission(scene, state, &spot, hit, surface, material, true);
@@ -307,7 +309,9 @@ pub fn past(scene: &Packed, before: PathState, surface: Surface, at: Arrival, t:
     let mut state = before;
     state.path = passed_path(before.path, surface, at);
     if scene.specialization.hidden != 0 && before.path.depth == 0 {
+        let start = state.path.ray;
         state.path = seen_path(scene, state.path);
+        state.way += dot(state.path.ray.origin - start.origin, start.direction);
     }
     state.way += t;
     state.passed += 1;
@@ -389,11 +393,13 @@ pub fn with_light(
     let light = sample_emitter(scene, chosen, surface.start, u);
     let reflected = reflection(scene, spot, surface, material, mixture, normalize(light.to));
     let mut found = state.path.throughput * reflected.value * light.radiance * (1.0 / light.pdf);
-    let mut from_side = *surface;
+    let turned;
+    let mut from_side = surface;
     let mut to = light.to;
     let mut absorption = state.absorption;
     if lets_through(material) & (dot(surface.normal, to) < 0.0) {
-        from_side = turned_over(scene, surface);
+        turned = turned_over(scene, surface);
+        from_side = &turned;
         to = light.to
             + if light.reach < 2.0 {
                 surface.start - from_side.start
@@ -415,10 +421,10 @@ pub fn with_light(
     if scene.specialization.sees_through != 0 {
         let bounce = state.path.depth + 1;
         let (reach, goal) = (light.reach, light.primitive);
-        let veiled = is_veiled(scene, dark, &from_side, to, reach, goal, pixel, state.sample, bounce);
+        let veiled = is_veiled(scene, dark, from_side, to, reach, goal, pixel, state.sample, bounce);
         return with_radiance(scene, state, found, !veiled, bounce);
     }
-    let hidden = is_hidden(scene, dark, &from_side, to, light.reach, light.primitive);
+    let hidden = is_hidden(scene, dark, from_side, to, light.reach, light.primitive);
     with_radiance(scene, state, found, !hidden, state.path.depth + 1)
 }
 
@@ -495,9 +501,11 @@ pub fn scattered_by_lobe(
     let wi = normalize(vector_from_lobe(frame, surface.shading_normal, found.wi));
     let lit = lets_light(scene, spot, surface, material, wi);
     let weight = if lit { found.weight } else { Vec3::ZERO };
-    let mut from_side = *surface;
+    let turned;
+    let mut from_side = surface;
     if found.wi.z < 0.0 {
-        from_side = turned_over(scene, surface);
+        turned = turned_over(scene, surface);
+        from_side = &turned;
         state.eta2 = before.eta2 * found.eta * found.eta;
         state.absorption = absorption_behind(before.absorption, surface, material);
     }

@@ -2,10 +2,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 
 use super::*;
-use crate::cpu::light_tree::{first_share, light_importance, light_sibling};
+use crate::cpu::light_tree::{light_child, light_importances, light_shares};
 
 /// Numbers from 0 to 1, by a linear congruence.
 struct Random(u64);
@@ -139,23 +139,27 @@ fn the_measure_of_a_cone_is_the_integral_of_its_weights() {
     }
 }
 
-/// The probability of each lamp at p, by the way down the tree.
-fn probabilities(nodes: &[LightNode], p: Vec3, n: Vec3) -> Vec<f64> {
-    let mut found = vec![0.0; nodes.len().div_ceil(2)];
+/// The children of a node: which they are, and the node below.
+fn children(node: &LightNode) -> impl Iterator<Item = (usize, u32)> {
+    (0..WIDTH)
+        .filter(|i| node.intensity[*i] > 0.0)
+        .map(|i| (i, node.children[i]))
+}
+
+/// The probability of each of so many lamps at p, by the way down the tree.
+fn probabilities(nodes: &[LightNode], count: usize, p: Vec3, n: Vec3) -> Vec<f64> {
+    let mut found = vec![0.0; count];
     let mut waiting = vec![(0_usize, 1.0)];
-    while let Some((i, probability)) = waiting.pop() {
-        let node = &nodes[i];
-        if node.children == NOTHING {
-            found[node.index as usize] = probability;
-            continue;
+    while let Some((number, probability)) = waiting.pop() {
+        let node = &nodes[number];
+        let shares = light_shares(light_importances(node, p, n));
+        for (i, below) in children(node) {
+            let probability = probability * f64::from(shares[i]);
+            match below {
+                NOTHING => found[node.index[i] as usize] = probability,
+                below => waiting.push((below as usize, probability)),
+            }
         }
-        let children = node.children as usize;
-        let share = first_share(
-            light_importance(&nodes[children], p, n),
-            light_importance(&nodes[children + 1], p, n),
-        );
-        waiting.push((children, probability * f64::from(share)));
-        waiting.push((children + 1, probability * f64::from(1.0 - share)));
     }
     found
 }
@@ -166,7 +170,14 @@ fn probabilities_sum_to_one_and_whatever_can_shine_has_one() {
     for (count, two_sided) in [(1, false), (2, false), (17, true), (300, false), (300, true)] {
         let lamps: Vec<Lamp> = (0..count).map(|i| random.lamp(i, two_sided)).collect();
         let nodes = build(&lamps);
-        assert_eq!(nodes.len(), 2 * lamps.len() - 1);
+        assert_eq!(
+            nodes
+                .iter()
+                .flat_map(children)
+                .filter(|(_, below)| *below == NOTHING)
+                .count(),
+            lamps.len()
+        );
         let mut dark = 0;
         for _ in 0..200 {
             let p = random.point() * 6.0;
@@ -175,7 +186,7 @@ fn probabilities_sum_to_one_and_whatever_can_shine_has_one() {
             } else {
                 random.direction()
             };
-            let found = probabilities(&nodes, p.as_vec3(), n.as_vec3());
+            let found = probabilities(&nodes, lamps.len(), p.as_vec3(), n.as_vec3());
             let sum: f64 = found.iter().sum();
             assert!((sum - 1.0).abs() < 1e-5, "{sum}");
             for lamp in &lamps {
@@ -206,27 +217,39 @@ fn nodes_know_their_parents_and_hold_their_children() {
     let mut random = Random(3);
     let lamps: Vec<Lamp> = (0..1000).map(|i| random.lamp(i, false)).collect();
     let nodes = build(&lamps);
+    assert_eq!(nodes[0].parent.x, NOTHING);
+    assert!(nodes.len() < 500, "most nodes are full: {}", nodes.len());
+    let center = |node: &LightNode, i: usize| Vec3::new(node.x[i], node.y[i], node.z[i]);
     let (mut seen, mut leaves) = (0, 0);
     let mut waiting = vec![0_u32];
-    while let Some(i) = waiting.pop() {
+    while let Some(number) = waiting.pop() {
         seen += 1;
-        let node = &nodes[i as usize];
-        if node.children == NOTHING {
-            leaves += 1;
-            continue;
+        let node = &nodes[number as usize];
+        for (i, below) in children(node) {
+            if below == NOTHING {
+                leaves += 1;
+                continue;
+            }
+            let inside = &nodes[below as usize];
+            assert_eq!(inside.parent.x, 4 * number + i as u32);
+            let mut sum = 0.0;
+            for (j, _) in children(inside) {
+                // Spheres around boxes: that of a part may stick out, but its middle does not.
+                assert!((center(node, i) - center(inside, j)).length() <= node.radius[i] * 1.0001);
+                sum += inside.intensity[j];
+            }
+            assert!((sum - node.intensity[i]).abs() <= 1e-5 * node.intensity[i]);
+            waiting.push(below);
         }
-        for child in [node.children, node.children + 1] {
-            assert_eq!(nodes[child as usize].parent, i);
-            assert_eq!(light_sibling(child), if child % 2 == 1 { child + 1 } else { child - 1 });
-            let (a, b) = (node, &nodes[child as usize]);
-            // Spheres around boxes: that of a part may stick out, but its middle does not.
-            assert!((a.center - b.center).length() <= a.radius * 1.0001);
-            waiting.push(child);
-        }
-        let sum = nodes[node.children as usize].intensity + nodes[node.children as usize + 1].intensity;
-        assert!((sum - node.intensity).abs() <= 1e-5 * node.intensity);
     }
     assert_eq!((seen, leaves), (nodes.len(), lamps.len()));
+}
+
+/// The mean of what is above 0 of a height, by many heights.
+fn mean_above(middle: f64, radius: f64) -> f64 {
+    let steps = 2000;
+    let heights = (0..steps).map(|i| middle + radius * (2.0 * (f64::from(i) + 0.5) / f64::from(steps) - 1.0));
+    heights.map(|height| height.max(0.0)).sum::<f64>() / f64::from(steps)
 }
 
 #[test]
@@ -256,10 +279,12 @@ fn importance_is_what_angles_say() {
         };
         let leaving = (along - lamp.cone.spread).max(0.0);
         let facing = n.angle_between(to);
-        let share = |cosine: f64| (cosine + radius / distance) / (1.0 + radius / distance);
-        let value = share(leaving.cos()).max(1e-3) * share(facing.cos()).max(1e-3)
-            / (distance * distance + 0.5 * radius * radius);
-        let found = f64::from(light_importance(&node, p.as_vec3(), n.as_vec3()));
+        let around = distance * distance + 0.1 * radius * radius;
+        let height = |angle: f64| mean_above(distance * angle.cos(), radius).max(0.03 * radius);
+        let value = height(leaving) * height(facing) / (around * around);
+        let found = light_importances(&node, p.as_vec3(), n.as_vec3());
+        assert_eq!((found.y, found.z, found.w), (0.0, 0.0, 0.0), "there is one child");
+        let found = f64::from(found.x);
         if leaving - seen < lamp.cone.edge && facing - seen < FRAC_PI_2 {
             compared += 1;
             assert!(
@@ -277,6 +302,48 @@ fn importance_is_what_angles_say() {
 }
 
 #[test]
+fn shares_are_those_of_importances_and_numbers_choose_by_them() {
+    let mut random = Random(5);
+    for _ in 0..2_000 {
+        let importances = Vec4::from_array([(); 4].map(|()| match (random.unit() * 4.0) as u32 {
+            0 => 0.0,
+            1 => 1e-36,
+            _ => (random.unit() * 60.0 - 30.0).exp() as f32,
+        }));
+        let shares = light_shares(importances);
+        let sum: f64 = importances.to_array().iter().map(|x| f64::from(*x)).sum();
+        assert!((shares.element_sum() - 1.0).abs() < 1e-6, "{importances}: {shares}");
+        if sum == 0.0 {
+            assert_eq!(shares, Vec4::X);
+            continue;
+        }
+        for i in 0..WIDTH {
+            let share = f64::from(importances[i]) / sum;
+            // At most three others are as rare as 2^-12 at least.
+            assert!(
+                (f64::from(shares[i]) - share).abs() < 4.0 / 4096.0,
+                "{importances}: {shares}"
+            );
+            assert_eq!(shares[i] > 0.0, importances[i] > 0.0);
+            assert!(shares[i] == 0.0 || shares[i] > 0.999 / 4096.0);
+        }
+        let mut counts = [0_u32; WIDTH];
+        let steps = 4096_u16;
+        for k in 0..steps {
+            counts[light_child(shares, f32::from(k) / f32::from(steps)) as usize] += 1;
+        }
+        for i in 0..WIDTH {
+            let expected = f64::from(shares[i]) * f64::from(steps);
+            assert!((f64::from(counts[i]) - expected).abs() <= 2.0, "{shares}: {counts:?}");
+            assert!(shares[i] > 0.0 || counts[i] == 0);
+        }
+        // The last number of all.
+        let last = light_child(shares, 1.0 - f32::EPSILON / 2.0) as usize;
+        assert!(shares[last] > 0.0, "{shares}: {last}");
+    }
+}
+
+#[test]
 fn lamps_in_one_place_and_in_a_row_make_trees_of_few_levels() {
     let at = |i: u32, p: DVec3, intensity: f64| Lamp {
         low: p,
@@ -291,8 +358,8 @@ fn lamps_in_one_place_and_in_a_row_make_trees_of_few_levels() {
         let nodes = build(lamps);
         let levels = |mut i: usize| {
             let mut levels = 0;
-            while nodes[i].parent != NOTHING {
-                i = nodes[i].parent as usize;
+            while nodes[i].parent.x != NOTHING {
+                i = nodes[i].parent.x as usize / 4;
                 levels += 1;
             }
             levels
@@ -301,9 +368,9 @@ fn lamps_in_one_place_and_in_a_row_make_trees_of_few_levels() {
     };
     let count = 20_000;
     let one_place: Vec<Lamp> = (0..count).map(|i| at(i, DVec3::ONE, 1.0)).collect();
-    assert_eq!(depth(&one_place), 15);
+    assert!(depth(&one_place) <= 8, "{}", depth(&one_place));
     let row: Vec<Lamp> = (0..count).map(|i| at(i, DVec3::X * f64::from(i), 1.0)).collect();
-    assert!(depth(&row) <= 24, "{}", depth(&row));
+    assert!(depth(&row) <= 12, "{}", depth(&row));
     // Each a thousandth of the next: split off one by one, were it not for the bound.
     let falling: Vec<Lamp> = (0..300)
         .map(|i| at(i, DVec3::X * 0.5_f64.powi(i as i32), 0.001_f64.powi(i as i32 % 90)))

@@ -32,6 +32,8 @@ impl MaterialDescription {
     pub(in crate::scene) fn values(&self) -> Vec<&ValueDescription> {
         match self {
             Self::Diffuse(diffuse) => vec![&diffuse.roughness],
+            Self::Conductor(conductor) => vec![&conductor.roughness],
+            Self::Dielectric(dielectric) => vec![&dielectric.roughness],
             Self::Principled(principled) => vec![
                 &principled.metallic,
                 &principled.roughness,
@@ -43,7 +45,7 @@ impl MaterialDescription {
                 &principled.sheen_roughness,
                 &principled.alpha,
             ],
-            _ => Vec::new(),
+            Self::Phong(_) | Self::Mirror(_) | Self::Glass(_) => Vec::new(),
         }
     }
 }

@@ -25,7 +25,7 @@ use super::description::{
     MaterialDescription, MeshFileDescription, ShapeDescription, TextureDescription,
 };
 use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
-use super::validate::{DEEPEST, MOST, depths};
+use super::validate::{BLADES, DEEPEST, MOST, depths};
 
 pub(super) use syntax::{NOT_UTF8, syntax_error};
 
@@ -337,8 +337,12 @@ fn read<T: DeserializeOwned>(table: Table) -> Result<T, Problem> {
 
 /// Reads a table. What it may say depends on the integrator.
 pub(super) fn read_for<T: DeserializeOwned>(table: Table, integrator: Integrator) -> Result<T, Problem> {
+    let read = |table: Table| serde_path_to_error::deserialize(table);
     // The copy is for the message: reading consumes the values.
-    serde_path_to_error::deserialize(table.clone()).map_err(|error| explain(error, table, false, integrator))
+    read(table.clone()).map_err(|error| {
+        let error = with_names(error, &table, |table| read(table).err());
+        explain(error, table, false, integrator)
+    })
 }
 
 fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) -> Result<T, Problem> {
@@ -352,7 +356,11 @@ fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) -> Result<T, 
     };
     let body = table.clone();
     match tag.as_str().and_then(|tag| T::read(tag, body)) {
-        Some(result) => result.map_err(|error| explain(error, table, true, Integrator::Phong)),
+        Some(result) => result.map_err(|error| {
+            let read = |body| tag.as_str().and_then(|tag| T::read(tag, body)?.err());
+            let error = with_names(error, &table, read);
+            explain(error, table, true, Integrator::Phong)
+        }),
         None => {
             let message = format!("{} must be one of {}", show(&tag), list(T::TYPES));
             Err(Problem::new(message).at("type"))
@@ -380,6 +388,34 @@ pub(super) fn list<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String 
 fn show(value: &Value) -> String {
     cut(&value.to_string().replace('\n', " ")).into_owned()
 }
+
+/// Where a value must be one of some names, serde tells them to a text alone: another value is told by the error that a text in
+/// its place gives.
+fn with_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<ReadError>) -> ReadError {
+    if !error.inner().message().ends_with(NAMES_EXPECTED) {
+        return error;
+    }
+    let mut with_text = Value::Table(table.clone());
+    let mut value = Some(&mut with_text);
+    for segment in segments(error.path()) {
+        value = match segment {
+            Segment::Key(key) => value.and_then(|value| value.get_mut(key)),
+            Segment::Index(index) => value.and_then(|value| value.get_mut(index)),
+        };
+    }
+    if let Some(value) = value {
+        *value = Value::from("?");
+    }
+    let told = match with_text {
+        Value::Table(table) => read(table),
+        _ => None,
+    };
+    let is_same = |told: &ReadError| told.path().to_string() == error.path().to_string();
+    told.filter(is_same).unwrap_or(error)
+}
+
+/// How serde's message ends where a value is no text and must be one of some names.
+const NAMES_EXPECTED: &str = ", expected string only";
 
 /// Makes a problem of serde's error while reading `table`, which has lost its key `type` if it is `tagged`.
 fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator) -> Problem {
@@ -411,6 +447,7 @@ fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator)
     } else if let (Some((_, expected)), Some(value)) = (message.rsplit_once(", expected "), value) {
         let rule = match expected {
             "f64" => "a number",
+            "a boolean" => "true or false",
             "u32" => &whole(path.last(), integrator),
             "a sequence of 3 f64 values" => "a list of 3 numbers",
             "an array of length 2" => "a list of 2 numbers",
@@ -448,6 +485,9 @@ pub(super) fn segments(path: &serde_path_to_error::Path) -> Vec<Segment> {
 
 /// What a key's whole number must be. How small it may be exactly is checked later, beside other keys.
 fn whole(key: Option<&Segment>, integrator: Integrator) -> String {
+    if key == Some(&Segment::from("blades")) {
+        return format!("0 or a whole number from {} to {}", BLADES.0, BLADES.1);
+    }
     let (low, high) = match key {
         Some(Segment::Key(key)) if key == "seed" => (0, u32::MAX),
         Some(Segment::Key(key)) if key == "max_depth" => depths(integrator),

@@ -86,11 +86,47 @@ fn bad_text_is_told_with_its_line() {
             "render.rr_depth: 1.5 must be a whole number from 0 to 1024",
         ),
         ("[render]\nclamp = 'off'", 2, "render.clamp: \"off\" must be a number"),
-        ("[render]\nalpha = 1", 2, "render.alpha: 1 must be a boolean"),
+        ("[render]\nalpha = 1", 2, "render.alpha: 1 must be true or false"),
         (
             "[environment]\nname = 'moon'",
             2,
             "environment.name: \"moon\" must be \"studio\" or \"sky\"",
+        ),
+        (
+            "[environment]\nname = 3",
+            2,
+            "environment.name: 3 must be \"studio\" or \"sky\"",
+        ),
+        (
+            "[environment]\nvisible = 1",
+            2,
+            "environment.visible: 1 must be true or false",
+        ),
+        (
+            "[render]\nintegrator = ['path']",
+            2,
+            "render.integrator: [\"path\"] must be \"phong\" or \"path\"",
+        ),
+        (
+            "[render]\npixel_samples = { pattern = 3, count = 4 }",
+            2,
+            "render.pixel_samples.pattern: 3 must be one of \"grid\", \"rotated_grid\", \"jittered\", \"random\", \
+             \"halton\", \"sobol\"",
+        ),
+        (
+            "[materials.a]\ntype = 'principled'\nalpha_mode = true",
+            3,
+            "materials.a.alpha_mode: true must be one of \"opaque\", \"mask\", \"blend\"",
+        ),
+        (
+            "[materials.a]\ntype = 'principled'\nalpha = { texture = 't', channel = 4 }",
+            3,
+            "materials.a.alpha.channel: 4 must be one of \"r\", \"g\", \"b\", \"a\"",
+        ),
+        (
+            "blades = 2.5",
+            1,
+            "camera.blades: 2.5 must be 0 or a whole number from 3 to 16",
         ),
         (
             "[environment]\ncolor = 1",

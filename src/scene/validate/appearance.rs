@@ -442,11 +442,7 @@ fn is_visible(description: &MaterialDescription) -> bool {
 }
 
 fn ior(ior: f64) -> Checked<f64> {
-    check((1.0 / DENSEST..=DENSEST).contains(&ior), || {
-        let (ior, low, high) = (number(ior), number(1.0 / DENSEST), number(DENSEST));
-        format!("{ior} must be greater than 0, from {low} to {high}")
-    })?;
-    Ok(ior)
+    between(ior, 1.0 / DENSEST, DENSEST)
 }
 
 fn absorption(absorption: DVec3) -> Checked<DVec3> {

@@ -16,7 +16,7 @@ const APERTURES: (f64, f64) = (0.0, 1e9);
 /// Focal lengths over diameters.
 const F_NUMBERS: (f64, f64) = (0.1, 1e9);
 /// Corners of lenses that are not round.
-const BLADES: (u32, u32) = (3, 16);
+pub(in crate::scene) const BLADES: (u32, u32) = (3, 16);
 /// By how many degrees they are turned.
 const ROTATIONS: (f64, f64) = (-360.0, 360.0);
 
@@ -99,7 +99,7 @@ fn lens_of(camera: &PerspectiveDescription) -> Checked<Option<Lens>> {
     camera.focus_distance.map(length).transpose().at("focus_distance")?;
     let blades = camera.blades;
     check(blades == 0 || (BLADES.0..=BLADES.1).contains(&blades), || {
-        format!("{blades} must be 0, or from {} to {}", BLADES.0, BLADES.1)
+        format!("{blades} must be 0 or a whole number from {} to {}", BLADES.0, BLADES.1)
     })
     .at("blades")?;
     let rotation = between(camera.blade_rotation, ROTATIONS.0, ROTATIONS.1).at("blade_rotation")?;

@@ -28,6 +28,7 @@ use super::{
     ShapeDescription, Texture, ViewSettings,
 };
 
+pub(super) use self::camera::BLADES;
 pub(super) use self::path::LIGHT_SAMPLES;
 
 /// Largest absolute coordinate.
@@ -272,12 +273,7 @@ fn rr_depth(depth: u32) -> Checked<u32> {
 }
 
 fn clamp(most: f64) -> Checked<f64> {
-    let (low, high) = CLAMPS;
-    check((low..=high).contains(&most), || {
-        let [most, low, high] = [most, low, high].map(number);
-        format!("{most} must be greater than 0, from {low} to {high}")
-    })?;
-    Ok(most)
+    between(most, CLAMPS.0, CLAMPS.1)
 }
 
 /// A value of a key that only paths have, if it is there.

@@ -1,6 +1,9 @@
 //! What a scene has for the path tracer alone, and what it ignores.
 
-use super::super::{Integrator, Reflection, RenderDescription, Shadows, TextureKind};
+use super::super::{
+    AlphaMode, Integrator, Principled, PrincipledDescription, Reflection, RenderDescription, Shadows, TextureKind,
+    Value,
+};
 use super::{Checked, Color, DVec3, Material, Texture, check, cut, number};
 
 /// The most materials in a note.
@@ -53,6 +56,8 @@ pub(super) fn notes(
         notes.push(LIGHT_SAMPLES.to_owned());
     }
     notes.extend(too_bright(names, materials, textures));
+    notes.extend(unused_alpha(names, materials));
+    notes.extend(unused_cutoff(names, materials));
     notes
 }
 
@@ -68,27 +73,65 @@ fn too_bright(names: &[String], materials: &[Material], textures: &[Texture]) ->
     let bright: Vec<(&String, f64)> = (names.iter().zip(materials))
         .filter_map(|(name, material)| Some((name, share(material)?)))
         .collect();
-    let shown = bright.iter().take(MOST_NAMES);
     // Hundredths tell by how much; sums such as 0.7 + 0.4 have many digits.
-    let shown = shown.map(|(name, share)| {
+    let shown = bright.iter().map(|(name, share)| {
         format!(
             "{} of {:?}",
             number(((share - ROUNDING) * 100.0).ceil() / 100.0),
             cut(name)
         )
     });
-    let mut shown: Vec<String> = shown.collect();
-    if bright.len() > MOST_NAMES {
-        shown.push(format!("{} more", bright.len() - MOST_NAMES));
-    }
-    let last = shown.pop()?;
-    let all = match shown.is_empty() {
-        true => last,
-        false => format!("{} and {last}", shown.join(", ")),
-    };
+    let all = several(shown)?;
     Some(format!(
         "materials: diffuse + specular must be at most 1 under integrator = \"path\", and both are scaled down to that: {all}"
     ))
+}
+
+/// Which materials have an `alpha` that nothing asks.
+fn unused_alpha(names: &[String], materials: &[Material]) -> Option<String> {
+    let is_unused = |principled: &Principled| {
+        principled.alpha_mode == AlphaMode::Opaque && !matches!(principled.alpha, Value::Plain(1.0))
+    };
+    let rule = "needs alpha_mode = \"mask\" or \"blend\", and is without effect";
+    Some(format!(
+        "materials: alpha {rule}: {}",
+        that(names, materials, is_unused)?
+    ))
+}
+
+/// Which materials have an `alpha_cutoff` that nothing asks.
+fn unused_cutoff(names: &[String], materials: &[Material]) -> Option<String> {
+    let usual = PrincipledDescription::default().alpha_cutoff;
+    let is_unused =
+        |principled: &Principled| principled.alpha_mode != AlphaMode::Mask && principled.alpha_cutoff != usual;
+    let rule = "needs alpha_mode = \"mask\", and is without effect";
+    Some(format!(
+        "materials: alpha_cutoff {rule}: {}",
+        that(names, materials, is_unused)?
+    ))
+}
+
+/// The names of the `principled` materials of which something is true.
+fn that(names: &[String], materials: &[Material], is_true: impl Fn(&Principled) -> bool) -> Option<String> {
+    let found = (names.iter().zip(materials)).filter(|(_, material)| match &material.reflection {
+        Reflection::Principled(principled) => is_true(principled),
+        _ => false,
+    });
+    several(found.map(|(name, _)| format!("{:?}", cut(name))))
+}
+
+/// `a, b and c`, the first of them where there are many; nothing of none.
+fn several(mut all: impl Iterator<Item = String>) -> Option<String> {
+    let mut shown: Vec<String> = all.by_ref().take(MOST_NAMES).collect();
+    match all.count() {
+        0 => {}
+        more => shown.push(format!("{more} more")),
+    }
+    let last = shown.pop()?;
+    Some(match shown.is_empty() {
+        true => last,
+        false => format!("{} and {last}", shown.join(", ")),
+    })
 }
 
 #[cfg(test)]

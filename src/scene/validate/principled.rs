@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::super::{Principled, PrincipledDescription};
 use super::appearance::{DARKEST, Textures};
-use super::{At, Checked, between, check, number};
+use super::{At, Checked, between, check};
 
 /// Indices of refraction, from that of empty space on.
 pub(super) const IORS: (f64, f64) = (1.0, 100.0);
@@ -14,11 +14,7 @@ pub(super) const ATTENUATION_DISTANCES: (f64, f64) = (1e-6, 1e9);
 impl Textures<'_> {
     pub(super) fn principled(&self, d: &PrincipledDescription) -> Checked<Principled> {
         let thin = d.thickness == 0.0;
-        check((0.0..=ATTENUATION_DISTANCES.1).contains(&d.thickness), || {
-            let (thickness, most) = (number(d.thickness), number(ATTENUATION_DISTANCES.1));
-            format!("{thickness} must be finite, from 0 to {most}; 0 is a thin sheet")
-        })
-        .at("thickness")?;
+        between(d.thickness, 0.0, ATTENUATION_DISTANCES.1).at("thickness")?;
         let absorption = absorption(d.attenuation_color, d.attenuation_distance)?;
         check(!thin || absorption == DVec3::ZERO, || {
             "needs a thickness: what is thin has no inside in which light is lost".to_owned()
@@ -62,11 +58,6 @@ fn absorption(color: DVec3, distance: Option<f64>) -> Checked<DVec3> {
         .at("attenuation_distance")?;
         return Ok(DVec3::ZERO);
     };
-    let (low, high) = ATTENUATION_DISTANCES;
-    check((low..=high).contains(&distance), || {
-        let [distance, low, high] = [distance, low, high].map(number);
-        format!("{distance} must be greater than 0, from {low} to {high}")
-    })
-    .at("attenuation_distance")?;
+    let distance = between(distance, ATTENUATION_DISTANCES.0, ATTENUATION_DISTANCES.1).at("attenuation_distance")?;
     Ok(color.map(|x| (-x.ln() / distance).clamp(0.0, DARKEST)))
 }

@@ -1,0 +1,75 @@
+//! Twin of `shaders/energy.wgsl`: what facets reflect, or let pass, at once, from tables.
+
+use glam::{Vec2, Vec3};
+
+use super::lobe::{facet_alpha, streak_place};
+use super::math::{floor, max, min};
+use crate::pack::{ENERGY_SIZE, Material, Packed, ROUGH_GLASS, STREAK_COLUMNS, STREAK_LINES};
+
+pub fn energy_kept(scene: &Packed, energy: u32, alpha: Vec2, wo: Vec3, side: f32) -> f32 {
+    let last = (ENERGY_SIZE - 1) as f32;
+    let square = 0.5 * (alpha.x * alpha.x + alpha.y * alpha.y);
+    let row = min(square.sqrt().sqrt(), 1.0) * last;
+    let column = min(max(wo.z, 0.0), 1.0) * last;
+    let i = min(floor(row), last - 1.0);
+    let j = min(floor(column), last - 1.0);
+    let table = if side > 0.0 { 0 } else { ENERGY_SIZE * ENERGY_SIZE };
+    let start = energy + table + i as u32 * ENERGY_SIZE + j as u32;
+    let word = |i: u32| f32::from_bits(scene.texels[i as usize]);
+    let finer = Vec2::new(word(start), word(start + 1));
+    let rougher = Vec2::new(word(start + ENERGY_SIZE), word(start + ENERGY_SIZE + 1));
+    let both = finer + (rougher - finer) * (row - i);
+    both.x + (both.y - both.x) * (column - j)
+}
+
+pub fn streak_energy(scene: &Packed, material: &Material, alpha: Vec2, wo: Vec3, part: u32) -> f32 {
+    let word = |i: u32| scene.texels[i as usize];
+    let start = material.streaks - 1;
+    let rows = [word(start), word(start + 1)];
+    let rough = min(max(material.roughness, 0.0), 1.0) * (rows[0] - 1) as f32;
+    let long = min(max(material.anisotropy, 0.0), 1.0) * (rows[1] - 1) as f32;
+    let place = streak_place(alpha, wo);
+    let line = place.x * (STREAK_LINES - 1) as f32;
+    let column = place.y * (STREAK_COLUMNS - 1) as f32;
+    let r = max(min(floor(rough), rows[0] as f32 - 2.0), 0.0);
+    let s = max(min(floor(long), rows[1] as f32 - 2.0), 0.0);
+    let i = min(floor(line), STREAK_LINES as f32 - 2.0);
+    let j = min(floor(column), STREAK_COLUMNS as f32 - 2.0);
+    let first = start + 2 + part * rows[0] * rows[1] * (STREAK_LINES * STREAK_COLUMNS);
+    let value = |i: u32| f32::from_bits(word(i));
+    let mut sum = 0.0;
+    for k in 0..if rows[0] > 1 { 2 } else { 1 } {
+        for l in 0..if rows[1] > 1 { 2 } else { 1 } {
+            let row = (r as u32 + k) * rows[1] + s as u32 + l;
+            let at = first + (row * STREAK_LINES + i as u32) * STREAK_COLUMNS + j as u32;
+            let across = Vec2::new(value(at), value(at + 1));
+            let along = Vec2::new(value(at + STREAK_COLUMNS), value(at + STREAK_COLUMNS + 1));
+            let both = across + (along - across) * (line - i);
+            let rougher = if k == 1 { rough - r } else { 1.0 - (rough - r) };
+            let longer = if l == 1 { long - s } else { 1.0 - (long - s) };
+            sum += (both.x + (both.y - both.x) * (column - j)) * (rougher * longer);
+        }
+    }
+    sum
+}
+
+pub fn glass_kept(scene: &Packed, material: &Material, alpha: Vec2, wo: Vec3, side: f32) -> f32 {
+    if material.streaks != 0 {
+        let behind = if material.kind == ROUGH_GLASS { 0 } else { 2 } + if side > 0.0 { 0 } else { 1 };
+        return streak_energy(scene, material, alpha, wo, behind);
+    }
+    energy_kept(scene, material.energy, alpha, wo, side)
+}
+
+pub fn principled_energy(scene: &Packed, material: &Material, wo: Vec3, side: f32) -> Vec3 {
+    let mut found = Vec3::ONE;
+    let alpha = facet_alpha(material);
+    if material.streaks != 0 {
+        found.x = streak_energy(scene, material, alpha, wo, 0);
+        found.y = streak_energy(scene, material, alpha, wo, 1);
+    }
+    if (material.thin == 0) & (material.transmission > 0.0) {
+        found.z = glass_kept(scene, material, alpha, wo, side);
+    }
+    found
+}

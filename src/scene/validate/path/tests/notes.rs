@@ -1,0 +1,113 @@
+//! What is told of values that have no effect, or another one.
+
+use super::super::LIGHT_SAMPLES;
+use super::*;
+
+fn notes(text: &str) -> Vec<String> {
+    parse(text).unwrap().notes
+}
+
+#[test]
+fn what_paths_ignore_is_told() {
+    for (added, told) in [
+        (
+            "ambient = [0, 0.1, 0]",
+            "render.ambient: without effect under integrator = \"path\"; surfaces light each other",
+        ),
+        (
+            "shadows = 'transparent'",
+            "render.shadows: without effect under integrator = \"path\"; light goes through glass as it does",
+        ),
+        ("light_samples = { count = 4 }", LIGHT_SAMPLES),
+        ("light_samples = { pattern = 'sobol', count = 16 }", LIGHT_SAMPLES),
+    ] {
+        let text = GOOD.replace("[render]", &format!("[render]\n{added}"));
+        assert_eq!(notes(&text), [told]);
+        let render = parse(&text).unwrap().render;
+        assert_eq!((render.ambient, render.shadows), (DVec3::ZERO, Shadows::Opaque));
+    }
+    for same in [
+        "ambient = [0, 0, 0]",
+        "shadows = 'opaque'",
+        "light_samples = { count = 16 }",
+    ] {
+        let text = GOOD.replace("[render]", &format!("[render]\n{same}"));
+        assert_eq!(notes(&text), Vec::<String>::new());
+    }
+    // An option is told whatever its value, and once.
+    for count in [16, 9] {
+        let overrides = Overrides {
+            light_samples: Some(count),
+            ..Overrides::default()
+        };
+        let scene = Scene::parse_with(GOOD, "s.toml", &overrides).unwrap();
+        assert_eq!(scene.notes, [LIGHT_SAMPLES]);
+    }
+    // Direct light does all of it.
+    let text = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n\
+                materials.a = { type = 'phong', color = [1, 1, 1] }\n\
+                render = { ambient = [1, 1, 1], shadows = 'transparent', light_samples = { count = 4 } }\n";
+    assert_eq!(notes(text), Vec::<String>::new());
+}
+
+#[test]
+fn phong_materials_that_are_too_bright_are_told() {
+    const RULE: &str = "materials: diffuse + specular must be at most 1 under integrator = \"path\", and both are scaled down to that: ";
+    let (diffuse, specular) = ("diffuse = [0.5, 0, 0]", "specular = [0.5, 0.5, 0.5]");
+    for (line, changed, told) in [
+        (diffuse, "diffuse = [0.7, 0.1, 0]", Some("1.2 of \"red\"")),
+        (specular, "specular = [0.501, 0, 0]", Some("1.01 of \"red\"")),
+        (specular, "specular = [0.5, 1, 1]", None),
+        (specular, "specular = [0, 1.5, 1]", Some("1.5 of \"red\"")),
+        // The largest of a texture's colours is 1, 2, 3.
+        (diffuse, "diffuse = { texture = 'spots' }", Some("3.5 of \"red\"")),
+        (diffuse, "diffuse = { texture = 'dark' }", None),
+        (specular, "specular = { texture = 'spots' }", Some("3 of \"red\"")),
+    ] {
+        let text = with(line, changed);
+        let told: Vec<String> = told.map(|told| format!("{RULE}{told}")).into_iter().collect();
+        assert_eq!(notes(&text), told, "{changed}");
+    }
+    // Many are one note.
+    let materials: String = (0..10)
+        .map(|i| format!("[materials.m{i}]\ntype = 'phong'\ncolor = [0.{i}, 0.8, 0]\n"))
+        .collect();
+    let told = notes(&GOOD.replace("[materials.clay]", &format!("{materials}[materials.clay]")));
+    let names: Vec<String> = (0..8).map(|i| format!("1.6 of \"m{i}\"")).collect();
+    assert_eq!(told, [format!("{RULE}{} and 2 more", names.join(", "))]);
+}
+
+#[test]
+fn alpha_that_nothing_asks_is_told() {
+    let leaf = |keys: &str| {
+        notes(&with(
+            "[materials.clay]",
+            &format!("[materials.leaf]\ntype = 'principled'\n{keys}\n[materials.clay]"),
+        ))
+    };
+    const ALPHA: &str = "materials: alpha needs alpha_mode = \"mask\" or \"blend\", and is without effect: \"leaf\"";
+    const CUTOFF: &str = "materials: alpha_cutoff needs alpha_mode = \"mask\", and is without effect: \"leaf\"";
+    for (keys, told) in [
+        ("alpha = 0.5", vec![ALPHA]),
+        ("alpha = { texture = 'spots' }", vec![ALPHA]),
+        (
+            "alpha = 0\nalpha_mode = 'opaque'\nalpha_cutoff = 0.25",
+            vec![ALPHA, CUTOFF],
+        ),
+        ("alpha = 0.5\nalpha_mode = 'blend'\nalpha_cutoff = 0.25", vec![CUTOFF]),
+        ("alpha = 0.5\nalpha_mode = 'blend'", vec![]),
+        ("alpha = 0.5\nalpha_mode = 'mask'\nalpha_cutoff = 0.25", vec![]),
+        ("alpha = 1\nalpha_cutoff = 0.5", vec![]),
+        ("alpha_mode = 'blend'", vec![]),
+    ] {
+        assert_eq!(leaf(keys), told, "{keys}");
+    }
+    // Many are one note.
+    let leaves: String = (0..9)
+        .map(|i| format!("[materials.leaf{i}]\ntype = 'principled'\nalpha = 0.{i}\n"))
+        .collect();
+    let told = notes(&with("[materials.clay]", &format!("{leaves}[materials.clay]")));
+    let names: Vec<String> = (0..8).map(|i| format!("\"leaf{i}\"")).collect();
+    let rule = ALPHA.trim_end_matches("\"leaf\"");
+    assert_eq!(told, [format!("{rule}{} and 1 more", names.join(", "))]);
+}

@@ -1,0 +1,365 @@
+//! What facets lose, and what is given back: white surfaces in white light, rougher along one axis or not, of metal, glass and `principled`. By
+//! quadratures over the slopes of facets, whose density mathematics knows.
+
+use std::f64::consts::TAU;
+
+use glam::{DVec3, Vec2, Vec3};
+use wgray::cpu::energy::principled_energy;
+use wgray::cpu::lobe::facet_alpha;
+use wgray::cpu::metal::metal_eval;
+use wgray::cpu::principled::{Mixture, principled_eval, principled_mixture, principled_pdf, principled_sample};
+use wgray::cpu::rough_dielectric::{rough_dielectric_eval, rough_dielectric_pdf};
+use wgray::cpu::scattering::facets_of;
+use wgray::cpu::sequence::sobol_sample;
+use wgray::cpu::surface::Surface;
+use wgray::cpu::thin::{thin_eval, thin_pdf};
+use wgray::pack::{METAL, Material, NOWHERE, Packed, ROUGH_GLASS};
+
+use crate::pictures::{both, render};
+
+/// All lobes.
+const ALL: u32 = 31;
+
+/// A scene with one material.
+fn scene_of(keys: &str) -> Packed {
+    super::scene(
+        1,
+        2,
+        &format!(
+            "camera = {{ position = [0, -4, 1], look_at = [0, 0, 0], fov = 40 }}\n\
+             textures.t = {{ type = 'checker', even = [1, 1, 1], odd = [0, 0, 0] }}\nmaterials.m = {{ {keys} }}\n\
+             [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n"
+        ),
+    )
+}
+
+fn direction(cosine: f64, longitude: f64) -> Vec3 {
+    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+    DVec3::new(sine * longitude.cos(), sine * longitude.sin(), cosine).as_vec3()
+}
+
+/// Directions to a viewer, from straight above to grazing, along the streaks, across them, and between.
+fn viewers() -> Vec<Vec3> {
+    let mut all = vec![Vec3::Z];
+    for cosine in [0.8, 0.4, 0.04] {
+        for longitude in [0.0, 0.7, 1.3, TAU / 4.0] {
+            all.push(direction(cosine, longitude));
+        }
+    }
+    all
+}
+
+/// A material with facets as it is seen from one side.
+fn seen(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> Material {
+    let surface = Surface {
+        position: Vec3::ZERO,
+        normal: Vec3::Z,
+        smooth_normal: Vec3::Z,
+        shading_normal: Vec3::Z,
+        wo,
+        start: Vec3::ZERO,
+        bulge: Vec3::ZERO,
+        side,
+        above: NOWHERE,
+        below: NOWHERE,
+        uv: Vec2::ZERO,
+        du: Vec3::X,
+        dv: Vec3::Y,
+    };
+    facets_of(packed, &surface, *material)
+}
+
+fn mixture(packed: &Packed, material: &Material, wo: Vec3, side: f32) -> Mixture {
+    let energy = principled_energy(packed, material, wo, side);
+    principled_mixture(material, wo, side > 0.0, Vec3::Z, ALL, energy)
+}
+
+/// The integral of `f` over all directions, mirrored and refracted, where `ior` is what is behind; facets' slopes are evenly many by their
+/// distribution (Walter et al. 2007, section 5.2). What passes counts as in the same medium.
+fn furnace(alpha: Vec2, ior: Option<f64>, thin: bool, wo: Vec3, f: impl Fn(Vec3) -> f32) -> f64 {
+    let steps = 360;
+    let a = alpha.as_dvec2();
+    let o = wo.as_dvec3();
+    let mut sum = 0.0;
+    for i in 0..steps {
+        // Finer where slopes are large, which grazing views see.
+        let t = (f64::from(i) + 0.5) / f64::from(steps);
+        let (u, du) = (1.0 - (1.0 - t) * (1.0 - t), 2.0 * (1.0 - t));
+        let r = (u / (1.0 - u)).sqrt();
+        for j in 0..steps {
+            let longitude = TAU * (f64::from(j) + 0.5) / f64::from(steps);
+            let m = DVec3::new(-a.x * r * longitude.cos(), -a.y * r * longitude.sin(), 1.0).normalize();
+            let c = o.dot(m);
+            if c <= 0.0 {
+                continue;
+            }
+            let s = (m.x / a.x).powi(2) + (m.y / a.y).powi(2) + m.z * m.z;
+            let density = m.z / (a.x * a.y * s * s * TAU / 2.0);
+            let weight = du / density;
+            let wi = m * (2.0 * c) - o;
+            if wi.z > 0.0 {
+                sum += f64::from(f(wi.as_vec3())) * 4.0 * c * weight;
+                if thin {
+                    sum += f64::from(f(DVec3::new(wi.x, wi.y, -wi.z).as_vec3())) * 4.0 * c * weight;
+                }
+            }
+            let Some(n) = ior.filter(|_| !thin) else {
+                continue;
+            };
+            let square = 1.0 - (1.0 - c * c) / (n * n);
+            if square > 0.0 {
+                let cosine = square.sqrt();
+                let wi = m * (c / n - cosine) - o / n;
+                if wi.z < 0.0 {
+                    let area = (c - n * cosine).powi(2) / (n * n * cosine);
+                    sum += f64::from(f(wi.normalize().as_vec3())) * area * weight * n * n;
+                }
+            }
+        }
+    }
+    sum / f64::from(steps * steps)
+}
+
+/// What a white material gives in white light.
+fn given(packed: &Packed, material: &Material, wo: Vec3, side: f32, compensated: bool) -> f64 {
+    let alpha = facet_alpha(material);
+    let mut known = seen(packed, material, wo, side);
+    if !compensated {
+        known.loss = 0.0;
+    }
+    match material.kind {
+        METAL => furnace(alpha, None, false, wo, |wi| metal_eval(&known, wo, wi).x),
+        ROUGH_GLASS => furnace(alpha, Some(f64::from(known.ior)), false, wo, |wi| {
+            rough_dielectric_eval(&known, wo, wi).x
+        }),
+        _ => furnace(alpha, None, true, wo, |wi| thin_eval(&known, wo, wi).x),
+    }
+}
+
+#[test]
+fn streaks_stay_white() {
+    let kinds = [
+        ("type = 'conductor'", 0.01, false),
+        ("type = 'dielectric', thin = true, ior = 1.5", 0.01, false),
+        ("type = 'dielectric', ior = 1.5", 0.02, true),
+        ("type = 'dielectric', ior = 2.5", 0.02, true),
+        ("type = 'dielectric', ior = 1.1", 0.02, true),
+    ];
+    let mut off = Vec::new();
+    for (kind, most, sides) in kinds {
+        for roughness in [0.1, 0.3, 0.6, 1.0] {
+            for anisotropy in [0.3, 0.7, 1.0] {
+                let keys = format!("{kind}, roughness = {roughness}, anisotropy = {anisotropy}");
+                let packed = scene_of(&keys);
+                let material = &packed.materials[0];
+                for wo in viewers() {
+                    for side in [1.0, -1.0].into_iter().take(1 + usize::from(sides)) {
+                        let found = given(&packed, material, wo, side, true);
+                        if !((found - 1.0).abs() < most && found < 1.005) {
+                            off.push(format!("{keys}, {wo}, {side}: {found}"));
+                        }
+                    }
+                }
+            }
+        }
+    }
+    assert!(off.is_empty(), "{} are off: {off:#?}", off.len());
+    // The control: nothing given back; and in the file too.
+    let packed = scene_of("type = 'conductor', roughness = 0.6, anisotropy = 0.7");
+    let lost = 1.0 - given(&packed, &packed.materials[0], direction(0.4, 0.7), 1.0, false);
+    assert!(lost > 0.1, "{lost}");
+    let plain = scene_of("type = 'conductor', roughness = 0.6, anisotropy = 0.7, energy_compensation = false");
+    assert_eq!(plain.materials[0].streaks, 0);
+    let same = 1.0 - given(&plain, &plain.materials[0], direction(0.4, 0.7), 1.0, true);
+    assert!((same - lost).abs() < 1e-9, "{same} {lost}");
+}
+
+#[test]
+fn streaks_of_a_texture_stay_nearly_white() {
+    let textures = ["{ texture = 't' }", "0.45"];
+    for rough in textures {
+        for long in textures {
+            let keys = format!("type = 'principled', metallic = 1, roughness = {rough}, anisotropy = {long}");
+            let packed = scene_of(&keys);
+            for (roughness, anisotropy) in [(0.45, 0.45), (0.3, 0.9), (0.85, 0.2)] {
+                let mut material = packed.materials[0];
+                if rough != "0.45" {
+                    material.roughness = roughness;
+                }
+                if long != "0.45" {
+                    material.anisotropy = anisotropy;
+                }
+                for wo in viewers() {
+                    let m = mixture(&packed, &material, wo, 1.0);
+                    let found = furnace(m.alpha, None, false, wo, |wi| principled_eval(&m, wo, wi, ALL).x);
+                    assert!(
+                        (found - 1.0).abs() < 0.05,
+                        "{keys}, {roughness} {anisotropy}, {wo}: {found}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn streaks_of_principled_metal_stay_white() {
+    for roughness in [0.1, 0.3, 0.6, 1.0] {
+        for anisotropy in [0.3, 0.7, 1.0] {
+            let keys = format!("type = 'principled', roughness = {roughness}, anisotropy = {anisotropy}");
+            let packed = scene_of(&keys);
+            for wo in viewers() {
+                let m = mixture(&packed, &packed.materials[0], wo, 1.0);
+                let found = furnace(m.alpha, None, false, wo, |wi| principled_eval(&m, wo, wi, ALL).x);
+                assert!((found - 1.0).abs() < 0.01 && found < 1.005, "{keys}, {wo}: {found}");
+            }
+        }
+    }
+}
+
+#[test]
+fn principled_that_passes_all_light_is_the_material_dielectric() {
+    for anisotropy in [0.0, 0.6] {
+        for (ior, thin) in [(1.1, false), (1.5, false), (2.5, false), (1.5, true), (2.5, true)] {
+            let all = [0.1, 0.3, 0.6, 1.0];
+            for roughness in if anisotropy == 0.0 { &all[..] } else { &all[1..2] } {
+                let facets = format!("ior = {ior}, roughness = {roughness}, anisotropy = {anisotropy}");
+                let glass = scene_of(&format!("type = 'dielectric', thin = {thin}, {facets}"));
+                let thickness = if thin { 0 } else { 1 };
+                let packed = scene_of(&format!(
+                    "type = 'principled', metallic = 0, transmission = 1, thickness = {thickness}, {facets}"
+                ));
+                let material = &packed.materials[0];
+                for wo in [Vec3::Z, direction(0.7, 0.3), direction(0.3, 1.2), direction(0.06, 0.8)] {
+                    for side in [1.0, -1.0] {
+                        let name = format!("{facets}, thin {thin}, {wo}, {side}");
+                        let m = mixture(&packed, material, wo, side);
+                        let other = seen(&glass, &glass.materials[0], wo, side);
+                        for k in 0..64 {
+                            let u = sobol_sample(k, glam::UVec2::new(1, 2));
+                            let found = principled_sample(&m, wo, u, sobol_sample(k, glam::UVec2::new(3, 4)).x, ALL);
+                            if found.pdf == 0.0 || found.wi.z.abs() < 0.02 {
+                                continue;
+                            }
+                            let (wi, here) = (found.wi, principled_eval(&m, wo, found.wi, ALL).x);
+                            let (there, pdf) = if thin {
+                                (thin_eval(&other, wo, wi).x, thin_pdf(&other, wo, wi))
+                            } else {
+                                (
+                                    rough_dielectric_eval(&other, wo, wi).x,
+                                    rough_dielectric_pdf(&other, wo, wi),
+                                )
+                            };
+                            let off = (here - there).abs() / there;
+                            let density = (principled_pdf(&m, wo, wi, ALL) - pdf).abs() / pdf;
+                            assert!(off < 0.01 && density < 0.01, "{name}, {wi}: {off} {density}");
+                        }
+                        let n = (!thin).then(|| f64::from(1.0 / m.eta));
+                        let whole = furnace(m.alpha, n, thin, wo, |wi| principled_eval(&m, wo, wi, ALL).x);
+                        assert!((whole - 1.0).abs() < 0.01, "{name}: {whole}");
+                    }
+                }
+            }
+        }
+    }
+    // The control: without its table.
+    let keys = "type = 'principled', metallic = 0, transmission = 1, thickness = 1, roughness = 1";
+    let material = scene_of(keys).materials[0];
+    let wo = direction(0.3, 0.0);
+    let m = principled_mixture(&material, wo, true, Vec3::Z, ALL, Vec3::ONE);
+    let kept = furnace(m.alpha, Some(1.5), false, wo, |wi| principled_eval(&m, wo, wi, ALL).x);
+    assert!((kept - 0.555).abs() < 0.01, "{kept}");
+}
+
+#[test]
+fn mixtures_of_glass_with_others_are_white_from_both_sides() {
+    for (metallic, transmission) in [(0.3, 1.0), (0.0, 0.5), (0.5, 0.5), (0.2, 0.05)] {
+        for (roughness, anisotropy) in [(0.3, 0.0), (1.0, 0.0), (0.3, 0.8)] {
+            let keys = format!(
+                "type = 'principled', metallic = {metallic}, transmission = {transmission}, thickness = 1, roughness = {roughness}, \
+                 anisotropy = {anisotropy}"
+            );
+            let packed = scene_of(&keys);
+            for (wo, side) in viewers().into_iter().flat_map(|wo| [(wo, 1.0), (wo, -1.0)]) {
+                let m = mixture(&packed, &packed.materials[0], wo, side);
+                let facets = furnace(m.alpha, Some(f64::from(1.0 / m.eta)), false, wo, |wi| {
+                    (principled_eval(&m, wo, wi, ALL) - m.diffuse * (wi.z.max(0.0) / std::f32::consts::PI)).x
+                });
+                let found = facets + f64::from(m.diffuse.x);
+                assert!((found - 1.0).abs() < 0.02, "{keys}, {wo}, {side}: {found}");
+            }
+        }
+    }
+}
+
+#[test]
+fn nothing_mirrors_where_the_index_is_that_of_air() {
+    for (transmission, thickness) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.5, 1.0)] {
+        let keys = |ior: f64| {
+            format!(
+                "type = 'principled', metallic = 0, transmission = {transmission}, thickness = {thickness}, roughness = 0.3, ior = {ior}"
+            )
+        };
+        for wo in [Vec3::Z, direction(0.3, 0.7), direction(0.02, 0.7)] {
+            let mirrored = |ior: f64| {
+                let packed = scene_of(&keys(ior));
+                let m = mixture(&packed, &packed.materials[0], wo, 1.0);
+                furnace(m.alpha, None, false, wo, |wi| {
+                    (principled_eval(&m, wo, wi, ALL) - m.diffuse * (wi.z.max(0.0) / std::f32::consts::PI)).x
+                })
+            };
+            let none = mirrored(1.0);
+            assert!(none.abs() < 1e-3, "{}, {wo}: {none}", keys(1.0));
+            // The control: the default, which does.
+            assert!(mirrored(1.5) > 0.03, "{wo}");
+        }
+    }
+}
+
+#[test]
+fn glass_around_the_camera_absorbs_all_the_way() {
+    // From inside through something that is not there, or that the camera does not see, to the wall of the glass and a lamp behind it: exp(-a d) of
+    // what Fresnel's equations let pass at a right angle, and n^2 of that.
+    let (a, d) = (0.4_f64, 2.0);
+    let wall = |z: f64, material: &str| {
+        format!(
+            "[[shapes]]\ntype = 'rectangle'\nmaterial = '{material}'\ncenter = [0, 0, {z}]\nsize = [9, 9]\nnormal = [0, 0, -1]\ntangent = [1, 0, 0]\n"
+        )
+    };
+    let scene = |between: &str| {
+        super::scene(
+            4096,
+            1,
+            &format!(
+                "camera = {{ position = [0, 0, {d}], look_at = [0, 0, 0], up = [0, 1, 0], fov = 1 }}\nenvironment = {{ color = [0, 0, 0] }}\n\
+                 materials.m = {{ type = 'dielectric', ior = 1.5, absorption = [{a}, {a}, {a}] }}\n\
+                 materials.s = {{ type = 'diffuse', color = [0, 0, 0], emission = [1, 1, 1] }}\n\
+                 materials.absent = {{ type = 'principled', alpha = 0, alpha_mode = 'blend' }}\n\
+                 materials.unseen = {{ type = 'diffuse', color = [1, 1, 1], visible = false }}\n\
+                 {between}{}\
+                 [[shapes]]\ntype = 'rectangle'\nmaterial = 's'\ncenter = [0, 0, -1]\nsize = [9, 9]\nnormal = [0, 0, 1]\ntangent = [1, 0, 0]\n",
+                wall(0.0, "m")
+            ),
+        )
+    };
+    let expected = (1.0 - 0.04) * (-a * d).exp() * 1.5 * 1.5;
+    for between in [
+        String::new(),
+        wall(0.7, "absent"),
+        wall(1.3, "unseen"),
+        wall(1.1, "absent") + &wall(0.7, "unseen") + &wall(0.3, "absent"),
+    ] {
+        let packed = scene(&between);
+        for way in both() {
+            let found = super::mean(&render(&packed, way))[1];
+            // One way in 25 is mirrored: that many samples tell it to this.
+            assert!(
+                (found / expected - 1.0).abs() < 2e-3,
+                "{way:?}, {between}: {found} for {expected}"
+            );
+            // The control: what lies behind the first of them alone.
+            let part = (1.0 - 0.04) * (-a * 0.7).exp() * 1.5 * 1.5;
+            assert!((found / part - 1.0).abs() > 0.1, "the control");
+        }
+    }
+}

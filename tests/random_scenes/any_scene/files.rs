@@ -1,0 +1,62 @@
+//! The files that random scenes name: meshes and images.
+
+use std::fs;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use glam::DVec3;
+
+use crate::meshes::forms::Form;
+use crate::random::Random;
+use crate::textures::write_exr;
+
+/// Images around scenes, beside their meshes: their sizes.
+pub const AROUND: &[(&str, u32, u32)] = &[("dot.exr", 1, 1), ("odd.exr", 5, 3), ("wide.exr", 64, 32)];
+
+/// Mesh files, and whether they have texture coordinates and normals. They are beside the scenes that failing tests write.
+pub const MESHES: &[(&str, bool, bool)] = &[
+    ("soup.obj", true, false),
+    ("slivers.obj", false, false),
+    ("ball.obj", true, true),
+    ("cube.obj", true, false),
+    ("rock.obj", true, true),
+];
+
+/// The folder that random scenes and their meshes are in.
+pub fn folder() -> &'static Path {
+    static FOLDER: OnceLock<&Path> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+        let random = Random::new(21);
+        for (name, has_uvs, has_normals) in MESHES {
+            let form = match *name {
+                "soup.obj" => Form::soup(60, &random),
+                "slivers.obj" => Form::slivers(40, &random),
+                "ball.obj" => Form::icosphere(1),
+                "cube.obj" => Form::cube(),
+                _ => bumpy(&random),
+            };
+            let uvs: Vec<[f64; 2]> = form.points.iter().map(|p| [p.x * 0.7 + p.z, p.y - 0.3 * p.x]).collect();
+            let normals: Vec<DVec3> = form.points.iter().map(|p| p.normalize()).collect();
+            let text = form.obj(has_normals.then_some(&normals), has_uvs.then_some(&uvs));
+            // Whoever reads it sees one whole file.
+            let draft = folder.join(format!("{name}.{}", std::process::id()));
+            fs::write(&draft, text).expect("a place for a mesh");
+            fs::rename(&draft, folder.join(name)).expect("a place for a mesh");
+        }
+        for (name, width, height) in AROUND {
+            let draft = folder.join(format!("{}.{name}", std::process::id()));
+            let value = || random.pick(&[0.0, 0.1, 0.5, 1.0, 30.0]);
+            write_exr(&draft, *width, *height, |_, _| [value(), value(), value()]);
+            fs::rename(&draft, folder.join(name)).expect("a place for an image");
+        }
+        folder
+    })
+}
+
+/// A sphere with dents and horns.
+fn bumpy(random: &Random) -> Form {
+    let mut form = Form::icosphere(2);
+    form.points.iter_mut().for_each(|p| *p *= random.between(0.4, 1.3));
+    form
+}

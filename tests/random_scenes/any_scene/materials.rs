@@ -1,0 +1,212 @@
+//! Textures and materials.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use proptest::prelude::*;
+use proptest::sample::select;
+use wgray::scene::*;
+
+use super::values::*;
+
+pub fn paint() -> impl Strategy<Value = ColorDescription> {
+    let texture = select(&["checker", "lines", "constant"][..]).prop_map(str::to_string);
+    prop_oneof![
+        4 => color(1.0).prop_map(ColorDescription::Plain),
+        1 => texture.prop_map(|texture| ColorDescription::Texture(TextureReference { texture })),
+    ]
+}
+
+pub fn textures() -> impl Strategy<Value = BTreeMap<String, TextureDescription>> {
+    let place = (
+        select(&[1.0, 4.0, 0.3, -2.0][..]),
+        select(&[0.0, 30.0, 90.0][..]),
+        0.0..1.0,
+    );
+    (color(1.0), color(1.0), place, 0.05..0.5).prop_map(|(even, odd, (scale, rotate, offset), line_width)| {
+        let (scale, offset) = ([scale, scale * 2.0], [offset, 0.0]);
+        let checker = CheckerDescription {
+            even,
+            odd,
+            scale,
+            rotate,
+            offset,
+        };
+        let lines = LinesDescription {
+            cell: even,
+            line: odd,
+            line_width,
+            scale,
+            rotate,
+            offset,
+        };
+        BTreeMap::from([
+            ("checker".to_string(), TextureDescription::Checker(checker)),
+            ("lines".to_string(), TextureDescription::Lines(lines)),
+            (
+                "constant".to_string(),
+                TextureDescription::Constant(ConstantDescription { color: even }),
+            ),
+        ])
+    })
+}
+
+pub fn material() -> BoxedStrategy<MaterialDescription> {
+    let shininess =
+        prop_oneof![3 => select(&[16.0, 1.0, 2.0, 50.0, 4096.0][..]), 1 => select(&[2.5, 0.5, 1e5, 1e-3][..])];
+    let visible = prop_oneof![9 => Just(None), 1 => Just(Some(false))];
+    let phong =
+        (paint(), paint(), paint(), shininess, visible).prop_map(|(ambient, diffuse, specular, shininess, visible)| {
+            MaterialDescription::Phong(PhongDescription {
+                color: None,
+                ambient: Some(ambient),
+                diffuse: Some(diffuse),
+                specular: Some(specular),
+                shininess,
+                normal_map: None,
+                emission: None,
+                visible,
+            })
+        });
+    let mirror = color(1.0).prop_map(|tint| {
+        let tint = ColorDescription::Plain(tint);
+        MaterialDescription::Mirror(MirrorDescription {
+            tint,
+            normal_map: None,
+            emission: None,
+            visible: None,
+        })
+    });
+    let glass = (color(1.0), select(&[1.5, 1.0, 0.7, 2.4][..])).prop_map(|(tint, ior)| {
+        let tint = ColorDescription::Plain(tint);
+        MaterialDescription::Glass(GlassDescription {
+            ior,
+            tint,
+            normal_map: None,
+            emission: None,
+            visible: None,
+        })
+    });
+    prop_oneof![6 => phong, 1 => mirror, 1 => glass].boxed()
+}
+
+/// What paths have more: shines, often; two dark ones among three.
+pub fn emission() -> impl Strategy<Value = Option<ColorDescription>> {
+    let texture = select(&["checker", "lines", "constant"][..]).prop_map(str::to_string);
+    prop_oneof![
+        6 => Just(None),
+        2 => color(5.0).prop_map(|color| Some(ColorDescription::Plain(color))),
+        1 => texture.prop_map(|texture| Some(ColorDescription::Texture(TextureReference { texture }))),
+    ]
+}
+
+/// A number from 0 to 1, often an end, or one of a texture's.
+pub fn share() -> impl Strategy<Value = ValueDescription> {
+    let texture = (
+        select(&["checker", "lines"][..]).prop_map(str::to_string),
+        select(&[Channel::R, Channel::G, Channel::B][..]),
+    );
+    prop_oneof![
+        3 => Just(ValueDescription::Plain(0.0)),
+        2 => Just(ValueDescription::Plain(1.0)),
+        3 => (0.0..=1.0).prop_map(ValueDescription::Plain),
+        1 => texture.prop_map(|(texture, channel)| ValueDescription::channel(texture, channel)),
+    ]
+}
+
+/// A principled material with some of its lobes.
+pub fn principled() -> impl Strategy<Value = MaterialDescription> {
+    let shares = proptest::collection::vec(share(), 8);
+    let volume = (select(&[0.0, 1.0][..]), color(1.0), select(&[1.0, 1.3, 1.5, 2.4][..]));
+    let alpha = (
+        select(&[AlphaMode::Opaque, AlphaMode::Opaque, AlphaMode::Blend, AlphaMode::Mask][..]),
+        share(),
+    );
+    (paint(), shares, volume, alpha, -360.0..360.0).prop_map(
+        |(base, shares, (thickness, color, ior), (alpha_mode, alpha), anisotropy_rotation)| {
+            let mut shares = shares.into_iter();
+            let mut next = || shares.next().unwrap();
+            let mut m = PrincipledDescription::default();
+            (m.base_color, m.metallic, m.roughness) = (base, next(), next());
+            (m.anisotropy, m.anisotropy_rotation) = (next(), anisotropy_rotation);
+            (m.specular, m.transmission, m.ior) = (next(), next(), ior);
+            if thickness > 0.0 {
+                (m.thickness, m.attenuation_color, m.attenuation_distance) = (thickness, color, Some(0.7));
+            }
+            (m.clearcoat, m.clearcoat_roughness, m.sheen_roughness) = (next(), next(), next());
+            m.sheen_color = [0.0, 0.5, color.x].into();
+            (m.alpha_mode, m.alpha) = (alpha_mode, alpha);
+            MaterialDescription::Principled(m)
+        },
+    )
+}
+
+/// A material of any kind, for paths.
+pub fn material_of_paths() -> BoxedStrategy<MaterialDescription> {
+    let texture = select(&["checker", "lines"][..]).prop_map(str::to_string);
+    let roughness = prop_oneof![
+        2 => Just(ValueDescription::Plain(0.0)),
+        1 => (0.0..=1.0).prop_map(ValueDescription::Plain),
+        1 => texture.prop_map(ValueDescription::texture),
+    ];
+    let diffuse = (paint(), roughness.clone()).prop_map(|(color, roughness)| {
+        let mut diffuse = DiffuseDescription::new(color);
+        diffuse.roughness = roughness;
+        MaterialDescription::Diffuse(diffuse)
+    });
+    let facets = (
+        prop_oneof![1 => Just(ValueDescription::default()), 3 => roughness],
+        prop_oneof![3 => Just(0.0), 1 => 0.0..=1.0],
+        -360.0..=360.0,
+        any::<bool>(),
+    );
+    let metal = prop_oneof![
+        2 => paint().prop_map(ConductorDescription::new),
+        1 => Just(ConductorDescription { metal: Some("gold".to_owned()), ..ConductorDescription::default() }),
+        1 => (color(3.0), color(3.0)).prop_map(|(eta, k)| ConductorDescription {
+            eta: Some(eta + 0.01),
+            k: Some(k),
+            ..ConductorDescription::default()
+        }),
+    ];
+    let conductor = (metal, facets.clone()).prop_map(|(mut conductor, facets)| {
+        (
+            conductor.roughness,
+            conductor.anisotropy,
+            conductor.anisotropy_rotation,
+            conductor.energy_compensation,
+        ) = facets;
+        MaterialDescription::Conductor(conductor)
+    });
+    let absorption = prop_oneof![Just(DVec3::ZERO), color(3.0)];
+    let clear = (select(&[1.5, 1.0, 0.7, 2.4][..]), paint(), absorption, any::<bool>());
+    let dielectric = (clear, facets).prop_map(|((ior, color, absorption, thin), facets)| {
+        let mut dielectric = DielectricDescription::new(ior);
+        (dielectric.color, dielectric.thin) = (color, thin);
+        dielectric.absorption = if thin { DVec3::ZERO } else { absorption };
+        (
+            dielectric.roughness,
+            dielectric.anisotropy,
+            dielectric.anisotropy_rotation,
+            dielectric.energy_compensation,
+        ) = facets;
+        MaterialDescription::Dielectric(dielectric)
+    });
+    let any = prop_oneof![4 => diffuse, 1 => conductor, 1 => dielectric, 2 => principled(), 3 => material()];
+    (any, emission())
+        .prop_map(|(mut material, emission)| {
+            let own = match &mut material {
+                MaterialDescription::Phong(m) => &mut m.emission,
+                MaterialDescription::Mirror(m) => &mut m.emission,
+                MaterialDescription::Glass(m) => &mut m.emission,
+                MaterialDescription::Diffuse(m) => &mut m.emission,
+                MaterialDescription::Conductor(m) => &mut m.emission,
+                MaterialDescription::Dielectric(m) => &mut m.emission,
+                MaterialDescription::Principled(m) => &mut m.emission,
+                other => panic!("no random scene has the material {other:?}"),
+            };
+            *own = emission;
+            material
+        })
+        .boxed() // the tree of a strategy that is not is on the stack
+}

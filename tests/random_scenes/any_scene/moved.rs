@@ -1,0 +1,87 @@
+//! Scenes elsewhere and of another size.
+
+use glam::DVec3;
+use wgray::scene::*;
+
+/// Scales and moves all that a scene has.
+pub fn moved(d: &mut Description, scale: f64, offset: DVec3) {
+    let point = |p: &mut DVec3| *p = *p * scale + offset;
+    match &mut d.camera {
+        CameraDescription::Perspective(c) => {
+            for length in [&mut c.aperture, &mut c.focus_distance].into_iter().flatten() {
+                *length *= scale;
+            }
+            [&mut c.position, &mut c.look_at].map(point)
+        }
+        CameraDescription::Panorama(c) => [&mut c.position, &mut c.look_at].map(point),
+        CameraDescription::Orthographic(c) => {
+            c.height *= scale;
+            [&mut c.position, &mut c.look_at].map(point)
+        }
+        other => panic!("no random scene has the camera {other:?}"),
+    };
+    for light in &mut d.lights {
+        match light {
+            LightDescription::Rectangle(l) => {
+                point(&mut l.center);
+                l.size = l.size.map(|side| side * scale);
+            }
+            LightDescription::Point(l) => point(&mut l.position),
+            LightDescription::Spot(l) => point(&mut l.position),
+            _ => {}
+        }
+    }
+    for shape in &mut d.shapes {
+        match shape {
+            ShapeDescription::Rectangle(s) => {
+                point(&mut s.center);
+                s.size = s.size.map(|side| side * scale);
+            }
+            ShapeDescription::Sphere(s) => {
+                point(&mut s.center);
+                s.radius *= scale;
+            }
+            ShapeDescription::Disk(s) => {
+                point(&mut s.center);
+                s.radius *= scale;
+            }
+            ShapeDescription::Ellipsoid(s) => {
+                point(&mut s.center);
+                [&mut s.a, &mut s.b, &mut s.c]
+                    .into_iter()
+                    .for_each(|axis| *axis *= scale);
+            }
+            ShapeDescription::Triangle(s) => s.vertices.iter_mut().for_each(point),
+            ShapeDescription::Tetrahedron(s) => s.vertices.iter_mut().for_each(point),
+            ShapeDescription::Plane(s) => point(&mut s.point),
+            ShapeDescription::Mesh(s) => placed(&mut s.translate, &mut s.scale, &mut s.matrix, scale, offset),
+            other => panic!("no random scene has the shape {other:?}"),
+        }
+    }
+    for i in &mut d.instances {
+        placed(&mut i.translate, &mut i.scale, &mut i.matrix, scale, offset);
+    }
+}
+
+/// Scales and moves a mesh.
+fn placed(
+    translate: &mut Option<DVec3>,
+    factors: &mut Option<Scale>,
+    matrix: &mut Option<Vec<[f64; 4]>>,
+    scale: f64,
+    offset: DVec3,
+) {
+    if let Some(rows) = matrix {
+        for (row, offset) in rows.iter_mut().zip(offset.to_array()) {
+            *row = row.map(|x| x * scale);
+            row[3] += offset;
+        }
+        return;
+    }
+    *translate = Some(translate.unwrap_or_default() * scale + offset);
+    *factors = Some(match factors {
+        None => Scale::All(scale),
+        Some(Scale::All(s)) => Scale::All(*s * scale),
+        Some(Scale::Each(s)) => Scale::Each(*s * scale),
+    });
+}

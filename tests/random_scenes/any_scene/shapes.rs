@@ -1,0 +1,177 @@
+//! Shapes, meshes and instances of them.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use proptest::prelude::*;
+use proptest::sample::select;
+use wgray::mesh::Normals;
+use wgray::pack::MOST_OUTSIDE;
+use wgray::scene::*;
+
+use super::files::MESHES;
+use super::values::*;
+
+pub fn shape() -> impl Strategy<Value = ShapeDescription> {
+    let material = select(&["a", "b", "c"][..]).prop_map(str::to_string);
+    let rectangle = (material.clone(), point(), frame(), [length(), length()]).prop_map(
+        |(material, center, [normal, tangent], size)| {
+            ShapeDescription::Rectangle(RectangleDescription {
+                material,
+                center,
+                size,
+                normal,
+                tangent,
+            })
+        },
+    );
+    let disk = (material.clone(), point(), frame(), length(), any::<bool>()).prop_map(
+        |(material, center, [normal, tangent], radius, turned)| {
+            ShapeDescription::Disk(DiskDescription {
+                material,
+                center,
+                radius,
+                normal,
+                tangent: turned.then_some(tangent),
+            })
+        },
+    );
+    let sphere = (material.clone(), point(), length()).prop_map(|(material, center, radius)| {
+        ShapeDescription::Sphere(SphereDescription {
+            material,
+            center,
+            radius,
+        })
+    });
+    let ellipsoid = (
+        material.clone(),
+        point(),
+        frame(),
+        direction(),
+        [length(), length(), length()],
+    )
+        .prop_map(|(material, center, [a, b], c, [la, lb, lc])| {
+            let (a, b, c) = (a.normalize() * la, b.normalize() * lb, c.normalize() * lc);
+            ShapeDescription::Ellipsoid(EllipsoidDescription {
+                material,
+                center,
+                a,
+                b,
+                c,
+            })
+        });
+    let triangle = (material.clone(), [point(), point(), point()])
+        .prop_map(|(material, vertices)| ShapeDescription::Triangle(TriangleDescription { material, vertices }));
+    let tetrahedron = (material.clone(), [point(), point(), point(), point()])
+        .prop_map(|(material, vertices)| ShapeDescription::Tetrahedron(TetrahedronDescription { material, vertices }));
+    let plane = (material, point(), frame()).prop_map(|(material, point, [normal, tangent])| {
+        ShapeDescription::Plane(PlaneDescription {
+            material,
+            point,
+            normal,
+            tangent,
+        })
+    });
+    prop_oneof![
+        2 => rectangle,
+        1 => disk,
+        2 => sphere,
+        2 => ellipsoid,
+        1 => triangle,
+        1 => tetrahedron,
+        1 => plane,
+    ]
+}
+
+/// What places a mesh: translate, rotate and scale, or a matrix.
+pub type Placement = (Option<DVec3>, Option<Rotation>, Option<Scale>, Option<Vec<[f64; 4]>>);
+
+pub fn placement() -> impl Strategy<Value = Placement> {
+    let angle = || prop_oneof![2 => select(&[0.0, 90.0, -180.0, 30.0][..]), 1 => -360.0..360.0];
+    let angles = [angle(), angle(), angle()].prop_map(|a| Rotation::Angles(DVec3::from_array(a)));
+    let about = (direction(), angle()).prop_map(|(axis, degrees)| Rotation::About(RotationAbout { axis, degrees }));
+    let rotation = prop_oneof![1 => Just(None), 1 => angles.prop_map(Some), 1 => about.prop_map(Some)];
+    let size = || select(&[1.0, 0.7, 0.3, -0.5, 1.0, 1e-3, 1e3][..]);
+    let each = [size(), size(), size()].prop_map(|s| Scale::Each(DVec3::from_array(s)));
+    let scale = prop_oneof![2 => Just(None), 2 => size().prop_map(|s| Some(Scale::All(s))), 1 => each.prop_map(Some)];
+    let parts = (prop::option::of(point()), rotation, scale).prop_map(|(t, r, s)| (t, r, s, None));
+    let row = || [coordinate(), coordinate(), coordinate(), coordinate()];
+    let matrix = [row(), row(), row()].prop_map(|rows| (None, None, None, Some(rows.to_vec())));
+    prop_oneof![5 => parts, 1 => matrix]
+}
+
+pub fn normals() -> impl Strategy<Value = Option<Normals>> {
+    select(vec![None, Some(Normals::Smooth), Some(Normals::Flat)])
+}
+
+pub fn up() -> impl Strategy<Value = Up> {
+    select(vec![Up::Z, Up::Y, Up::X])
+}
+
+/// Materials of groups that have others than the rest.
+pub fn materials_of_groups() -> impl Strategy<Value = BTreeMap<String, String>> {
+    prop::option::of(select(&["a", "b", "c"][..])).prop_map(|material| {
+        let named = material.map(|material| ("second".to_string(), material.to_string()));
+        named.into_iter().collect()
+    })
+}
+
+pub fn mesh() -> impl Strategy<Value = ShapeDescription> {
+    let material = select(&["a", "b", "c"][..]).prop_map(str::to_string);
+    let file = select(MESHES).prop_map(|(name, ..)| name.to_string());
+    (file, normals(), up(), material, materials_of_groups(), placement()).prop_map(
+        |(file, normals, up, material, materials, (translate, rotate, scale, matrix))| {
+            ShapeDescription::Mesh(MeshDescription {
+                file,
+                normals,
+                up,
+                material: Some(material),
+                materials,
+                translate,
+                rotate,
+                scale,
+                matrix,
+            })
+        },
+    )
+}
+
+pub fn instance() -> impl Strategy<Value = InstanceDescription> {
+    let name = || select(&["a", "b", "c"][..]).prop_map(str::to_string);
+    (name(), name(), materials_of_groups(), placement()).prop_map(
+        |(mesh, material, materials, (translate, rotate, scale, matrix))| InstanceDescription {
+            mesh,
+            material: Some(material),
+            materials,
+            translate,
+            rotate,
+            scale,
+            matrix,
+        },
+    )
+}
+
+/// Meshes for instances, which some scenes have.
+pub fn meshes() -> impl Strategy<Value = (BTreeMap<String, MeshFileDescription>, Vec<InstanceDescription>)> {
+    let file = || {
+        (select(MESHES), normals(), up()).prop_map(|((name, ..), normals, up)| {
+            let mut mesh = MeshFileDescription::new(name.to_string());
+            (mesh.normals, mesh.up) = (normals, up);
+            mesh
+        })
+    };
+    let files = [file(), file(), file()].prop_map(|files| {
+        let names = ["a", "b", "c"].map(str::to_string);
+        names.into_iter().zip(files).collect()
+    });
+    let some = (files, prop::collection::vec(instance(), 1..5));
+    prop_oneof![3 => Just(Default::default()), 1 => some]
+}
+
+/// A few shapes, or so many that they are in a tree. Meshes are few among them, as kernels that walk through trees take seconds
+/// to compile.
+pub fn shapes() -> impl Strategy<Value = Vec<ShapeDescription>> {
+    let shape = || prop_oneof![9 => shape(), 1 => mesh()];
+    let many = MOST_OUTSIDE + 1..MOST_OUTSIDE + 20;
+    prop_oneof![11 => prop::collection::vec(shape(), 0..7), 1 => prop::collection::vec(shape(), many)]
+}

@@ -1,0 +1,37 @@
+//! Points, directions, lengths and colours.
+
+use glam::DVec3;
+use proptest::prelude::*;
+use proptest::sample::select;
+
+/// Often one of a few numbers, so that things touch, coincide and lie in one plane.
+pub fn coordinate() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        3 => select(&[0.0, 0.5, -0.5, 1.0, -1.0][..]),
+        2 => (-64i32..64).prop_map(|n| f64::from(n) / 32.0),
+        1 => -2.0..2.0,
+    ]
+}
+
+pub fn point() -> impl Strategy<Value = DVec3> {
+    [coordinate(), coordinate(), coordinate()].prop_map(DVec3::from_array)
+}
+
+pub fn direction() -> impl Strategy<Value = DVec3> {
+    let axes = select(vec![DVec3::Z, DVec3::X, DVec3::Y, -DVec3::Z, -DVec3::X, -DVec3::Y]);
+    prop_oneof![2 => axes, 1 => point().prop_filter("a direction", |v| v.length() > 0.1)]
+}
+
+/// Perpendicular directions with equal lengths, of any orientation.
+pub fn frame() -> impl Strategy<Value = [DVec3; 2]> {
+    [direction(), direction()].prop_filter("a frame", |[a, b]| a.normalize().cross(b.normalize()).length() > 0.01)
+}
+
+pub fn length() -> impl Strategy<Value = f64> {
+    prop_oneof![select(&[1.0, 0.5, 2.0, 0.01][..]), 0.05..2.0]
+}
+
+pub fn color(most: f64) -> impl Strategy<Value = DVec3> {
+    let part = prop_oneof![select(vec![0.5, 0.0, 1.0]), 0.0..most];
+    [part.clone(), part.clone(), part].prop_map(DVec3::from_array)
+}
