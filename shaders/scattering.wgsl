@@ -7,7 +7,8 @@ struct Reflection {
     pdf: f32,              // per solid angle
 }
 
-fn reflection(spot: Spot, surface: Surface, material: Material, mixture: Mixture, wi: vec3f) -> Reflection {
+// Of what has no lobes in a frame of its own.
+fn plain_reflection(surface: Surface, material: Material, wi: vec3f) -> Reflection {
     let angles = angles_at(surface.shading_normal, surface.wo, wi);
     var result = Reflection(vec3f(0.0), 0.0);
     if (MATERIALS & (1u << DIFFUSE)) != 0u {
@@ -23,6 +24,12 @@ fn reflection(spot: Spot, surface: Surface, material: Material, mixture: Mixture
             result = Reflection(modified_phong_eval(material, angles), modified_phong_pdf(material, angles));
         }
     }
+    return result;
+}
+
+// Of any surface.
+fn reflection(spot: Spot, surface: Surface, material: Material, mixture: Mixture, wi: vec3f) -> Reflection {
+    var result = plain_reflection(surface, material, wi);
     if (MATERIALS & FACET_KINDS) != 0u {
         if has_facets(material) {
             let frame = Tangents(surface.du, surface.dv);

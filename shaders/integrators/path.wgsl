@@ -312,8 +312,9 @@ fn scattered(before: PathState, spot: Spot, surface: Surface, material: Material
             wi = modified_phong_sample(material, surface.shading_normal, surface.wo, u, random);
         }
     }
-    let reflected = reflection(spot, surface, material, mixture, wi);
-    let factor = reflected.value * select(0.0, 1.0 / reflected.pdf, reflected.pdf > 0.0);
+    let reflected = plain_reflection(surface, material, wi);
+    let value = select(vec3f(0.0), reflected.value, lets_light(spot, surface, material, wi));
+    let factor = value * select(0.0, 1.0 / reflected.pdf, reflected.pdf > 0.0);
     let throughput = before.path.throughput * factor;
     state.path = Path(Ray(surface.start, wi), Differential(), throughput, before.path.depth + 1u, 0u, surface.above, surface.below);
     state.pdf = reflected.pdf;

@@ -52,6 +52,25 @@ pub struct Reflection {
 }
 
 #[inline(always)]
+pub fn plain_reflection(surface: &Surface, material: &Material, wi: Vec3) -> Reflection {
+    let angles = angles_at(surface.shading_normal, surface.wo, wi);
+    if material.kind == PHONG {
+        return Reflection {
+            value: modified_phong_eval(material, angles),
+            pdf: modified_phong_pdf(material, angles),
+        };
+    }
+    Reflection {
+        value: if material.roughness > 0.0 {
+            rough_diffuse_eval(material, angles)
+        } else {
+            diffuse_eval(material, angles)
+        },
+        pdf: diffuse_pdf(angles),
+    }
+}
+
+#[inline(always)]
 pub fn reflection(
     scene: &Packed,
     spot: &Spot,
@@ -60,49 +79,28 @@ pub fn reflection(
     mixture: &Mixture,
     wi: Vec3,
 ) -> Reflection {
-    if has_facets(material) {
-        let frame = Tangents {
-            u: surface.du,
-            v: surface.dv,
-        };
+    let frame = Tangents {
+        u: surface.du,
+        v: surface.dv,
+    };
+    let mut result = if has_facets(material) {
         let wo = vector_to_lobe(frame, surface.shading_normal, surface.wo);
-        let mut result = facet_reflection(material, wo, vector_to_lobe(frame, surface.shading_normal, wi));
-        if !lets_light(scene, spot, surface, material, wi) {
-            result.value = Vec3::ZERO;
-        }
-        return result;
-    }
-    let angles = angles_at(surface.shading_normal, surface.wo, wi);
-    let (value, pdf) = if material.kind == PHONG {
-        (
-            modified_phong_eval(material, angles),
-            modified_phong_pdf(material, angles),
-        )
+        facet_reflection(material, wo, vector_to_lobe(frame, surface.shading_normal, wi))
     } else if material.kind == PRINCIPLED {
         let lobes = scene.specialization.lobes;
-        let frame = Tangents {
-            u: surface.du,
-            v: surface.dv,
-        };
         let local = vector_to_lobe(frame, surface.shading_normal, wi);
         let wo = local_wo(surface);
-        (
-            principled_eval(mixture, wo, local, lobes),
-            principled_pdf(mixture, wo, local, lobes),
-        )
-    } else if material.roughness > 0.0 {
-        (rough_diffuse_eval(material, angles), diffuse_pdf(angles))
+        Reflection {
+            value: principled_eval(mixture, wo, local, lobes),
+            pdf: principled_pdf(mixture, wo, local, lobes),
+        }
     } else {
-        (diffuse_eval(material, angles), diffuse_pdf(angles))
+        plain_reflection(surface, material, wi)
     };
-    Reflection {
-        value: if lets_light(scene, spot, surface, material, wi) {
-            value
-        } else {
-            Vec3::ZERO
-        },
-        pdf,
+    if !lets_light(scene, spot, surface, material, wi) {
+        result.value = Vec3::ZERO;
     }
+    result
 }
 
 pub fn bounded(found: Material) -> Material {

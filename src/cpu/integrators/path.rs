@@ -24,7 +24,8 @@ use crate::cpu::ray::{Hit, Ray};
 use crate::cpu::rng::{hash4, unit_float};
 use crate::cpu::scattering::{
     NO_MIXTURE, absorption_behind, albedo, bounded, facet_frame, facet_sample, facets_of, has_facets, has_inside,
-    is_delta, lets_light, lets_through, lit_normal, local_wo, mixture_at, reflection, shaded_normal, turned_over,
+    is_delta, lets_light, lets_through, lit_normal, local_wo, mixture_at, plain_reflection, reflection, shaded_normal,
+    turned_over,
 };
 use crate::cpu::sequence::sobol_bits;
 use crate::cpu::surface::{Surface, largest};
@@ -457,8 +458,13 @@ pub fn scattered(
         } else {
             diffuse_sample(surface.shading_normal, u)
         };
-        let reflected = reflection(scene, spot, surface, material, mixture, wi);
-        let factor = reflected.value * if reflected.pdf > 0.0 { 1.0 / reflected.pdf } else { 0.0 };
+        let reflected = plain_reflection(surface, material, wi);
+        let value = if lets_light(scene, spot, surface, material, wi) {
+            reflected.value
+        } else {
+            Vec3::ZERO
+        };
+        let factor = value * if reflected.pdf > 0.0 { 1.0 / reflected.pdf } else { 0.0 };
         let path = Path {
             ray: Ray {
                 origin: surface.start,
