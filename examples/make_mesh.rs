@@ -7,8 +7,8 @@
 //! cargo run --release --example make_mesh -- rock 1000000 target/rock.ply
 //! ```
 //!
-//! The number is about how many triangles there shall be. The ending of the name says the format: `.obj`, `.ply` or `.stl`,
-//! the latter two binary. +Z is up.
+//! The number is about how many triangles there shall be. The ending of the name says the format: `.obj`, `.ply`, `.stl` or
+//! `.glb`, all but the first binary. +Z is up, but in `.glb` +Y is.
 
 use std::collections::HashMap;
 use std::error::Error;
@@ -119,7 +119,8 @@ impl Triangles {
             Some("obj") => Ok(self.to_obj()),
             Some("ply") => Ok(self.to_ply()),
             Some("stl") => Ok(self.to_stl()),
-            _ => Err(format!("{file:?} must end in .obj, .ply or .stl").into()),
+            Some("glb") => Ok(self.to_glb()),
+            _ => Err(format!("{file:?} must end in .obj, .ply, .stl or .glb").into()),
         }
     }
 
@@ -132,6 +133,47 @@ impl Triangles {
             writeln!(text, "f {a} {b} {c}").expect("a string takes all text");
         }
         text.into_bytes()
+    }
+
+    /// glTF: a mesh of one primitive, in a container.
+    fn to_glb(&self) -> Vec<u8> {
+        let (vertices, indices) = (self.positions.len(), 3 * self.triangles.len());
+        let mut binary = Vec::with_capacity(12 * vertices + 4 * indices);
+        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        for [x, y, z] in &self.positions {
+            for (k, x) in [*x, *z, -*y].into_iter().enumerate() {
+                (low[k], high[k]) = (low[k].min(x), high[k].max(x));
+                binary.extend(x.to_le_bytes());
+            }
+        }
+        for vertex in self.triangles.iter().flatten() {
+            binary.extend(vertex.to_le_bytes());
+        }
+        let (all, at) = (binary.len(), 12 * vertices);
+        let mut json =
+            r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"#.to_owned();
+        json += r#""meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],"#;
+        json += r#""materials":[{"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0.5}}],"#;
+        json += &format!(r#""accessors":[{{"bufferView":0,"componentType":5126,"count":{vertices},"type":"VEC3","#);
+        json += &format!(r#""min":{low:?},"max":{high:?}}},"#);
+        json += &format!(r#"{{"bufferView":1,"componentType":5125,"count":{indices},"type":"SCALAR"}}],"#);
+        json += &format!(r#""bufferViews":[{{"buffer":0,"byteLength":{at}}},"#);
+        json += &format!(
+            r#"{{"buffer":0,"byteOffset":{at},"byteLength":{}}}],"buffers":[{{"byteLength":{all}}}]}}"#,
+            all - at
+        );
+        json += &" ".repeat(json.len().next_multiple_of(4) - json.len());
+        let mut bytes = b"glTF".to_vec();
+        let word = |bytes: &mut Vec<u8>, x: usize| bytes.extend((x as u32).to_le_bytes());
+        word(&mut bytes, 2);
+        word(&mut bytes, 12 + 8 + json.len() + 8 + all);
+        word(&mut bytes, json.len());
+        bytes.extend(b"JSON");
+        bytes.extend(json.as_bytes());
+        word(&mut bytes, all);
+        bytes.extend(b"BIN\0");
+        bytes.extend(binary);
+        bytes
     }
 
     fn to_ply(&self) -> Vec<u8> {

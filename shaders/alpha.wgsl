@@ -15,24 +15,28 @@ fn is_there(material: Material, pixel: vec2u, sample: u32, bounce: u32, purpose:
     return whole | (material.alpha_mode == OPAQUE);
 }
 
-// What is there at a point, by its texture if it has one.
-fn with_opacity_at(before: Material, uv: vec2f) -> Material {
+// What is there at a point, by its texture if it has one, and by the colours of its vertices.
+fn with_opacity_at(before: Material, spot: Spot, hit: Hit, uv: vec2f) -> Material {
     var material = before;
     for (var i = 0u; i < LOOKUPS; i++) {
         if i < material.lookups.y {
             let lookup = load_lookup(material.lookups.x + i);
             if (lookup.purposes & FOR_OPACITY) != 0u {
-                let color = texture_color(load_texture(lookup.texture), Footprint(uv, vec2f(0.0), vec2f(0.0)));
+                let place = uv_in_set(uv, spot, hit, lookup.uv_set);
+                let color = texture_color(load_texture(lookup.texture), Footprint(place, vec2f(0.0), vec2f(0.0)));
                 material.opacity = channel_of(color, lookup, OPACITY_CHANNEL);
             }
         }
+    }
+    if VERTEX_COLORS != 0u {
+        material = with_vertex_colors(material, hit);
     }
     return material;
 }
 
 // The share of rays that a surface is there for, at texture coordinates.
-fn presence_at(before: Material, uv: vec2f) -> f32 {
-    let material = with_opacity_at(before, uv);
+fn presence_at(before: Material, spot: Spot, hit: Hit, uv: vec2f) -> f32 {
+    let material = with_opacity_at(before, spot, hit, uv);
     let whole = select(0.0, 1.0, material.opacity >= material.cutoff);
     let share = select(min(material.opacity, 1.0), whole, material.alpha_mode == MASK);
     return select(share, 1.0, material.alpha_mode == OPAQUE);
@@ -56,7 +60,7 @@ fn is_veiled(before: bool, surface: Surface, to: vec3f, reach: f32, goal: u32, p
         }
         let spot = spot_of(hit);
         let met = surface_of(spot, hit, ray);
-        let material = with_opacity_at(material_of(spot), met.uv);
+        let material = with_opacity_at(material_of(spot), spot, hit, met.uv);
         let is_goal = (hit.instance == 0u) & (hit.primitive == goal);
         if !is_goal & is_there(material, pixel, sample, bounce, TO_LIGHT, hit, met.side) {
             return true;
@@ -80,7 +84,7 @@ fn first_seen(ray: Ray, met: Hit) -> Hit {
         }
         let spot = spot_of(hit);
         let surface = surface_of(spot, hit, onward);
-        let material = with_opacity_at(material_of(spot), surface.uv);
+        let material = with_opacity_at(material_of(spot), spot, hit, surface.uv);
         let least = select(0.5, material.cutoff, material.alpha_mode == MASK);
         if (material.alpha_mode == OPAQUE) | (material.opacity >= least) {
             break;

@@ -79,32 +79,45 @@ fn sample_light(light: Light, p: vec3f, u: vec2f) -> LightSample {
         if !is_delta {
             let q = load_primitive(light.primitive);
             let uv = primitive_uv(q, point_to_local(q, p + to));
-            radiance = emission_at(load_material(q.material), uv);
+            let hit = hit_on_primitive(light.primitive);
+            radiance = emission_at(load_material(q.material), spot_by_itself(q), hit, uv);
         }
     }
     if SEES_THROUGH != 0u {
         if !is_delta {
             let q = load_primitive(light.primitive);
-            radiance *= presence_at(load_material(q.material), primitive_uv(q, point_to_local(q, p + to)));
+            let hit = hit_on_primitive(light.primitive);
+            radiance *= presence_at(load_material(q.material), spot_by_itself(q), hit, primitive_uv(q, point_to_local(q, p + to)));
         }
     }
     radiance = select(radiance, vec3f(0.0), behind);
     return LightSample(to, radiance, pdf, is_delta, light.reach, light.primitive);
 }
 
+// A hit on a primitive by itself, for what asks for no more of it.
+fn hit_on_primitive(primitive: u32) -> Hit {
+    return Hit(0.0, 0u, primitive, 0u, vec2f(0.0));
+}
+
 // Of a triangle of a mesh.
 fn sample_face(chosen: Chosen, p: vec3f, u: vec2f) -> LightSample {
     let emitter = chosen.emitter;
     let b = triangle_sample(u);
-    let face = face_of(load_instance(emitter.instance - 1u), Hit(0.0, emitter.instance, 0u, emitter.index, b));
+    let hit = Hit(0.0, emitter.instance, 0u, emitter.index, b);
+    let face = face_of(load_instance(emitter.instance - 1u), hit);
     let material = material_of(face);
     let to = face.primitive.anchor + (face.edge_1 * b.x + face.edge_2 * b.y) - p;
     var radiance = material.emission;
     if EMISSION_TEXTURES != 0u {
-        radiance = emission_at(material, face_uv(face, b));
+        radiance = emission_at(material, face, hit, face_uv(face, b));
+    }
+    if VERTEX_COLORS != 0u {
+        if material.vertex_colors == COLORS_OF_EMISSION {
+            radiance *= vertex_color(hit).xyz;
+        }
     }
     if SEES_THROUGH != 0u {
-        radiance *= presence_at(material, face_uv(face, b));
+        radiance *= presence_at(material, face, hit, face_uv(face, b));
     }
     var density = material.density;
     if LIGHT_TREE != 0u {
@@ -114,14 +127,15 @@ fn sample_face(chosen: Chosen, p: vec3f, u: vec2f) -> LightSample {
     return LightSample(to, radiance, pdf, false, environment.reach, NOTHING);
 }
 
-// What a surface radiates at texture coordinates.
-fn emission_at(material: Material, uv: vec2f) -> vec3f {
+// What a surface radiates at texture coordinates, the colours of its vertices aside.
+fn emission_at(material: Material, spot: Spot, hit: Hit, uv: vec2f) -> vec3f {
     var emission = material.emission;
     for (var i = 0u; i < LOOKUPS; i++) {
         if i < material.lookups.y {
             let lookup = load_lookup(material.lookups.x + i);
             if (lookup.purposes & FOR_EMISSION) != 0u {
-                emission = texture_color(load_texture(lookup.texture), Footprint(uv, vec2f(0.0), vec2f(0.0)));
+                let place = uv_in_set(uv, spot, hit, lookup.uv_set);
+                emission = texture_color(load_texture(lookup.texture), Footprint(place, vec2f(0.0), vec2f(0.0)));
             }
         }
     }

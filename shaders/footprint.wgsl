@@ -13,14 +13,23 @@ fn surface_footprint(q: Primitive, surface: Surface, dx: vec3f, dy: vec3f) -> Fo
                      uv_derivative(q, local, vector_to_local(q, dy)));
 }
 
+// What a texture is beyond its edges along u, and along v.
+fn wrap_u(t: Texture) -> u32 {
+    return t.wrap & 3u;
+}
+
+fn wrap_v(t: Texture) -> u32 {
+    return t.wrap >> 2u;
+}
+
 // A surface's footprint in a texture's own coordinates. Beyond an edge that is clamped nothing changes across the edge: the footprint
 // is a point there in that direction, so that no coarse level brings in what is far from the edge.
 fn texture_footprint(t: Texture, f: Footprint) -> Footprint {
     let dx = vec2f(t.u.x * f.dx.x + t.u.y * f.dx.y, t.v.x * f.dx.x + t.v.y * f.dx.y);
     let dy = vec2f(t.u.x * f.dy.x + t.u.y * f.dy.y, t.v.x * f.dy.x + t.v.y * f.dy.y);
     let uv = vec2f(t.u.x * f.uv.x + t.u.y * f.uv.y + t.u.z, t.v.x * f.uv.x + t.v.y * f.uv.y + t.v.z);
-    let x = (t.wrap == CLAMP) & ((uv.x < 0.0) | (uv.x > 1.0));
-    let y = (t.wrap == CLAMP) & ((uv.y < 0.0) | (uv.y > 1.0));
+    let x = (wrap_u(t) == CLAMP) & ((uv.x < 0.0) | (uv.x > 1.0));
+    let y = (wrap_v(t) == CLAMP) & ((uv.y < 0.0) | (uv.y > 1.0));
     return Footprint(uv, vec2f(select(dx.x, 0.0, x), select(dx.y, 0.0, y)),
                      vec2f(select(dy.x, 0.0, x), select(dy.y, 0.0, y)));
 }

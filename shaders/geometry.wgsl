@@ -102,10 +102,14 @@ fn seen_path(start: Path) -> Path {
             break;
         }
         let spot = spot_of(hit);
-        if material_of(spot).hidden == 0u {
+        let hidden = material_of(spot).hidden;
+        if hidden == 0u {
             break;
         }
         let surface = surface_of(spot, hit, path.ray);
+        if (hidden == HIDDEN_BACK) & (surface.side > 0.0) {
+            break;
+        }
         path = passed_path(path, surface, arrival_of(spot, hit, surface, path.ray, path.differential));
     }
     return path;

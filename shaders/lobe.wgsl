@@ -42,6 +42,12 @@ fn lobe_frame(surface: Surface, rotation: f32) -> Tangents {
     return Tangents(u, cross(n, u));
 }
 
+// How far a direction, whose parts along u and v are red and green from 0 to 1 as -1 to 1, is turned from u towards v, in half turns; 0 where
+// it has no length: KHR_materials_anisotropy.
+fn direction_turn(color: vec3f) -> f32 {
+    return atan2(2.0 * color.y - 1.0, 2.0 * color.x - 1.0) * 0.31830988618379067;
+}
+
 // A vector in a lobe's frame.
 fn vector_to_lobe(frame: Tangents, n: vec3f, w: vec3f) -> vec3f {
     return vec3f(dot(frame.u, w), dot(frame.v, w), dot(n, w));

@@ -144,6 +144,11 @@ fn face_uv(face: Spot, b: vec2f) -> vec2f {
     return face.uv_0 + (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y;
 }
 
+// A colour between those of the vertices, at barycentric coordinates b; never below 0.
+fn color_between(c0: vec4f, c1: vec4f, c2: vec4f, b: vec2f) -> vec4f {
+    return max4(c0 + (c1 - c0) * b.x + (c2 - c0) * b.y, vec4f(0.0));
+}
+
 // The unit normal between the vertices' own, on the outer side of the triangle; the triangle's where they have none.
 fn face_normal(face: Spot, b: vec2f) -> vec3f {
     let n = face.normal_0 * (1.0 - b.x - b.y) + face.normal_1 * b.x + face.normal_2 * b.y;

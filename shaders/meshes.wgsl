@@ -55,7 +55,7 @@ fn face_of(i: Instance, hit: Hit) -> Spot {
             face.uv_2 = vec2f(bitcast<f32>(meshes[i.vertices + corners.z].w), row_2.w);
         }
     }
-    if NORMAL_MAPS == 1u {
+    if (NORMAL_MAPS == 1u) | (ANISOTROPIC == 1u) {
         if i.tangents != NOTHING {
             face.tangents_0 = load_tangents(i, corners.x);
             face.tangents_1 = load_tangents(i, corners.y);

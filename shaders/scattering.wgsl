@@ -48,10 +48,10 @@ fn reflection(spot: Spot, surface: Surface, material: Material, mixture: Mixture
     return result;
 }
 
-// A material as its textures make it, none of which makes more light than there is.
+// A material as its textures and vertices make it, none of which makes more light than there is.
 fn bounded(found: Material) -> Material {
     var material = found;
-    if LOOKUPS != 0u {
+    if (LOOKUPS != 0u) | (VERTEX_COLORS != 0u) {
         let one = vec3f(1.0);
         let above = (found.diffuse > one) & vec3<bool>((found.kind == DIFFUSE) | (found.kind == PRINCIPLED));
         material.diffuse = select(found.diffuse, one, above);

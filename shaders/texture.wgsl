@@ -38,7 +38,7 @@ fn level_of(t: Texture, i: u32) -> Level {
 }
 
 fn load_texel(t: Texture, level: Level, x: i32, y: i32) -> vec3f {
-    let i = wrapped_index(y, level.height, t.wrap) * level.width + wrapped_index(x, level.width, t.wrap);
+    let i = wrapped_index(y, level.height, wrap_v(t)) * level.width + wrapped_index(x, level.width, wrap_u(t));
     var color = vec3f(0.0);
     if (TEXEL_FORMATS & 4u) != 0u {
         if t.format == FLOAT {
@@ -56,8 +56,8 @@ fn load_texel(t: Texture, level: Level, x: i32, y: i32) -> vec3f {
 
 fn nearest_color(t: Texture, uv: vec2f) -> vec3f {
     let level = level_of(t, 0u);
-    let x = floor(near_coordinate(uv.x, t.wrap) * f32(level.width));
-    let y = floor(near_coordinate(uv.y, t.wrap) * f32(level.height));
+    let x = floor(near_coordinate(uv.x, wrap_u(t)) * f32(level.width));
+    let y = floor(near_coordinate(uv.y, wrap_v(t)) * f32(level.height));
     return load_texel(t, level, i32(x), i32(y));
 }
 
@@ -87,8 +87,8 @@ fn linear_color(t: Texture, f: Footprint) -> vec3f {
 }
 
 fn bilinear_color(t: Texture, level: Level, uv: vec2f) -> vec3f {
-    let x = near_coordinate(uv.x, t.wrap) * f32(level.width) - 0.5;
-    let y = near_coordinate(uv.y, t.wrap) * f32(level.height) - 0.5;
+    let x = near_coordinate(uv.x, wrap_u(t)) * f32(level.width) - 0.5;
+    let y = near_coordinate(uv.y, wrap_v(t)) * f32(level.height) - 0.5;
     let x0 = floor(x);
     let y0 = floor(y);
     var rows = array(vec3f(0.0), vec3f(0.0));
@@ -137,8 +137,8 @@ fn ewa_level_color(t: Texture, level: Level, uv: vec2f, dx: vec2f, dy: vec2f) ->
     let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, least);
     let slope = m.y / yy;
     let across = xx - m.y * slope; // the square of the half width of the row through the centre
-    let x = near_coordinate(uv.x, t.wrap) * size.x - 0.5;
-    let y = near_coordinate(uv.y, t.wrap) * size.y - 0.5;
+    let x = near_coordinate(uv.x, wrap_u(t)) * size.x - 0.5;
+    let y = near_coordinate(uv.y, wrap_v(t)) * size.y - 0.5;
     let reach = sqrt(yy);
     let first_row = -i32(floor(reach - y));
     let last_row = i32(floor(y + reach));
@@ -176,6 +176,9 @@ fn with_principled(before: Material, color: vec3f, lookup: Lookup) -> Material {
     m.sheen = select(m.sheen, color, (purposes & FOR_SHEEN) != 0u);
     m.metallic = select(m.metallic, channel_of(color, lookup, METALLIC_CHANNEL), (purposes & FOR_METALLIC) != 0u);
     m.anisotropy = select(m.anisotropy, channel_of(color, lookup, ANISOTROPY_CHANNEL), (purposes & FOR_ANISOTROPY) != 0u);
+    if (LOBES & LOBE_ANISOTROPY) != 0u {
+        m.rotation += select(0.0, direction_turn(color), (purposes & FOR_DIRECTION) != 0u);
+    }
     m.specular_weight = select(m.specular_weight, channel_of(color, lookup, WEIGHT_CHANNEL), (purposes & FOR_WEIGHT) != 0u);
     m.transmission = select(m.transmission, channel_of(color, lookup, TRANSMISSION_CHANNEL), (purposes & FOR_TRANSMISSION) != 0u);
     m.clearcoat = select(m.clearcoat, channel_of(color, lookup, COAT_CHANNEL), (purposes & FOR_COAT) != 0u);
@@ -205,7 +208,7 @@ fn appearance(spot: Spot, hit: Hit, material: Material, surface: Surface, at: Ar
         if i < material.lookups.y {
             let lookup = load_lookup(material.lookups.x + i);
             let t = load_texture(lookup.texture);
-            let color = texture_color(t, footprint);
+            let color = texture_color(t, footprint_in_set(footprint, spot, hit, at, lookup.uv_set));
             let purposes = lookup.purposes;
             look.material.ambient = select(look.material.ambient, color, (purposes & FOR_AMBIENT) != 0u);
             look.material.diffuse = select(look.material.diffuse, color, (purposes & FOR_DIFFUSE) != 0u);

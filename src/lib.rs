@@ -76,6 +76,7 @@ pub mod dev;
 pub mod device;
 pub mod error;
 pub mod film;
+mod gltf;
 #[cfg(feature = "gpu")]
 #[doc(hidden)]
 pub mod gpu;

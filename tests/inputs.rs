@@ -704,7 +704,7 @@ fn texture(random: &Random) -> Texture {
         u: vector(random).as_vec3(),
         format: random.below(3),
         v: vector(random).as_vec3(),
-        wrap: random.below(3),
+        wrap: random.below(3) + 4 * random.below(3),
         texels: 0,
         width: 1 + random.below(300),
         height: 1 + random.below(300),

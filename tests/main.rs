@@ -15,6 +15,7 @@ mod culling;
 mod dev;
 #[cfg(target_os = "linux")]
 mod faults;
+mod gltf;
 mod grounds;
 mod inputs;
 mod integrator;
@@ -25,6 +26,7 @@ mod layout;
 mod lens;
 mod loops;
 mod meshes;
+mod model;
 mod nearly;
 mod oracle;
 mod panorama;

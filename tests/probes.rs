@@ -18,7 +18,9 @@ use wgray::cpu::diffuse::{
 use wgray::cpu::disk::{disk_blocks, intersect_disk};
 use wgray::cpu::ellipsoid::{ellipsoid_blocks, ellipsoid_discriminant, ellipsoid_level, intersect_ellipsoid};
 use wgray::cpu::filter::{filter_bin, filter_offset};
-use wgray::cpu::footprint::{Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint};
+use wgray::cpu::footprint::{
+    Ellipse, Footprint, footprint_ellipse, surface_footprint, texture_footprint, wrap_u, wrap_v,
+};
 use wgray::cpu::ggx::{
     ggx_albedo, ggx_albedo_along, ggx_albedo_fit, ggx_d, ggx_g1, ggx_g2, ggx_length, ggx_pdf, ggx_sample,
 };
@@ -29,17 +31,17 @@ use wgray::cpu::light_sample::{
 };
 use wgray::cpu::light_tree::{light_child, light_importances, light_shares, mean_above};
 use wgray::cpu::lobe::{
-    LobeSample, facet_alpha, facet_eval, facet_loss, facet_pdf, facet_weight, half_vector, is_polished, lobe_frame,
-    plain_alpha, streak_place, vector_from_lobe, vector_to_lobe,
+    LobeSample, direction_turn, facet_alpha, facet_eval, facet_loss, facet_pdf, facet_weight, half_vector, is_polished,
+    lobe_frame, plain_alpha, streak_place, vector_from_lobe, vector_to_lobe,
 };
 use wgray::cpu::math::{
     atan2, cross, dot, exp2, floor, log2, max, max4, min, normalize, positive_zero, power, power_whole, sine,
 };
 use wgray::cpu::mesh::{
-    Crossing, Shear, Spot, face_arrival, face_bulge, face_first_hit, face_footprint, face_frame, face_lets_pass,
-    face_normal, face_normal_derivative, face_primitive, face_surface, face_tangents, face_uv, face_uv_derivative,
-    highest, lift, lowest, mesh_pad, normal_from_mesh, permuted, point_to_mesh, shear_of, sheared, spot_by_itself,
-    triangle_crossing, turned_to, vector_from_mesh, vector_to_mesh,
+    Crossing, Shear, Spot, color_between, face_arrival, face_bulge, face_first_hit, face_footprint, face_frame,
+    face_lets_pass, face_normal, face_normal_derivative, face_primitive, face_surface, face_tangents, face_uv,
+    face_uv_derivative, highest, lift, lowest, mesh_pad, normal_from_mesh, permuted, point_to_mesh, shear_of, sheared,
+    spot_by_itself, triangle_crossing, turned_to, vector_from_mesh, vector_to_mesh,
 };
 use wgray::cpu::metal::{conductor_fresnel, metal_eval, metal_factor, metal_fresnel, metal_pdf, metal_sample};
 use wgray::cpu::modified_phong::{
@@ -315,6 +317,7 @@ probes! {
     is_polished(material: &Material) -> bool;
     facet_alpha(material: &Material) -> Vec2;
     lobe_frame(surface: &Surface, rotation: f32) -> Tangents;
+    direction_turn(color: Vec3) -> f32;
     vector_to_lobe(frame: Tangents, n: Vec3, w: Vec3) -> Vec3;
     vector_from_lobe(frame: Tangents, n: Vec3, w: Vec3) -> Vec3;
     half_vector(wo: Vec3, wi: Vec3) -> Vec3;
@@ -352,6 +355,8 @@ probes! {
     direction_in_cell(column: u32, row: u32, u: Vec2, width: u32, height: u32) -> Vec3;
     surface_footprint(q: &Primitive, surface: Surface, dx: Vec3, dy: Vec3) -> Footprint;
     uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2;
+    wrap_u(t: &Texture) -> u32;
+    wrap_v(t: &Texture) -> u32;
     texture_footprint(t: &Texture, f: Footprint) -> Footprint;
     footprint_ellipse(dx: Vec2, dy: Vec2, anisotropy: f32) -> Ellipse;
     procedural_share(kind: u32, line_width: f32, f: Footprint) -> f32;
@@ -414,6 +419,7 @@ probes! {
     turned_to(v: Vec3, side: Vec3) -> Vec3;
     face_surface(face: &Spot, place: UVec2, b: Vec2, d: Vec3, epsilon: f32) -> Surface;
     face_uv(face: &Spot, b: Vec2) -> Vec2;
+    color_between(c0: Vec4, c1: Vec4, c2: Vec4, b: Vec2) -> Vec4;
     face_normal(face: &Spot, b: Vec2) -> Vec3;
     face_bulge(face: &Spot, b: Vec2, side: f32) -> Vec3;
     lift(n: Vec3, way: Vec3, up: Vec3) -> Vec3;

@@ -47,6 +47,9 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
             arriving = light_from_afar(path.ray.direction, state.pdf);
         }
     }
+    if (SURROUNDINGS & BACKGROUND) != 0u {
+        arriving = select(arriving, environment.background, path.depth == 0u);
+    }
     state = with_radiance(state, path.throughput * arriving, !met & shown, path.depth);
     if (IN_TREE != 0u) | (LOOKUPS != 0u) {
         if !met {
@@ -57,7 +60,10 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     let spot = spot_of(hit);
     var surface = surface_of(spot, hit, path.ray);
     let at = arrival_of(spot, hit, surface, path.ray, path.differential);
-    let look = appearance(spot, hit, material_of(spot), surface, at, LOOKUPS);
+    var look = appearance(spot, hit, material_of(spot), surface, at, LOOKUPS);
+    if VERTEX_COLORS != 0u {
+        look.material = with_vertex_colors(look.material, hit);
+    }
     var material = bounded(look.material);
     if SEES_THROUGH != 0u {
         if met & !is_there(material, pixel, state.sample, path.depth, ONWARD, hit, surface.side) {

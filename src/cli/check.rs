@@ -9,6 +9,8 @@ use wgray::gpu::{Forms, check_kernels, compose::Shaders};
 use wgray::pack::pack;
 use wgray::scene::{CameraPath, Define, Overrides, Projection, Scene, SceneError};
 
+use super::scene_options::SceneOptions;
+
 #[derive(Debug, clap::Args)]
 #[command(after_help = super::EXIT_CODES)]
 pub struct Args {
@@ -28,6 +30,9 @@ pub struct Args {
     /// Puts a value in place of each scene's: -D render.seed=3
     #[arg(short = 'D', long, value_name = "KEY=VALUE")]
     define: Vec<Define>,
+
+    #[command(flatten)]
+    options: SceneOptions,
 }
 
 /// The most frames of a path that are looked at.
@@ -40,11 +45,11 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Some(folder) => Shaders::read(folder)?,
         None => Shaders::built_in(),
     };
-    let overrides = Overrides {
+    let overrides = args.options.over(Overrides {
         asset_root: args.asset_root.clone(),
         define: args.define.clone(),
         ..Overrides::default()
-    };
+    });
     let mut code = None;
     let mut printed = Ok(());
     for path in &args.scenes {

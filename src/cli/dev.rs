@@ -16,6 +16,7 @@ use wgray::scene::{Description, Overrides, Scene, SceneError};
 use super::Usage;
 use super::outputs::keep_inputs;
 use super::render::parse_size;
+use super::scene_options::SceneOptions;
 use super::signal;
 
 /// The arguments as they are written.
@@ -58,16 +59,19 @@ pub struct Args {
     /// Measures the time from a save to the picture, on copies of the files, and prints it
     #[arg(long, conflicts_with_all = ["listen", "out", "no_page"])]
     measure: bool,
+
+    #[command(flatten)]
+    options: SceneOptions,
 }
 
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let sources = Sources {
         scene: args.scene,
-        overrides: Overrides {
+        overrides: args.options.over(Overrides {
             size: args.size,
             asset_root: args.asset_root,
             ..Overrides::default()
-        },
+        }),
         shaders: shaders(args.shaders)?,
     };
     let device = match args.device.to_lowercase().as_str() {
@@ -140,7 +144,7 @@ fn checked(out: &Path, sources: &Sources, loaded: Option<&Scene>) -> anyhow::Res
     let Some(path) = output.path() else {
         return Err(Usage(format!("--out: {}: must be a file, which is replaced", out.display())).into());
     };
-    let text = std::fs::read_to_string(&sources.scene).unwrap_or_default();
+    let text = std::fs::read_to_string(&sources.scene).unwrap_or_default(); // that of a glTF file describes nothing
     let described = Description::parse(&text, &sources.scene.display().to_string()).ok();
     let folder = sources.scene.parent().unwrap_or(Path::new(""));
     let named = described.iter().flat_map(|described| described.files(folder));

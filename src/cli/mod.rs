@@ -1,6 +1,7 @@
 //! The command line: arguments, messages and exit codes. One file a subcommand.
 
 mod check;
+mod convert;
 #[cfg(feature = "dev")]
 mod dev;
 mod devices;
@@ -11,6 +12,7 @@ mod outputs;
 mod picture_options;
 mod progress;
 mod render;
+mod scene_options;
 mod signal;
 mod stats;
 
@@ -50,6 +52,8 @@ enum Command {
     Check(check::Args),
     /// Joins parts of a picture, which render --tile has written, to the picture
     Merge(Box<merge::Args>),
+    /// Writes a scene, a glTF file for one, as a TOML file that renders the same picture
+    Convert(Box<convert::Args>),
     /// Compares two pictures, and fails if they differ
     Diff(Box<diff::Args>),
     /// Lists the adapters that pictures can be rendered on, and which one "auto" chooses
@@ -79,7 +83,7 @@ pub fn main() -> ExitCode {
     };
     let threads = match &cli.command {
         Command::Render(args) => args.threads,
-        Command::Check(_) | Command::Diff(_) | Command::Merge(_) | Command::Devices => None,
+        Command::Check(_) | Command::Convert(_) | Command::Diff(_) | Command::Merge(_) | Command::Devices => None,
         #[cfg(feature = "dev")]
         Command::Dev(_) => None,
     };
@@ -89,6 +93,7 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Render(args) => render::run(*args, start),
         Command::Check(args) => check::run(&args),
+        Command::Convert(args) => convert::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Diff(args) => diff::run(*args),
         Command::Devices => Ok(devices::run()),

@@ -239,6 +239,8 @@ fn find_checkpoint(path: &Path) -> anyhow::Result<Output> {
 fn forbid_pictures(option: &str, path: &Path, output: &Output) -> Result<(), Usage> {
     forbid_ending(option, path, output, "toml", "is a scene's name")?;
     forbid_ending(option, path, output, PART, "is a part's name")?;
+    let mut models = ["gltf", "glb"].into_iter();
+    models.try_for_each(|ending| forbid_ending(option, path, output, ending, "is a model's name"))?;
     let mut pictures = ["png", "exr", "jpg", "jpeg", "webp"].into_iter();
     pictures.try_for_each(|ending| forbid_ending(option, path, output, ending, "is a picture's name"))
 }

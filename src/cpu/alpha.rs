@@ -5,10 +5,12 @@ use glam::{UVec2, UVec4, Vec2, Vec3};
 use super::footprint::Footprint;
 use super::geometry::{closest_hit, material_of, spot_of, surface_of};
 use super::math::{dot, min};
+use super::mesh::Spot;
 use super::ray::{Hit, Ray};
 use super::rng::{hash4, unit_float};
 use super::surface::Surface;
 use super::texture::{channel_of, texture_color};
+use super::vertices::{uv_in_set, with_vertex_colors};
 use crate::pack::{FOR_OPACITY, MASK, MOST_PASSED, Material, NOTHING, OPACITY_CHANNEL, OPAQUE, Packed};
 
 pub const ONWARD: u32 = 0;
@@ -39,13 +41,13 @@ pub fn is_there(
     unit_float(bits.x) < material.opacity
 }
 
-pub fn with_opacity_at(scene: &Packed, before: &Material, uv: Vec2) -> Material {
+pub fn with_opacity_at(scene: &Packed, before: &Material, spot: &Spot, hit: Hit, uv: Vec2) -> Material {
     let mut material = *before;
     for i in 0..material.lookups.y {
         let lookup = &scene.lookups[(material.lookups.x + i) as usize];
         if lookup.purposes & FOR_OPACITY != 0 {
             let footprint = Footprint {
-                uv,
+                uv: uv_in_set(scene, uv, spot, hit, lookup.uv_set),
                 dx: Vec2::ZERO,
                 dy: Vec2::ZERO,
             };
@@ -53,11 +55,14 @@ pub fn with_opacity_at(scene: &Packed, before: &Material, uv: Vec2) -> Material 
             material.opacity = channel_of(color, lookup, OPACITY_CHANNEL);
         }
     }
+    if scene.specialization.vertex_colors != 0 {
+        material = with_vertex_colors(scene, &material, hit);
+    }
     material
 }
 
-pub fn presence_at(scene: &Packed, before: &Material, uv: Vec2) -> f32 {
-    let material = with_opacity_at(scene, before, uv);
+pub fn presence_at(scene: &Packed, before: &Material, spot: &Spot, hit: Hit, uv: Vec2) -> f32 {
+    let material = with_opacity_at(scene, before, spot, hit, uv);
     match material.alpha_mode {
         OPAQUE => 1.0,
         MASK if material.opacity >= material.cutoff => 1.0,
@@ -96,7 +101,7 @@ pub fn is_veiled(
         }
         let spot = spot_of(scene, hit);
         let met = surface_of(scene, &spot, hit, ray);
-        let material = with_opacity_at(scene, material_of(scene, &spot), met.uv);
+        let material = with_opacity_at(scene, material_of(scene, &spot), &spot, hit, met.uv);
         let is_goal = (hit.instance == 0) & (hit.primitive == goal);
         if !is_goal & is_there(scene, &material, pixel, sample, bounce, TO_LIGHT, hit, met.side) {
             return true;
@@ -119,7 +124,7 @@ pub fn first_seen(scene: &Packed, ray: Ray, met: Hit) -> Hit {
         }
         let spot = spot_of(scene, hit);
         let surface = surface_of(scene, &spot, hit, onward);
-        let material = with_opacity_at(scene, material_of(scene, &spot), surface.uv);
+        let material = with_opacity_at(scene, material_of(scene, &spot), &spot, hit, surface.uv);
         let least = if material.alpha_mode == MASK {
             material.cutoff
         } else {

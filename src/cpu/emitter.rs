@@ -10,15 +10,16 @@ use super::light::spot_falloff;
 use super::light_choice::Chosen;
 use super::light_sample::{ellipsoid_area, ellipsoid_pdf, ellipsoid_sample, solid_angle_pdf, whole_below};
 use super::math::{dot, normalize};
-use super::mesh::{Spot, face_uv};
+use super::mesh::{Spot, face_uv, spot_by_itself};
 use super::primitive::primitive_uv;
 use super::ray::{Hit, Ray, point_to_local};
 use super::rng::unit_float;
 use super::texture::texture_color;
+use super::vertices::{uv_in_set, vertex_color};
 use super::warp::{disk_sample, triangle_sample};
 use crate::pack::{
-    DISK, ELLIPSOID, ENVIRONMENT, Emitter, FOR_EMISSION, Light, Material, NOTHING, POINT, Packed, RECTANGLE, SPOT,
-    TRIANGLE,
+    COLORS_OF_EMISSION, DISK, ELLIPSOID, ENVIRONMENT, Emitter, FOR_EMISSION, Light, Material, NOTHING, POINT, Packed,
+    RECTANGLE, SPOT, TRIANGLE,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,12 +90,14 @@ pub fn sample_light(scene: &Packed, light: &Light, p: Vec3, u: Vec2) -> LightSam
     if scene.specialization.emission_textures != 0 && !is_delta {
         let q = &scene.primitives[light.primitive as usize];
         let uv = primitive_uv(q, point_to_local(q, p + to));
-        radiance = emission_at(scene, &scene.materials[q.material as usize], uv);
+        let (material, hit) = (&scene.materials[q.material as usize], hit_on_primitive(light.primitive));
+        radiance = emission_at(scene, material, &spot_by_itself(q), hit, uv);
     }
     if scene.specialization.sees_through != 0 && !is_delta {
         let q = &scene.primitives[light.primitive as usize];
         let uv = primitive_uv(q, point_to_local(q, p + to));
-        radiance *= presence_at(scene, &scene.materials[q.material as usize], uv);
+        let (material, hit) = (&scene.materials[q.material as usize], hit_on_primitive(light.primitive));
+        radiance *= presence_at(scene, material, &spot_by_itself(q), hit, uv);
     }
     LightSample {
         to,
@@ -103,6 +106,16 @@ pub fn sample_light(scene: &Packed, light: &Light, p: Vec3, u: Vec2) -> LightSam
         is_delta,
         reach: light.reach,
         primitive: light.primitive,
+    }
+}
+
+pub fn hit_on_primitive(primitive: u32) -> Hit {
+    Hit {
+        t: 0.0,
+        instance: 0,
+        primitive,
+        slot: 0,
+        barycentric: Vec2::ZERO,
     }
 }
 
@@ -121,10 +134,14 @@ pub fn sample_face(scene: &Packed, chosen: Chosen, p: Vec3, u: Vec2) -> LightSam
     let to = face.primitive.anchor + (face.edge_1 * b.x + face.edge_2 * b.y) - p;
     let mut radiance = material.emission;
     if scene.specialization.emission_textures != 0 {
-        radiance = emission_at(scene, material, face_uv(&face, b));
+        radiance = emission_at(scene, material, &face, hit, face_uv(&face, b));
+    }
+    if scene.specialization.vertex_colors != 0 && material.vertex_colors == COLORS_OF_EMISSION {
+        let color = vertex_color(scene, hit);
+        radiance *= Vec3::new(color.x, color.y, color.z);
     }
     if scene.specialization.sees_through != 0 {
-        radiance *= presence_at(scene, material, face_uv(&face, b));
+        radiance *= presence_at(scene, material, &face, hit, face_uv(&face, b));
     }
     let density = if scene.specialization.light_tree != 0 {
         chosen.density
@@ -141,14 +158,14 @@ pub fn sample_face(scene: &Packed, chosen: Chosen, p: Vec3, u: Vec2) -> LightSam
     }
 }
 
-pub fn emission_at(scene: &Packed, material: &Material, uv: Vec2) -> Vec3 {
+pub fn emission_at(scene: &Packed, material: &Material, spot: &Spot, hit: Hit, uv: Vec2) -> Vec3 {
     let mut emission = material.emission;
     for i in 0..material.lookups.y {
         let lookup = &scene.lookups[(material.lookups.x + i) as usize];
         if lookup.purposes & FOR_EMISSION != 0 {
             let texture = &scene.textures[lookup.texture as usize];
             let footprint = Footprint {
-                uv,
+                uv: uv_in_set(scene, uv, spot, hit, lookup.uv_set),
                 dx: Vec2::ZERO,
                 dy: Vec2::ZERO,
             };

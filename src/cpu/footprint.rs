@@ -24,6 +24,14 @@ pub fn surface_footprint(q: &Primitive, surface: Surface, dx: Vec3, dy: Vec3) ->
     }
 }
 
+pub fn wrap_u(t: &Texture) -> u32 {
+    t.wrap & 3
+}
+
+pub fn wrap_v(t: &Texture) -> u32 {
+    t.wrap >> 2
+}
+
 pub fn texture_footprint(t: &Texture, f: Footprint) -> Footprint {
     let dx = Vec2::new(t.u.x * f.dx.x + t.u.y * f.dx.y, t.v.x * f.dx.x + t.v.y * f.dx.y);
     let dy = Vec2::new(t.u.x * f.dy.x + t.u.y * f.dy.y, t.v.x * f.dy.x + t.v.y * f.dy.y);
@@ -31,8 +39,8 @@ pub fn texture_footprint(t: &Texture, f: Footprint) -> Footprint {
         t.u.x * f.uv.x + t.u.y * f.uv.y + t.u.z,
         t.v.x * f.uv.x + t.v.y * f.uv.y + t.v.z,
     );
-    let x = (t.wrap == CLAMP) & ((uv.x < 0.0) | (uv.x > 1.0));
-    let y = (t.wrap == CLAMP) & ((uv.y < 0.0) | (uv.y > 1.0));
+    let x = (wrap_u(t) == CLAMP) & ((uv.x < 0.0) | (uv.x > 1.0));
+    let y = (wrap_v(t) == CLAMP) & ((uv.y < 0.0) | (uv.y > 1.0));
     let along = |d: Vec2| Vec2::new(if x { 0.0 } else { d.x }, if y { 0.0 } else { d.y });
     Footprint {
         uv,

@@ -21,7 +21,7 @@ use super::surface::{Surface, first_hit, surface_at, with_coordinates};
 use super::traverse::{closest_primitive, hidden_by_primitives, is_hidden_by_primitives};
 use super::tree::{closest_in_tree, hidden_by_tree, is_hidden_by_tree};
 use crate::pack::{
-    FirstHit, Instance, Light, MOST_HIDDEN, Material, NO_SHADOW, NOTHING, NOWHERE, Packed, SOME_SHADOWS,
+    FirstHit, HIDDEN_BACK, Instance, Light, MOST_HIDDEN, Material, NO_SHADOW, NOTHING, NOWHERE, Packed, SOME_SHADOWS,
 };
 
 pub fn closest_hit(scene: &Packed, ray: Ray, left: UVec2, wall: UVec2) -> Hit {
@@ -53,7 +53,7 @@ pub fn is_on_mesh(hit: Hit) -> bool {
 }
 
 /// The instance that a hit on a mesh is of.
-fn instance_of(scene: &Packed, hit: Hit) -> &Instance {
+pub fn instance_of(scene: &Packed, hit: Hit) -> &Instance {
     &scene.instances[hit.instance as usize - 1]
 }
 
@@ -179,10 +179,14 @@ pub fn seen_path(scene: &Packed, start: Path) -> Path {
             break;
         }
         let spot = spot_of(scene, hit);
-        if material_of(scene, &spot).hidden == 0 {
+        let hidden = material_of(scene, &spot).hidden;
+        if hidden == 0 {
             break;
         }
         let surface = surface_of(scene, &spot, hit, path.ray);
+        if (hidden == HIDDEN_BACK) & (surface.side > 0.0) {
+            break;
+        }
         let at = arrival_of(scene, &spot, hit, surface, path.ray, path.differential);
         path = passed_path(path, surface, at);
     }

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::ggx::{ggx_albedo_along, ggx_d, ggx_length};
-use super::math::{cross, dot, max, min, normalize, sine};
+use super::math::{atan2, cross, dot, max, min, normalize, sine};
 use super::primitive::Tangents;
 use super::surface::Surface;
 use super::warp::frame_around;
@@ -47,6 +47,10 @@ pub fn lobe_frame(surface: &Surface, rotation: f32) -> Tangents {
     let second = across * if dot(across, surface.dv) >= 0.0 { 1.0 } else { -1.0 };
     let u = normalize(first * sine(rotation + 0.5) + second * sine(rotation));
     Tangents { u, v: cross(n, u) }
+}
+
+pub fn direction_turn(color: Vec3) -> f32 {
+    atan2(2.0 * color.y - 1.0, 2.0 * color.x - 1.0) * std::f32::consts::FRAC_1_PI
 }
 
 pub fn vector_to_lobe(frame: Tangents, n: Vec3, w: Vec3) -> Vec3 {

@@ -1,10 +1,10 @@
 //! Twin of `shaders/mesh.wgsl`: triangles of meshes.
 
-use glam::{UVec2, Vec2, Vec3};
+use glam::{UVec2, Vec2, Vec3, Vec4};
 
 use super::differential::{Arrival, Differential, transferred};
 use super::footprint::Footprint;
-use super::math::{cross, dot, max, min, normalize, positive_zero};
+use super::math::{cross, dot, max, max4, min, normalize, positive_zero};
 use super::primitive::Tangents;
 use super::ray::{Hit, Ray, point_to_local, vector_to_local};
 use super::slab::{Slabs, box_passage, is_passed};
@@ -206,6 +206,10 @@ pub fn face_surface(face: &Spot, place: UVec2, b: Vec2, d: Vec3, epsilon: f32) -
 
 pub fn face_uv(face: &Spot, b: Vec2) -> Vec2 {
     face.uv_0 + (face.uv_1 - face.uv_0) * b.x + (face.uv_2 - face.uv_0) * b.y
+}
+
+pub fn color_between(c0: Vec4, c1: Vec4, c2: Vec4, b: Vec2) -> Vec4 {
+    max4(c0 + (c1 - c0) * b.x + (c2 - c0) * b.y, Vec4::ZERO)
 }
 
 pub fn face_normal(face: &Spot, b: Vec2) -> Vec3 {

@@ -61,6 +61,7 @@ pub mod thin;
 pub mod traverse;
 pub mod tree;
 pub mod triangle;
+pub mod vertices;
 pub mod walk;
 pub mod warp;
 

@@ -3,21 +3,23 @@
 use glam::{Vec2, Vec3};
 
 use super::differential::Arrival;
-use super::footprint::{Footprint, footprint_ellipse, texture_footprint};
+use super::footprint::{Footprint, footprint_ellipse, texture_footprint, wrap_u, wrap_v};
 use super::geometry::footprint_of;
+use super::lobe::direction_turn;
 use super::math::{floor, log2, max};
 use super::mesh::Spot;
 use super::normal_map::mapped_normal;
 use super::procedural::procedural_share;
 use super::ray::Hit;
 use super::surface::Surface;
+use super::vertices::footprint_in_set;
 
 use super::texel::{gaussian_weight, level_size, near_coordinate, unpacked_color, wrapped_index};
 use crate::pack::{
     ANISOTROPY_CHANNEL, COAT_CHANNEL, COAT_ROUGHNESS_CHANNEL, EWA, FLOAT, FOR_AMBIENT, FOR_ANISOTROPY, FOR_COAT,
-    FOR_COAT_NORMAL, FOR_COAT_ROUGHNESS, FOR_DIFFUSE, FOR_EMISSION, FOR_METALLIC, FOR_NORMAL, FOR_OPACITY,
-    FOR_ROUGHNESS, FOR_SHEEN, FOR_SHEEN_ROUGHNESS, FOR_SPECULAR, FOR_TINT, FOR_TRANSMISSION, FOR_WEIGHT, LINES, Lookup,
-    METALLIC_CHANNEL, Material, NEAREST, OPACITY_CHANNEL, PRINCIPLED, Packed, ROUGHNESS_CHANNEL,
+    FOR_COAT_NORMAL, FOR_COAT_ROUGHNESS, FOR_DIFFUSE, FOR_DIRECTION, FOR_EMISSION, FOR_METALLIC, FOR_NORMAL,
+    FOR_OPACITY, FOR_ROUGHNESS, FOR_SHEEN, FOR_SHEEN_ROUGHNESS, FOR_SPECULAR, FOR_TINT, FOR_TRANSMISSION, FOR_WEIGHT,
+    LINES, Lookup, METALLIC_CHANNEL, Material, NEAREST, OPACITY_CHANNEL, PRINCIPLED, Packed, ROUGHNESS_CHANNEL,
     SHEEN_ROUGHNESS_CHANNEL, TRANSMISSION_CHANNEL, TRILINEAR, Texture, WEIGHT_CHANNEL,
 };
 
@@ -51,7 +53,7 @@ pub fn level_of(scene: &Packed, t: &Texture, i: u32) -> Level {
 }
 
 pub fn load_texel(scene: &Packed, t: &Texture, level: Level, x: i32, y: i32) -> Vec3 {
-    let i = wrapped_index(y, level.height, t.wrap) * level.width + wrapped_index(x, level.width, t.wrap);
+    let i = wrapped_index(y, level.height, wrap_v(t)) * level.width + wrapped_index(x, level.width, wrap_u(t));
     if t.format == FLOAT {
         let at = (level.start + 3 * i) as usize;
         return Vec3::from_slice(bytemuck::cast_slice(&scene.texels[at..at + 3]));
@@ -61,8 +63,8 @@ pub fn load_texel(scene: &Packed, t: &Texture, level: Level, x: i32, y: i32) -> 
 
 pub fn nearest_color(scene: &Packed, t: &Texture, uv: Vec2) -> Vec3 {
     let level = level_of(scene, t, 0);
-    let x = floor(near_coordinate(uv.x, t.wrap) * level.width as f32);
-    let y = floor(near_coordinate(uv.y, t.wrap) * level.height as f32);
+    let x = floor(near_coordinate(uv.x, wrap_u(t)) * level.width as f32);
+    let y = floor(near_coordinate(uv.y, wrap_v(t)) * level.height as f32);
     load_texel(scene, t, level, x as i32, y as i32)
 }
 
@@ -101,8 +103,8 @@ pub fn linear_color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
 }
 
 pub fn bilinear_color(scene: &Packed, t: &Texture, level: Level, uv: Vec2) -> Vec3 {
-    let x = near_coordinate(uv.x, t.wrap) * level.width as f32 - 0.5;
-    let y = near_coordinate(uv.y, t.wrap) * level.height as f32 - 0.5;
+    let x = near_coordinate(uv.x, wrap_u(t)) * level.width as f32 - 0.5;
+    let y = near_coordinate(uv.y, wrap_v(t)) * level.height as f32 - 0.5;
     let x0 = floor(x);
     let y0 = floor(y);
     let rows = [0, 1].map(|i| {
@@ -148,8 +150,8 @@ pub fn ewa_level_color(scene: &Packed, t: &Texture, level: Level, uv: Vec2, dx: 
     let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, least);
     let slope = m.y / yy;
     let across = xx - m.y * slope;
-    let x = near_coordinate(uv.x, t.wrap) * size.x - 0.5;
-    let y = near_coordinate(uv.y, t.wrap) * size.y - 0.5;
+    let x = near_coordinate(uv.x, wrap_u(t)) * size.x - 0.5;
+    let y = near_coordinate(uv.y, wrap_v(t)) * size.y - 0.5;
     let reach = yy.sqrt();
     let first_row = -(floor(reach - y) as i32);
     let last_row = floor(y + reach) as i32;
@@ -187,6 +189,9 @@ pub fn with_principled(before: Material, color: Vec3, lookup: &Lookup) -> Materi
     let mut m = before;
     if lookup.purposes & FOR_SHEEN != 0 {
         m.sheen = color;
+    }
+    if lookup.purposes & FOR_DIRECTION != 0 {
+        m.rotation += direction_turn(color);
     }
     for (number, purpose, place) in [
         (&mut m.metallic, FOR_METALLIC, METALLIC_CHANNEL),
@@ -234,7 +239,8 @@ pub fn appearance(
         if i < material.lookups.y {
             let lookup = &scene.lookups[(material.lookups.x + i) as usize];
             let t = &scene.textures[lookup.texture as usize];
-            let color = texture_color(scene, t, footprint);
+            let place = footprint_in_set(scene, footprint, spot, hit, at, lookup.uv_set);
+            let color = texture_color(scene, t, place);
             let purposes = lookup.purposes;
             if purposes & FOR_AMBIENT != 0 {
                 look.material.ambient = color;

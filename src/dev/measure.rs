@@ -15,7 +15,7 @@ use super::session::{Session, Settings};
 use super::source::Sources;
 use crate::gpu::Choice;
 use crate::gpu::compose::{self, Shaders};
-use crate::scene::is_course;
+use crate::scene::{is_course, is_gltf};
 
 /// Saves of each kind.
 const ROUNDS: usize = 7;
@@ -44,9 +44,11 @@ pub struct Measured {
 /// What to tell the user; `None` if it was stopped. The copies are gone in every case.
 pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Result<Vec<Measured>, Option<String>> {
     let told = |error: std::io::Error| Some(error.to_string());
-    if is_course(&sources.scene) {
-        let place = sources.scene.display();
-        return Err(Some(format!("{place}: must be TOML to be measured; it is JSON")));
+    for (is_it, kind) in [(is_course as fn(&Path) -> bool, "JSON"), (is_gltf, "glTF")] {
+        if is_it(&sources.scene) {
+            let place = sources.scene.display();
+            return Err(Some(format!("{place}: must be TOML to be measured; it is {kind}")));
+        }
     }
     let text =
         fs::read_to_string(&sources.scene).map_err(|error| Some(format!("{}: {error}", sources.scene.display())))?;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use toml_edit::{Document, Item, TableLike, Value};
 
 use super::camera::{Entry, entries};
-use crate::scene::{CameraDescription, Description, is_course};
+use crate::scene::{CameraDescription, Description, is_course, is_gltf};
 
 /// What a file was before a save and is after it.
 #[derive(Debug)]
@@ -50,6 +50,10 @@ impl Saved {
 /// What to tell the user: the file cannot be read or written, or is no scene that this camera fits.
 pub fn save_camera(path: &Path, camera: &CameraDescription) -> Result<Option<Saved>, String> {
     let place = path.display();
+    if is_gltf(path) {
+        let rule = "must be TOML for a camera to be saved into it; it is glTF, and wgray convert makes a scene of it";
+        return Err(format!("{place}: {rule}"));
+    }
     // A link stays one: what it leads to is replaced.
     let path = fs::canonicalize(path).map_err(|error| format!("{place}: {error}"))?;
     let before = fs::read_to_string(&path).map_err(|error| format!("{place}: {error}"))?;

@@ -9,7 +9,7 @@ use std::time::SystemTime;
 use super::diagnostic::Diagnostic;
 use crate::gpu::compose::{self, Shaders};
 use crate::pack::{Packed, Specialization, pack};
-use crate::scene::{CameraDescription, Description, Integrator, Overrides, Scene};
+use crate::scene::{CameraDescription, Description, Integrator, Overrides, Scene, is_gltf};
 
 /// Where the files are.
 #[derive(Clone, Debug)]
@@ -52,7 +52,7 @@ pub struct Snapshot {
     pub files: Vec<(PathBuf, Stamp)>,
 }
 
-/// What tells two states of a file apart: a scene file's content; of large files length and time of change.
+/// What tells two states of a file apart: a scene file's content; of large files, models among them, length and time of change.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Stamp {
     /// It cannot be read.
@@ -114,10 +114,14 @@ impl Sources {
     fn read_scene(&self, shaders: Result<Arc<Shaders>, Diagnostic>) -> Snapshot {
         // The stamps are taken first: a file that changes while it is read is read again.
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
-        let text = fs::read_to_string(&self.scene).unwrap_or_default();
-        let described = Description::parse_defined(&text, &self.scene.display().to_string(), &self.overrides.define);
-        if let Ok(described) = &described {
-            files.extend(self.assets(described).map(|path| (path.clone(), self.stamp(&path))));
+        let mut text = String::new();
+        if !is_gltf(&self.scene) {
+            text = fs::read_to_string(&self.scene).unwrap_or_default();
+            let origin = self.scene.display().to_string();
+            let described = Description::parse_defined(&text, &origin, &self.overrides.define);
+            if let Ok(described) = &described {
+                files.extend(self.assets(described).map(|path| (path.clone(), self.stamp(&path))));
+            }
         }
         let mut named = BTreeSet::new();
         let scene = Scene::load_and_list(&self.scene, &self.overrides, &mut named);
@@ -128,7 +132,6 @@ impl Sources {
                 files.push((path, stamp));
             }
         }
-        let scene = scene.and_then(|scene| Ok((scene, described?)));
         let scene = scene
             .map_err(|error| Diagnostic::scene(&error, &text))
             .map(|(scene, described)| {
@@ -148,7 +151,7 @@ impl Sources {
     }
 
     fn stamp(&self, path: &Path) -> Stamp {
-        if path == self.scene {
+        if path == self.scene && !is_gltf(path) {
             return fs::read(path).map_or(Stamp::Absent, Stamp::Content);
         }
         fs::metadata(path).map_or(Stamp::Absent, |data| Stamp::Changed(data.len(), data.modified().ok()))

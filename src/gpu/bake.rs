@@ -179,7 +179,8 @@ pub fn node_rows(packed: &Packed) -> Vec<UVec4> {
     out
 }
 
-/// The rows of a scene's meshes: of each the triangles, the vertices, their attributes and tangents, and the triangles' groups.
+/// The rows of a scene's meshes: of each the triangles, the vertices, their attributes and tangents, the triangles' groups, and
+/// the vertices' colours and further texture coordinates.
 pub fn mesh_rows(packed: &Packed) -> Vec<UVec4> {
     let mut out = Vec::new();
     for mesh in &packed.meshes {
@@ -188,6 +189,8 @@ pub fn mesh_rows(packed: &Packed) -> Vec<UVec4> {
         out.extend(cast_slice::<_, UVec4>(&mesh.attributes));
         out.extend(cast_slice::<_, UVec4>(&mesh.tangents));
         out.extend(in_rows(&mesh.groups));
+        out.extend(cast_slice::<_, UVec4>(&mesh.colors));
+        out.extend(cast_slice::<_, UVec4>(&mesh.more_uvs));
     }
     out
 }
@@ -203,7 +206,11 @@ pub fn node_rows_count(packed: &Packed) -> usize {
 /// How many rows [`mesh_rows`] has.
 pub fn mesh_rows_count(packed: &Packed) -> usize {
     let rows = packed.meshes.iter().map(|mesh| {
-        let of_vertices = mesh.vertices.len() + mesh.attributes.len() + 2 * mesh.tangents.len();
+        let of_vertices = mesh.vertices.len()
+            + mesh.attributes.len()
+            + 2 * mesh.tangents.len()
+            + mesh.colors.len()
+            + mesh.more_uvs.len();
         mesh.triangles.len() + of_vertices + mesh.groups.len().div_ceil(4)
     });
     rows.sum()

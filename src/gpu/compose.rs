@@ -75,6 +75,7 @@ static KERNEL: &[File] = files![
     "meshes.wgsl",
     "tree.wgsl",
     "geometry.wgsl",
+    "vertices.wgsl",
     "texture.wgsl",
     "alpha.wgsl",
 ];

@@ -192,16 +192,20 @@ fn hash_mesh(hasher: &mut blake3::Hasher, mesh: &PackedMesh) {
         vertices,
         attributes,
         tangents,
+        colors,
+        more_uvs,
         groups,
         low,
         high,
     } = mesh;
-    let records: [&[u8]; 8] = [
+    let records: [&[u8]; 10] = [
         cast_slice(nodes),
         cast_slice(triangles),
         cast_slice(vertices),
         cast_slice(attributes),
         cast_slice(tangents),
+        cast_slice(colors),
+        cast_slice(more_uvs),
         cast_slice(groups),
         bytes_of(low),
         bytes_of(high),

@@ -1,18 +1,24 @@
 //! What the readers of all formats make: triangles as the file has them, in the file's coordinates.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::error::{Fault, Place, shown_number};
-use super::{Group, LARGEST_COORDINATE, MOST};
+use super::{Group, LARGEST_COORDINATE, MOST, Mesh, finish};
 
 /// A mesh as its file has it.
 #[derive(Default)]
-pub(super) struct Draft {
+pub(crate) struct Draft {
     pub positions: Vec<DVec3>,
     /// A unit normal for each vertex, zero where the file has none that is one; or empty.
     pub normals: Vec<Vec3>,
     /// For each vertex, or empty.
     pub uvs: Vec<Vec2>,
+    /// Further sets of texture coordinates, each for each vertex.
+    pub more_uvs: Vec<Vec<Vec2>>,
+    /// Linear RGB and opacity for each vertex, or empty.
+    pub colors: Vec<Vec4>,
+    /// For each vertex, or empty, as [`Mesh::tangents`](super::Mesh::tangents) has them.
+    pub tangents: Vec<Vec4>,
     pub triangles: Vec<[u32; 3]>,
     pub groups: Vec<Group>,
     /// The first triangles of runs of one group each, and their groups.
@@ -29,9 +35,18 @@ impl Draft {
         }
     }
 
+    /// The mesh, with the normals that are there; None if no triangle has an area. The error is what rule is broken.
+    pub(crate) fn finish(self) -> Result<Option<Mesh>, String> {
+        match finish::finish(self, None) {
+            Ok(mesh) => Ok(Some(mesh)),
+            Err(fault) if fault.message.starts_with(finish::NO_TRIANGLES) => Ok(None),
+            Err(fault) => Err(fault.message),
+        }
+    }
+
     /// Adds a triangle.
     #[inline]
-    pub fn push(&mut self, triangle: [u32; 3], place: Place) -> Result<(), Fault> {
+    pub(super) fn push(&mut self, triangle: [u32; 3], place: Place) -> Result<(), Fault> {
         if self.triangles.len() >= MOST {
             return Err(place.fault(format!("there must be at most {MOST} triangles")));
         }
@@ -89,7 +104,7 @@ pub(super) fn texture_coordinate(x: f64) -> Result<f32, String> {
 }
 
 /// A normal of length 1; zero where there is none.
-pub(super) fn unit(normal: DVec3) -> Vec3 {
+pub(crate) fn unit(normal: DVec3) -> Vec3 {
     let largest = normal.abs().max_element();
     if !(largest > 0.0 && normal.is_finite()) {
         return Vec3::ZERO;

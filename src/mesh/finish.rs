@@ -1,6 +1,6 @@
 //! From what a file says to a mesh: 32-bit positions around a centre, triangles that have an area, normals.
 
-use glam::{DVec3, DVec4, Vec3};
+use glam::{DVec3, DVec4, Vec3, Vec4};
 use rayon::prelude::*;
 use robust::{Coord, orient2d};
 
@@ -9,11 +9,19 @@ use super::error::{Fault, Place};
 use super::neighbours::Neighbours;
 use super::{MOST, Mesh, Normals};
 
+/// The largest red, green or blue of a vertex.
+const MOST_COLOR: f32 = 1e6;
+/// How the message begins where nothing is left to be seen.
+pub(super) const NO_TRIANGLES: &str = "has no triangles";
+
 /// Makes the mesh.
 pub(super) fn finish(draft: Draft, normals: Option<Normals>) -> Result<Mesh, Fault> {
     let mut mesh = Mesh {
         normals: draft.normals,
         uvs: draft.uvs,
+        more_uvs: draft.more_uvs,
+        colors: draft.colors,
+        tangents: draft.tangents,
         triangles: draft.triangles,
         groups: draft.groups,
         notes: draft.notes,
@@ -21,7 +29,7 @@ pub(super) fn finish(draft: Draft, normals: Option<Normals>) -> Result<Mesh, Fau
     };
     let count = mesh.triangles.len();
     if count == 0 {
-        return Err(Place::File.fault("has no triangles"));
+        return Err(Place::File.fault(NO_TRIANGLES));
     }
     if mesh.groups.len() > 1 {
         let ends = draft.runs.iter().skip(1).map(|(start, _)| *start).chain([count]);
@@ -29,13 +37,19 @@ pub(super) fn finish(draft: Draft, normals: Option<Normals>) -> Result<Mesh, Fau
             mesh.group_of.resize(end, *group);
         }
     }
+    // NaN is 0 too.
+    let bounded = |x: f32, most: f32| if x > 0.0 { x.min(most) } else { 0.0 };
+    for color in &mut mesh.colors {
+        let most = Vec4::new(MOST_COLOR, MOST_COLOR, MOST_COLOR, 1.0);
+        *color = Vec4::from_array(std::array::from_fn(|i| bounded(color[i], most[i])));
+    }
     round(&mut mesh, &draft.positions);
     drop(draft.positions);
     drop_degenerate(&mut mesh);
     drop_unused(&mut mesh);
     let dropped = count - mesh.triangles.len();
     if mesh.triangles.is_empty() {
-        return Err(Place::File.fault(format!("has no triangles but {dropped} without an area")));
+        return Err(Place::File.fault(format!("{NO_TRIANGLES} but {dropped} without an area")));
     }
     if dropped > 0 {
         let (one, several) = ("degenerate triangle dropped", "degenerate triangles dropped");
@@ -84,6 +98,9 @@ pub(super) fn finish(draft: Draft, normals: Option<Normals>) -> Result<Mesh, Fau
     mesh.positions.shrink_to_fit();
     mesh.normals.shrink_to_fit();
     mesh.uvs.shrink_to_fit();
+    mesh.more_uvs.iter_mut().for_each(Vec::shrink_to_fit);
+    mesh.colors.shrink_to_fit();
+    mesh.tangents.shrink_to_fit();
     mesh.triangles.shrink_to_fit();
     Ok(mesh)
 }
@@ -125,12 +142,22 @@ fn drop_unused(mesh: &mut Mesh) {
     keep(&mut mesh.positions, &used);
     keep(&mut mesh.normals, &used);
     keep(&mut mesh.uvs, &used);
+    mesh.more_uvs.iter_mut().for_each(|uvs| keep(uvs, &used));
+    keep(&mut mesh.colors, &used);
+    keep(&mut mesh.tangents, &used);
 }
 
 /// Keeps what is marked of a list that may be empty.
 fn keep<T>(list: &mut Vec<T>, marks: &[bool]) {
     let mut marks = marks.iter();
     list.retain(|_| marks.next() == Some(&true));
+}
+
+/// Adds what a vertex has of a list that may be empty once more, for its copy.
+fn repeat<T: Copy>(list: &mut Vec<T>, vertex: usize) {
+    if let Some(value) = list.get(vertex).copied() {
+        list.push(value);
+    }
 }
 
 /// A point near the middle of all positions: on the grid whose cells are at least as large as the mesh, a power of 2. So a
@@ -234,9 +261,10 @@ fn fill_normals(mesh: &mut Mesh) -> Result<(), Fault> {
                 *vertex = mesh.positions.len() as u32;
                 mesh.positions.push(position);
                 mesh.normals.push(normal);
-                if let Some(uv) = mesh.uvs.get(i).copied() {
-                    mesh.uvs.push(uv);
-                }
+                repeat(&mut mesh.uvs, i);
+                mesh.more_uvs.iter_mut().for_each(|uvs| repeat(uvs, i));
+                repeat(&mut mesh.colors, i);
+                repeat(&mut mesh.tangents, i);
             }
         }
     }

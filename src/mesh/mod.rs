@@ -19,10 +19,11 @@ use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use serde::{Deserialize, Serialize};
 
 use self::cache::Cache;
+pub(crate) use self::draft::{Draft, unit};
 pub use self::error::MeshError;
 use self::error::{Fault, Place, shown};
 pub(crate) use self::tangents::VertexTangents;
@@ -36,7 +37,7 @@ const LARGEST_LIBRARY: u64 = 16 << 20;
 /// The most triangles, and the most vertices: three times as many are numbered by 32 bits.
 const MOST: usize = 1 << 30;
 /// The largest coordinate of a position.
-const LARGEST_COORDINATE: f64 = 1e9;
+pub(crate) const LARGEST_COORDINATE: f64 = 1e9;
 
 /// A mesh of triangles that share vertices. Positions count from [`Mesh::center`], so that one far from the origin keeps its
 /// digits.
@@ -51,6 +52,13 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates of each vertex; empty if there are none.
     pub uvs: Vec<Vec2>,
+    /// Further sets of texture coordinates: of set k + 1 each vertex's. Empty if there are none.
+    pub more_uvs: Vec<Vec<Vec2>>,
+    /// A colour for each vertex, linear RGB from 0 to 1e6 and opacity from 0 to 1; empty if there are none.
+    pub colors: Vec<Vec4>,
+    /// For each vertex the unit tangent along which u grows, and 1 or -1 as a factor of normal x tangent, along which v grows. 0 where
+    /// there is none, and then it is made from the texture coordinates; empty if there are none.
+    pub tangents: Vec<Vec4>,
     /// Each triangle's vertices, counter-clockwise as seen from outside.
     pub triangles: Vec<[u32; 3]>,
     /// The parts that may have a material of their own, at least one.
@@ -143,7 +151,8 @@ impl Mesh {
     ///   and a group for each different combination of `g` or `o`, the later one, with `usemtl`. The files that `mtllib`
     ///   names are read if they are in the folder of the mesh or in one below. Smoothing groups (`s`), colours of vertices,
     ///   fourth coordinates, and what is no triangle are not looked at.
-    /// - PLY files have the vertices that their triangles share.
+    /// - PLY files have the vertices that their triangles share. Colours of vertices that are whole numbers are sRGB, those that are floats
+    ///   linear.
     /// - STL files have a vertex for each different position, and a group for each `solid`. Normals of facets are looked at
     ///   for [`Normals::File`] alone, and then tell vertices apart.
     ///

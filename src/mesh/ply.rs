@@ -6,7 +6,7 @@
 mod header;
 mod values;
 
-use glam::{DVec3, Vec2};
+use glam::{DVec3, Vec2, Vec4};
 
 use self::header::{Element, Format, Header, Property, Scalar, header};
 use self::values::{Ascii, Binary, Values};
@@ -113,8 +113,8 @@ fn list_length(count: Scalar, property: &Property, values: &mut impl Values) -> 
     }
 }
 
-/// The names of the columns of a vertex: position, normal, texture coordinates.
-const COLUMNS: [&[&str]; 8] = [
+/// The names of the columns of a vertex: position, normal, texture coordinates, colour.
+const COLUMNS: [&[&str]; 12] = [
     &["x"],
     &["y"],
     &["z"],
@@ -123,7 +123,26 @@ const COLUMNS: [&[&str]; 8] = [
     &["nz"],
     &["u", "s", "texture_u"],
     &["v", "t", "texture_v"],
+    &["red"],
+    &["green"],
+    &["blue"],
+    &["alpha"],
 ];
+
+/// What a value of a colour is as linear light, or as opacity: whole numbers reach from 0 to the largest of their type, by the curve of
+/// IEC 61966-2-1 but for opacity; floats are what they are.
+fn color_value(value: f64, scalar: Scalar, is_opacity: bool) -> f32 {
+    let Some(largest) = scalar.largest() else {
+        return value as f32;
+    };
+    let share = (value / largest).clamp(0.0, 1.0);
+    let linear = match share {
+        _ if is_opacity => share,
+        share if share <= 0.04045 => share / 12.92,
+        share => ((share + 0.055) / 1.055).powf(2.4),
+    };
+    linear as f32
+}
 
 fn read_vertices(
     element: &Element,
@@ -132,7 +151,7 @@ fn read_vertices(
     draft: &mut Draft,
 ) -> Result<(), Fault> {
     // For each property the column that it is, and for each column whether it is there.
-    let mut has = [false; 8];
+    let mut has = [false; 12];
     let columns: Vec<Option<usize>> = element
         .properties
         .iter()
@@ -152,6 +171,13 @@ fn read_vertices(
     }
     let has_normals = normals_wanted && has[3] && has[4] && has[5];
     let has_uvs = has[6] && has[7];
+    let has_colors = has[8] && has[9] && has[10];
+    let mut of_colors = [Scalar::F32; 4];
+    for (property, column) in element.properties.iter().zip(&columns) {
+        if let Some(of_color) = column.and_then(|column| of_colors.get_mut(column.wrapping_sub(8))) {
+            *of_color = property.scalar;
+        }
+    }
     draft.positions.reserve_exact(element.count);
     if has_normals {
         draft.normals.reserve_exact(element.count);
@@ -159,9 +185,13 @@ fn read_vertices(
     if has_uvs {
         draft.uvs.reserve_exact(element.count);
     }
+    if has_colors {
+        draft.colors.reserve_exact(element.count);
+    }
     for i in 0..element.count {
         let place = values.place();
-        let mut row = [0.0; 8];
+        let mut row = [0.0; 12];
+        row[11] = of_colors[3].largest().unwrap_or(1.0);
         for (property, column) in element.properties.iter().zip(&columns) {
             match column {
                 Some(column) => row[*column] = values.next(property.scalar)?,
@@ -169,7 +199,7 @@ fn read_vertices(
             }
         }
         let fault = |name: &str, rule: String| place.fault(format!("vertex {i}: {name}: {rule}"));
-        let [x, y, z, nx, ny, nz, u, v] = row;
+        let [x, y, z, nx, ny, nz, u, v, ..] = row;
         let position = |name: &str, x: f64| coordinate(x).map_err(|rule| fault(name, rule));
         draft
             .positions
@@ -180,6 +210,10 @@ fn read_vertices(
         if has_uvs {
             let uv = |name: &str, x: f64| texture_coordinate(x).map_err(|rule| fault(name, rule));
             draft.uvs.push(Vec2::new(uv("u", u)?, uv("v", v)?));
+        }
+        if has_colors {
+            let value = |k: usize| color_value(row[8 + k], of_colors[k], k == 3);
+            draft.colors.push(Vec4::from_array(std::array::from_fn(value)));
         }
     }
     Ok(())

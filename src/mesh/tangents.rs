@@ -4,8 +4,9 @@
 //! plane of the vertex's normal, without its length, and weighted by the triangle's angle there: Mikkelsen, "Simulation of
 //! Wrinkled Surfaces Revisited", University of Copenhagen, 2008, whose tangents (MikkTSpace) glTF prescribes. Unlike there, the
 //! derivative by v is kept too, so that a texture may be turned on a surface where the two are not at right angles.
+//! Tangents that the mesh has of its own stand as they are.
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::Mesh;
@@ -46,6 +47,7 @@ impl VertexTangents {
         if mesh.uvs.is_empty() || mesh.normals.is_empty() {
             return None;
         }
+        let with_mesh = |vertex: usize| mesh.tangents.get(vertex).and_then(|t| given(*t, mesh.normals[vertex]));
         let (triangles, copies) = parted(mesh);
         let neighbours = Neighbours::of(&mesh.positions, &mesh.triangles);
         let mut tangents = vec![Tangents::default(); mesh.positions.len() + copies.len()];
@@ -57,12 +59,27 @@ impl VertexTangents {
         for (vertex, found) in found {
             tangents[vertex as usize] = found;
         }
+        for (vertex, own) in tangents.iter_mut().enumerate().take(mesh.positions.len()) {
+            *own = with_mesh(vertex).unwrap_or(*own);
+        }
         Some(VertexTangents {
             triangles,
             copies,
             tangents,
         })
     }
+}
+
+/// The tangents that a mesh has itself at a vertex with this normal, as glTF has them (glTF 2.0, 3.7.2.1); None where it has none.
+fn given(tangent: Vec4, normal: Vec3) -> Option<Tangents> {
+    let u = tangent.truncate().as_dvec3().try_normalize()?;
+    let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
+    let v = normal.as_dvec3().cross(u).try_normalize()? * side;
+    let scale = std::f64::consts::FRAC_1_SQRT_2;
+    Some(Tangents {
+        u: (u * scale).as_vec3(),
+        v: (v * scale).as_vec3(),
+    })
 }
 
 /// Twice the area of a triangle in texture coordinates, negative where the texture is mirrored.
@@ -87,7 +104,8 @@ fn parted(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<u32>) {
     let mut copies = Vec::new();
     let mut copy_of = vec![0; hands_at.len()];
     for (vertex, hands) in hands_at.iter().enumerate() {
-        if *hands == PLAIN | MIRRORED {
+        let has_own = (mesh.tangents.get(vertex)).is_some_and(|t| given(*t, mesh.normals[vertex]).is_some());
+        if *hands == PLAIN | MIRRORED && !has_own {
             copy_of[vertex] = (hands_at.len() + copies.len()) as u32;
             copies.push(vertex as u32);
         }

@@ -11,7 +11,7 @@ use super::*;
 use crate::cpu::lobe::{facet_alpha, is_polished};
 use crate::scene::{
     self, AlphaMode, Channel, Color, Encoding, Facets, Image, Integrator, Reflection, Scene, Texels, TextureFilter,
-    TextureKind, Value, Wrap,
+    TextureKind, Value, VertexColors, Wrap,
 };
 
 /// The records of a scene's materials and of the textures that they use.
@@ -32,6 +32,15 @@ pub struct Appearances {
     energies: BTreeMap<(u32, Option<u32>), u32>,
     /// Those of facets that are rougher along one axis, by what is in them, roughness and anisotropy.
     streaks: BTreeMap<(Parts, Option<u32>, Option<u32>), u32>,
+}
+
+/// What of a material the camera does not see.
+fn hidden(material: &scene::Material) -> u32 {
+    match &material.reflection {
+        _ if !material.visible => 1,
+        Reflection::Principled(principled) if !principled.double_sided => HIDDEN_BACK,
+        _ => 0,
+    }
 }
 
 /// A record of facets; `texture` gives the roughness of one.
@@ -130,12 +139,13 @@ impl Appearances {
 
     fn material(&mut self, scene: &Scene, material: &scene::Material) -> Material {
         let mut lookups = Lookups::default();
+        let uv_set = |i: usize| scene.textures[i].uv_set;
         let mut found = |color: &Color, purpose: u32, channel: Option<(Channel, u32)>| match *color {
             Color::Plain(color) => color.as_vec3(),
             Color::Texture(i) => match scene.textures[i].kind {
                 TextureKind::Constant(color) => color.as_vec3(),
                 _ => {
-                    lookups.add(self.texture(scene, i, None), purpose, channel);
+                    lookups.add(self.texture(scene, i, None), uv_set(i), purpose, channel);
                     Vec3::ZERO
                 }
             },
@@ -208,7 +218,7 @@ impl Appearances {
         let has = |purpose: u32| lookups.0.iter().any(|lookup| lookup.purposes & purpose != 0);
         let textured = has(FOR_ROUGHNESS);
         let mut record = simplest(record, textured);
-        record.hidden = (!material.visible).into();
+        record.hidden = hidden(material);
         let passes = record.thin == 0 && (record.transmission > 0.0 || has(FOR_TRANSMISSION));
         let parts = match record.kind {
             METAL | THIN if record.energy != NOTHING => Some(Parts::Mirror),
@@ -224,16 +234,19 @@ impl Appearances {
             }
         }
         if let Some(map) = material.normal_map {
-            lookups.add(self.texture(scene, map.texture, Some(map.strength)), FOR_NORMAL, None);
+            let texture = self.texture(scene, map.texture, Some(map.strength));
+            lookups.add(texture, uv_set(map.texture), FOR_NORMAL, None);
+        }
+        if let Reflection::Principled(principled) = &material.reflection
+            && let Some(texture) = principled.anisotropy_direction
+        {
+            lookups.add(self.texture(scene, texture, None), uv_set(texture), FOR_DIRECTION, None);
         }
         if let Reflection::Principled(principled) = &material.reflection
             && let Some(map) = principled.clearcoat_normal_map
         {
-            lookups.add(
-                self.texture(scene, map.texture, Some(map.strength)),
-                FOR_COAT_NORMAL,
-                None,
-            );
+            let texture = self.texture(scene, map.texture, Some(map.strength));
+            lookups.add(texture, uv_set(map.texture), FOR_COAT_NORMAL, None);
         }
         record.lookups = UVec2::new(self.lookups.len() as u32, lookups.0.len() as u32);
         self.lookups.extend(lookups.0);
@@ -313,10 +326,11 @@ impl Appearances {
                 wrap,
                 filter,
                 max_anisotropy,
+                factor,
             } => {
                 let (first, second) = match strength {
                     Some(s) => between(DVec3::new(-s, -s, -1.0), DVec3::new(s, s, 1.0)),
-                    None => between(DVec3::ZERO, DVec3::ONE),
+                    None => between(DVec3::ZERO, *factor),
                 };
                 let levels = levels_of(image, *filter);
                 let address = address(image);
@@ -337,11 +351,7 @@ impl Appearances {
                         Texels::Bytes(Encoding::Linear, _) => LINEAR8,
                         Texels::Floats(_) => FLOAT,
                     },
-                    wrap: match wrap {
-                        Wrap::Repeat => REPEAT,
-                        Wrap::Clamp => CLAMP,
-                        Wrap::Mirror => MIRRORED,
-                    },
+                    wrap: self::wrap(wrap[0]) + 4 * self::wrap(wrap[1]),
                     texels: *(self.places.entry(address)).or_insert_with(|| pyramid(image, most_levels, texels)),
                     width: image.width,
                     height: image.height,
@@ -354,6 +364,14 @@ impl Appearances {
         self.textures.push(record);
         self.records.insert(key, number);
         number
+    }
+}
+
+fn wrap(wrap: Wrap) -> u32 {
+    match wrap {
+        Wrap::Repeat => REPEAT,
+        Wrap::Clamp => CLAMP,
+        Wrap::Mirror => MIRRORED,
     }
 }
 
@@ -372,11 +390,12 @@ struct Lookups(Vec<Lookup>);
 
 impl Lookups {
     /// A number has a place for its channel.
-    fn add(&mut self, texture: u32, purpose: u32, channel: Option<(Channel, u32)>) {
+    fn add(&mut self, texture: u32, uv_set: u32, purpose: u32, channel: Option<(Channel, u32)>) {
         let known = self.0.iter().position(|lookup| lookup.texture == texture);
         let place = known.unwrap_or_else(|| {
             self.0.push(Lookup {
                 texture,
+                uv_set,
                 ..bytemuck::Zeroable::zeroed()
             });
             self.0.len() - 1
@@ -423,6 +442,11 @@ fn principled(p: &scene::Principled, found: &mut impl FnMut(&Color, u32, Option<
             AlphaMode::Opaque => OPAQUE,
             AlphaMode::Mask => MASK,
             AlphaMode::Blend => BLEND,
+        },
+        vertex_colors: match p.vertex_colors {
+            VertexColors::None => NO_COLORS,
+            VertexColors::BaseColor => COLORS_OF_BASE,
+            VertexColors::Emission => COLORS_OF_EMISSION,
         },
         ..bytemuck::Zeroable::zeroed()
     }

@@ -110,8 +110,18 @@ constants! {
     pub const IMAGE_AROUND: u32 = 1;
     /// In [`Specialization::surroundings`](super::Specialization::surroundings): the camera does not see what surrounds the scene.
     pub const UNSEEN_AROUND: u32 = 2;
+    /// In [`Specialization::surroundings`](super::Specialization::surroundings): the camera sees one colour in place of them.
+    pub const BACKGROUND: u32 = 4;
     /// [`Light::kind`](super::Light::kind): a cone of light from one point.
     pub const SPOT: u32 = 9;
+    /// [`Material::hidden`]: the camera's rays go through its back.
+    pub const HIDDEN_BACK: u32 = 2;
+    /// [`Material::vertex_colors`]: colours of vertices do nothing.
+    pub const NO_COLORS: u32 = 0;
+    /// [`Material::vertex_colors`]: they are factors of the base colour, and of what there is of the surface.
+    pub const COLORS_OF_BASE: u32 = 1;
+    /// [`Material::vertex_colors`]: they are factors of the emission, and of what there is of the surface.
+    pub const COLORS_OF_EMISSION: u32 = 2;
     /// The camera's rays go through so many surfaces that are hidden from it, at most; they see the next one.
     pub const MOST_HIDDEN: u32 = 64;
 
@@ -181,6 +191,8 @@ constants! {
     pub const FOR_SHEEN_ROUGHNESS: u32 = 0x8000;
     /// In [`Lookup::purposes`]: gives [`Material::opacity`].
     pub const FOR_OPACITY: u32 = 0x10000;
+    /// In [`Lookup::purposes`]: turns [`Material::rotation`].
+    pub const FOR_DIRECTION: u32 = 0x20000;
     /// Where the two bits of [`Lookup::channels`] are that say which value gives [`Material::roughness`].
     pub const ROUGHNESS_CHANNEL: u32 = 0;
     /// Those of [`Material::metallic`], and so on.

@@ -445,15 +445,19 @@ fn mean_of(scene: &Scene, color: &Color) -> f64 {
             TextureKind::Constant(color) => mean(*color),
             TextureKind::Checker { even, odd } => mean((*even + *odd) / 2.0),
             TextureKind::Lines { cell, line, .. } => mean((*cell + *line) / 2.0),
-            TextureKind::Image { image, .. } => match &image.texels {
-                Texels::Bytes(_, bytes) => {
-                    let sum: u64 = bytes.iter().flatten().map(|byte| u64::from(*byte)).sum();
-                    sum as f64 / 255.0 / (3 * bytes.len().max(1)) as f64
-                }
-                Texels::Floats(floats) => {
-                    floats.iter().flatten().map(|x| f64::from(*x)).sum::<f64>() / (3 * floats.len().max(1)) as f64
-                }
-            },
+            TextureKind::Image { image, factor, .. } => {
+                mean(*factor)
+                    * match &image.texels {
+                        Texels::Bytes(_, bytes) => {
+                            let sum: u64 = bytes.iter().flatten().map(|byte| u64::from(*byte)).sum();
+                            sum as f64 / 255.0 / (3 * bytes.len().max(1)) as f64
+                        }
+                        Texels::Floats(floats) => {
+                            floats.iter().flatten().map(|x| f64::from(*x)).sum::<f64>()
+                                / (3 * floats.len().max(1)) as f64
+                        }
+                    }
+            }
         },
     }
 }

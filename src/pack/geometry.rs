@@ -63,6 +63,7 @@ pub fn trees(scene: &Scene, primitives: &[(u32, &Primitive, bool)], casts: impl 
             shape: number as u32,
             shadows: if casting < words.len() { SOME_SHADOWS } else { 0 },
             has_uvs: (!mesh.uvs.is_empty()).into(),
+            uv_sets: mesh.more_uvs.len() as u32,
             ..instance(packed, mesh.center, to_world)
         });
         trees.group_words.extend(words);
@@ -91,11 +92,15 @@ pub fn trees(scene: &Scene, primitives: &[(u32, &Primitive, bool)], casts: impl 
     trees
 }
 
-/// The meshes of which any instance has a normal map.
+/// The meshes of which any instance has a normal map. What else has a direction along the surface, facets that are rougher along one axis and
+/// the normal map of a coat, takes tangents that come with the mesh, else those of single triangles.
 fn with_normal_maps(scene: &Scene) -> HashSet<*const Mesh> {
-    let has_map = |material: &usize| scene.materials[*material].normal_map.is_some();
+    let wants = |mesh: &Mesh, material: &usize| {
+        let material = &scene.materials[*material];
+        material.normal_map.is_some() || !mesh.tangents.is_empty() && material.has_direction()
+    };
     let mesh = |shape: &Shape| match &shape.geometry {
-        Geometry::Mesh { mesh, materials, .. } if materials.iter().any(has_map) => Some(Arc::as_ptr(mesh)),
+        Geometry::Mesh { mesh, materials, .. } if materials.iter().any(|m| wants(mesh, m)) => Some(Arc::as_ptr(mesh)),
         _ => None,
     };
     scene.shapes.iter().filter_map(mesh).collect()
@@ -106,7 +111,7 @@ impl Trees {
     fn place_rows(&mut self) {
         let mut node_row = self.mesh_nodes_row();
         let mut row = 0;
-        let places: Vec<[u32; 6]> = self
+        let places: Vec<[u32; 8]> = self
             .meshes
             .iter()
             .map(|mesh| {
@@ -115,7 +120,9 @@ impl Trees {
                 let attributes = vertices + mesh.vertices.len() as u32;
                 let tangents = attributes + mesh.attributes.len() as u32;
                 let groups = tangents + TANGENT_ROWS * mesh.tangents.len() as u32;
-                row = groups + mesh.groups.len().div_ceil(4) as u32;
+                let colors = groups + mesh.groups.len().div_ceil(4) as u32;
+                let more_uvs = colors + mesh.colors.len() as u32;
+                row = more_uvs + mesh.more_uvs.len() as u32;
                 let nodes = node_row;
                 node_row += NODE_ROWS * mesh.nodes.len() as u32;
                 let or_nothing = |row: u32, is_there: bool| if is_there { row } else { NOTHING };
@@ -126,6 +133,8 @@ impl Trees {
                     or_nothing(attributes, !mesh.attributes.is_empty()),
                     or_nothing(tangents, !mesh.tangents.is_empty()),
                     or_nothing(groups, !mesh.groups.is_empty()),
+                    or_nothing(colors, !mesh.colors.is_empty()),
+                    or_nothing(more_uvs, !mesh.more_uvs.is_empty()),
                 ]
             })
             .collect();
@@ -138,6 +147,8 @@ impl Trees {
                 instance.attributes,
                 instance.tangents,
                 instance.groups,
+                instance.colors,
+                instance.more_uvs,
             ] = place;
         }
     }

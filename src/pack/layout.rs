@@ -41,7 +41,7 @@ records! {
         pub ambient: Vec3,
         /// How far above a surface rays start, relative to the largest coordinate.
         pub shadow_epsilon: f32,
-        /// Radiance of rays that leave the scene.
+        /// Radiance of rays that leave the scene; under the integrator `path` what the camera sees there, if that is [`BACKGROUND`].
         pub background: Vec3,
         /// 1 / (samples of an area light).
         pub light_weight: f32,
@@ -166,12 +166,12 @@ records! {
         pub alpha_mode: u32,
         /// 1 where it is a thin sheet, else 0.
         pub thin: u32,
-        /// Of any kind: 1 where the camera's rays go through it, else 0.
+        /// Of any kind: 1 where the camera's rays go through it, [`HIDDEN_BACK`] where they go through its back alone, else 0.
         pub hidden: u32,
         /// Of any kind with facets: the texel where the table of those that are rougher along one axis starts, plus one; 0 where there is none.
         pub streaks: u32,
-        /// 0.
-        pub unused: u32,
+        /// What the colours of vertices are factors of: [`COLORS_OF_BASE`], [`COLORS_OF_EMISSION`], or [`NO_COLORS`].
+        pub vertex_colors: u32,
     }
 
     /// A lookup in a texture, whatever a material wants it for.
@@ -182,8 +182,8 @@ records! {
         pub purposes: u32,
         /// For each number that it gives, in two bits, which of the colour's values: 0 red, 1 green, 2 blue.
         pub channels: u32,
-        /// 0.
-        pub unused: u32,
+        /// By which set of texture coordinates the texture lies.
+        pub uv_set: u32,
     }
 
     /// A texture: first + (second - first) x, where x is what the pattern or the image gives.
@@ -202,7 +202,7 @@ records! {
         pub format: u32,
         /// Second row of the map.
         pub v: Vec3,
-        /// [`REPEAT`], [`CLAMP`] or [`MIRRORED`].
+        /// [`REPEAT`], [`CLAMP`] or [`MIRRORED`] along u, and four times that along v.
         pub wrap: u32,
         /// Where, in the scene's texels, the table of its levels' places starts.
         pub texels: u32,
@@ -402,6 +402,14 @@ records! {
         /// Where the numbers of its triangles' leaves start in the list of what shines, [`NOTHING`] if none of them shines; 0 where there
         /// is no tree over what shines.
         pub leaves: u32,
+        /// The row of its mesh's first vertex's colour, [`NOTHING`] if there are none.
+        pub colors: u32,
+        /// The first of the rows of its mesh's first vertex's further texture coordinates, two sets in each; [`NOTHING`] if there are none.
+        pub more_uvs: u32,
+        /// How many further sets there are.
+        pub uv_sets: u32,
+        /// 0.
+        pub unused: u32,
     }
 
     /// What the ray through a pixel's centre meets first; depth 0 and shape [`NOTHING`] where that is nothing.

@@ -24,6 +24,10 @@ pub struct PackedMesh {
     pub attributes: Vec<Vec4>,
     /// Each vertex's tangents along u and along v, for normal maps; or empty.
     pub tangents: Vec<[Vec4; 2]>,
+    /// Each vertex's colour, linear RGB and opacity; or empty.
+    pub colors: Vec<Vec4>,
+    /// Each vertex's further texture coordinates, two sets in a row, all of a vertex's rows together; or empty.
+    pub more_uvs: Vec<Vec4>,
     /// Each triangle's group, in the order of the triangles; none if there is one group alone.
     pub groups: Vec<u32>,
     /// The lower corner of its box.
@@ -62,12 +66,28 @@ impl PackedMesh {
         let attributes = (0..with_attributes).into_par_iter().map(original);
         let attributes = attributes.map(|i| normal(i).extend(uv(i).y));
         let tangents = tangents.par_iter().map(|of| [of.u.extend(0.0), of.v.extend(0.0)]);
+        let colors = (0..if mesh.colors.is_empty() { 0 } else { count })
+            .into_par_iter()
+            .map(original);
+        let colors = colors.map(|i| mesh.colors.get(i).copied().unwrap_or(Vec4::ONE));
+        let further = |set: usize, i: usize| {
+            let uvs = mesh.more_uvs.get(set);
+            uvs.and_then(|uvs| uvs.get(i)).copied().unwrap_or_default()
+        };
+        let pairs = mesh.more_uvs.len().div_ceil(2);
+        let more_uvs = (0..count * pairs).into_par_iter().map(|row| {
+            let (i, first) = (original(row / pairs), 2 * (row % pairs));
+            let [a, b] = [further(first, i), further(first + 1, i)];
+            Vec4::new(a.x, a.y, b.x, b.y)
+        });
         let group = |&number: &u32| mesh.group_of.get(number as usize).copied();
         PackedMesh {
             triangles: triangles.collect(),
             vertices: vertices.collect(),
             attributes: attributes.collect(),
             tangents: tangents.collect(),
+            colors: colors.collect(),
+            more_uvs: more_uvs.collect(),
             groups: tree.order.iter().filter_map(group).collect(),
             low: whole.low,
             high: whole.high,
@@ -83,6 +103,8 @@ impl PackedMesh {
             size_of_val(self.vertices.as_slice()),
             size_of_val(self.attributes.as_slice()),
             size_of_val(self.tangents.as_slice()),
+            size_of_val(self.colors.as_slice()),
+            size_of_val(self.more_uvs.as_slice()),
             size_of_val(self.groups.as_slice()),
         ];
         lists.iter().map(|bytes| *bytes as u64).sum()

@@ -328,6 +328,10 @@ pub fn pack(scene: &Scene) -> Packed {
         lookups: appearances.lookups(scene.render.integrator).0,
         specular_lookups: appearances.lookups(scene.render.integrator).1,
         normal_maps: appearances.has_normal_maps().into(),
+        uv_sets: appearances.lookups.iter().any(|lookup| lookup.uv_set != 0).into(),
+        vertex_colors: (materials.iter().any(|material| material.vertex_colors != NO_COLORS)
+            && trees.meshes.iter().any(|mesh| !mesh.colors.is_empty()))
+        .into(),
         texture_kinds: appearances.kinds(),
         texel_formats: appearances.formats(),
         ..match is_path {
@@ -346,7 +350,10 @@ pub fn pack(scene: &Scene) -> Packed {
         environment: Environment {
             ambient: scene.render.ambient.as_vec3(),
             shadow_epsilon: scene.render.shadow_epsilon.max(LEAST_EPSILON) as f32,
-            background: scene.render.background.as_vec3(),
+            background: (scene.environment.as_ref())
+                .and_then(|environment| environment.background)
+                .unwrap_or(scene.render.background)
+                .as_vec3(),
             light_weight: 1.0 / light_samples.count as f32,
             radiance: scene
                 .environment

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use crate::scene::image_file::{linear_to_srgb, srgb_to_linear};
+use crate::scene::halves::{Level, half, linear};
+use crate::scene::image_file::linear_to_srgb;
 use crate::scene::texture::words;
 use crate::scene::{Encoding, Image, Texels};
 
@@ -44,71 +45,11 @@ fn write_level(image: &Image, colors: impl Iterator<Item = DVec3>, texels: &mut 
     }
 }
 
-/// A level in linear light.
-struct Level {
-    width: usize,
-    height: usize,
-    texels: Vec<DVec3>,
-}
-
 /// The texels of the finest level, row by row from the bottom.
 fn finest(image: &Image) -> impl Fn(usize) -> DVec3 {
     let (width, height) = (image.width as usize, image.height as usize);
     let texel = linear(image);
     move |i| texel((height - 1 - i / width) * width + i % width)
-}
-
-/// The texels of an image in linear light, in its own order.
-pub fn linear(image: &Image) -> impl Fn(usize) -> DVec3 {
-    let texel: Box<dyn Fn(usize) -> DVec3> = match &image.texels {
-        Texels::Bytes(encoding, bytes) => {
-            let decode = |value: u32| match encoding {
-                Encoding::Srgb => srgb_to_linear(f64::from(value) / 255.0),
-                Encoding::Linear => f64::from(value) / 255.0,
-            };
-            let table: Vec<f64> = (0..256).map(decode).collect();
-            Box::new(move |i| DVec3::from_array(bytes[i].map(|byte| table[usize::from(byte)])))
-        }
-        Texels::Floats(floats) => Box::new(|i| DVec3::from_array(floats[i].map(f64::from))),
-    };
-    texel
-}
-
-/// The level after one: each texel the mean over the part of that level that it covers.
-fn half(width: usize, height: usize, texel: impl Fn(usize) -> DVec3) -> Level {
-    let (columns, rows) = (covers(width, (width / 2).max(1)), covers(height, (height / 2).max(1)));
-    let mut texels = Vec::with_capacity(columns.len() * rows.len());
-    for row in &rows {
-        for column in &columns {
-            let mut sum = DVec3::ZERO;
-            for (y, v) in row {
-                for (x, u) in column {
-                    sum += texel(y * width + x) * (u * v);
-                }
-            }
-            texels.push(sum);
-        }
-    }
-    Level {
-        width: columns.len(),
-        height: rows.len(),
-        texels,
-    }
-}
-
-/// Which of `from` texels in a line each of `to` covers, and with what weight; `to` is half of `from`, rounded down.
-fn covers(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
-    let size = from as f64 / to as f64;
-    let cover = |i: usize| {
-        let (start, end) = (i as f64 * size, (i + 1) as f64 * size);
-        let inside = move |j: usize| (end.min((j + 1) as f64) - start.max(j as f64)) / size;
-        let touched = start as usize..from.min(end.ceil() as usize);
-        touched
-            .map(move |j| (j, inside(j)))
-            .filter(|(_, weight)| *weight > 0.0)
-            .collect()
-    };
-    (0..to).map(cover).collect()
 }
 
 /// A colour by the encoding's curve, in steps of 8 bits: see `unpacked_color` in `shaders/texel.wgsl`.

@@ -71,6 +71,10 @@ specialization! {
     texture_kinds = "TEXTURE_KINDS",
     /// Bit i is set if texels are of format i.
     texel_formats = "TEXEL_FORMATS",
+    /// 1 if any texture lies by another set of texture coordinates than the first, else 0.
+    uv_sets = "UV_SETS",
+    /// 1 if any material asks for the colours of vertices, and any mesh has them, else 0.
+    vertex_colors = "VERTEX_COLORS",
     /// Under the integrator `path`, as all below: bit i is set if there are materials of kind i.
     materials = "MATERIALS",
     /// 1 if any diffuse material is rough, else 0.
@@ -95,7 +99,7 @@ specialization! {
     emitter_kinds = "EMITTER_KINDS",
     /// 1 if a texture says how anything shines, else 0.
     emission_textures = "EMISSION_TEXTURES",
-    /// [`IMAGE_AROUND`](super::IMAGE_AROUND), [`UNSEEN_AROUND`](super::UNSEEN_AROUND), both, or 0.
+    /// Any of [`IMAGE_AROUND`](super::IMAGE_AROUND), [`UNSEEN_AROUND`](super::UNSEEN_AROUND) and [`BACKGROUND`](super::BACKGROUND).
     surroundings = "SURROUNDINGS",
     /// From which bounce on paths end at random.
     rr_depth = "RR_DEPTH",

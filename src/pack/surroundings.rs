@@ -2,9 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
-use super::pyramid::linear;
-use super::{Environment, IMAGE_AROUND, UNSEEN_AROUND};
-use crate::scene::{EnvironmentImage, Scene};
+use super::{BACKGROUND, Environment, IMAGE_AROUND, UNSEEN_AROUND};
+use crate::scene::halves::linear;
+use crate::scene::{self, EnvironmentImage, Scene};
 
 /// Darker surroundings count as black: what the densities of samples are made of would be beside the normal numbers.
 const DARKEST: f64 = 1e-25;
@@ -40,12 +40,11 @@ impl Surroundings {
 
     /// What kernels know of it as a constant.
     pub fn bits(&self, scene: &Scene) -> u32 {
-        let unseen = scene
-            .environment
-            .as_ref()
-            .is_some_and(|environment| !environment.visible);
-        let image = if self.0.is_some() { IMAGE_AROUND } else { 0 };
-        image | if unseen { UNSEEN_AROUND } else { 0 }
+        let any = |test: fn(&scene::Environment) -> bool| scene.environment.as_ref().is_some_and(test);
+        let bit = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
+        bit(self.0.is_some(), IMAGE_AROUND)
+            | bit(any(|environment| !environment.visible), UNSEEN_AROUND)
+            | bit(any(|environment| environment.background.is_some()), BACKGROUND)
     }
 
     /// Its part of the record, where so large a share of all samples of light is of it.

@@ -5,6 +5,8 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
+use crate::gltf::GltfError;
+
 /// Why there is no scene. Every message begins with the place.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -40,6 +42,9 @@ pub enum SceneError {
         /// What is wrong.
         problem: Problem,
     },
+    /// A glTF file is no scene.
+    #[error("{0}")]
+    Gltf(GltfError),
     /// A value that stands in for one of the file is bad; the key is the field of [`Overrides`](super::Overrides).
     #[error("{0}")]
     Override(Problem),

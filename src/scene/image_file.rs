@@ -1,6 +1,7 @@
 //! Images that textures name: files, found, decoded within limits, and checked; and images in memory.
 
-use std::collections::BTreeMap;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
@@ -10,8 +11,10 @@ use image::error::LimitErrorKind;
 use image::{DynamicImage, ImageError, ImageFormat};
 
 use super::decode::{Channels, Header, LONGEST_SIDE, Refused, decode};
+use super::halves::halved;
 use super::parse::list;
 use super::texture::{Encoding, Image, Texels};
+use crate::mesh::Mesh;
 
 /// The largest file, in bytes.
 const LARGEST_FILE: u64 = 512 << 20;
@@ -25,8 +28,16 @@ pub struct Assets {
     pub folder: PathBuf,
     /// The folder that images must lie in.
     pub root: PathBuf,
+    /// Files that may lie elsewhere, by the absolute names that the scene has for them.
+    pub elsewhere: BTreeSet<PathBuf>,
     /// Images in memory by their names: a texture that names one of them as its file has it, and no file is read.
     pub images: BTreeMap<String, Arc<Image>>,
+    /// Image files in memory, as they would be on a disk, by their names.
+    pub encoded: BTreeMap<String, Arc<[u8]>>,
+    /// The longest side of what is kept of those, in texels: larger ones are halved until they are no longer than it.
+    pub longest_side: Option<u32>,
+    /// Meshes in memory by their names.
+    pub meshes: BTreeMap<String, Arc<Mesh>>,
 }
 
 /// A place that an image comes from.
@@ -36,6 +47,8 @@ pub(super) enum Place {
     File(PathBuf),
     /// An image of [`Assets::images`].
     Memory(String),
+    /// A file of [`Assets::encoded`].
+    Encoded(String),
 }
 
 impl Default for Assets {
@@ -55,7 +68,11 @@ impl Assets {
         Assets {
             folder: folder.to_owned(),
             root: folder.to_owned(),
+            elsewhere: BTreeSet::new(),
             images: BTreeMap::new(),
+            encoded: BTreeMap::new(),
+            longest_side: None,
+            meshes: BTreeMap::new(),
         }
     }
 
@@ -109,18 +126,22 @@ impl Assets {
         fits: impl Fn(Header) -> Result<(), String>,
     ) -> Result<File, String> {
         let encoding = part.encoding();
-        let Place::File(path) = place else {
-            if part == Part::Alpha {
+        let bytes = match place {
+            Place::Memory(_) if part == Part::Alpha => {
                 return Err(format!("{file:?} is an image in memory, which has no alpha channel"));
             }
-            return self.image_in_memory(file, encoding, fits);
+            Place::Memory(_) => return self.image_in_memory(file, encoding, fits),
+            Place::File(path) => Cow::Owned(read(file, path)?),
+            Place::Encoded(name) => Cow::Borrowed(self.encoded.get(name).map_or(&[][..], |bytes| bytes)),
         };
-        let bytes = read(file, path)?;
         let format = image::guess_format(&bytes)
             .ok()
             .filter(|format| NAMES.iter().any(|(known, _)| known == format));
-        let format = format.ok_or_else(|| format!("{file:?} must be a PNG, JPEG, EXR or HDR file"))?;
-        check_name(file, format)?;
+        let format = format.ok_or_else(|| format!("{file:?} must be a PNG, JPEG, WebP, EXR or HDR file"))?;
+        let is_named = matches!(place, Place::File(_));
+        if is_named {
+            check_name(file, format)?;
+        }
         let is_float = matches!(format, ImageFormat::OpenExr | ImageFormat::Hdr);
         if is_float && encoding == Some(Encoding::Srgb) {
             return Err(format!(
@@ -128,6 +149,19 @@ impl Assets {
                 name(format)
             ));
         }
+        let longest = self.longest_side.filter(|_| matches!(place, Place::Encoded(_)));
+        let halvings = |width: u32, height: u32| {
+            let sizes = (0..).map(|i| width.max(height) >> i);
+            longest.map_or(0, |longest| sizes.take_while(|size| *size > longest.max(1)).count())
+        };
+        let fits = |header: Header| {
+            let times = halvings(header.width, header.height);
+            fits(Header {
+                width: (header.width >> times).max(1),
+                height: (header.height >> times).max(1),
+                ..header
+            })
+        };
         let decoded = decode(&bytes, format, fits).map_err(|refused| match refused {
             Refused::Rule(rule) => rule,
             Refused::Channels(channels) => format!("{file:?} {}", refused_channels(&channels)),
@@ -141,11 +175,14 @@ impl Assets {
             Part::Colors(_) => texels(decoded, is_float, encoding.unwrap_or(default)),
             Part::Alpha => alpha(decoded).ok_or_else(|| format!("{file:?} must have an alpha channel"))?,
         };
-        let image = Image { width, height, texels };
+        let mut image = Image { width, height, texels };
         in_range(file, &image)?;
+        for _ in 0..halvings(width, height) {
+            image = halved(&image);
+        }
         Ok(File {
             image: Arc::new(image),
-            format: Some(format),
+            format: Some(format).filter(|_| is_named),
             default,
             encoding: encoding.unwrap_or(default),
             is_alpha: part == Part::Alpha,
@@ -157,13 +194,16 @@ impl Assets {
         if self.images.contains_key(file) {
             return Ok(Place::Memory(file.to_owned()));
         }
+        if self.encoded.contains_key(file) {
+            return Ok(Place::Encoded(file.to_owned()));
+        }
         let path = self.folder.join(file).canonicalize();
         let path = path.map_err(|error| unreadable(file, &error))?;
         let root = self.root.canonicalize().map_err(|error| {
             let root = self.root.display();
             format!("{file:?} must lie in {root}, the asset root, which cannot be found: {error}")
         })?;
-        if !path.starts_with(&root) {
+        if !path.starts_with(&root) && !self.elsewhere.contains(Path::new(file)) {
             let root = self.root.display();
             return Err(match self.root == self.folder {
                 true => format!(
@@ -208,7 +248,7 @@ fn in_range(name: &str, image: &Image) -> Result<(), String> {
 #[derive(Clone)]
 pub(super) struct File {
     pub image: Arc<Image>,
-    /// None in memory.
+    /// None if its name says none, as in memory.
     format: Option<ImageFormat>,
     default: Encoding,
     encoding: Encoding,
@@ -293,9 +333,10 @@ fn refused_channels(channels: &Channels) -> String {
     }
 }
 
-const NAMES: [(ImageFormat, &str); 4] = [
+const NAMES: [(ImageFormat, &str); 5] = [
     (ImageFormat::Png, "PNG"),
     (ImageFormat::Jpeg, "JPEG"),
+    (ImageFormat::WebP, "WebP"),
     (ImageFormat::OpenExr, "EXR"),
     (ImageFormat::Hdr, "HDR"),
 ];

@@ -5,12 +5,19 @@ use std::fs::File;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
+use super::around::{Background, of_option, surround};
 use super::course;
 use super::define::{Define, Defines};
 use super::error::{At, Problem, SceneError};
+use super::gltf::{GltfChoice, describe, is_gltf};
 use super::parse::{NOT_UTF8, invalid, line_of_path, syntax_error};
+use super::turntable::turning;
 use super::validate::{LIGHT_SAMPLES, adaptive, adaptive_error, max_depth, sample_count, side};
-use super::{AdaptiveDescription, Assets, Description, Integrator, Pattern, SamplesDescription, Scene};
+use super::{
+    AdaptiveDescription, Assets, CameraPath, Description, EnvironmentDescription, Integrator, Pattern,
+    SamplesDescription, Scene,
+};
+use crate::gltf::GltfError;
 
 /// The largest scene file in bytes: far above what anyone writes, far below what fills the memory.
 const LARGEST_FILE: u64 = 64 << 20;
@@ -40,6 +47,16 @@ pub struct Overrides {
     /// The frame that [`Scene::camera`] is of, if the camera moves. Without it the camera is as the file has it by itself, or
     /// as in the first key of its path.
     pub frame: Option<f64>,
+    /// What surrounds the scene, for [`Integrator::Path`]. Whether the camera sees it stays as it is. Its file may lie anywhere, if its name is
+    /// absolute.
+    pub environment: Option<EnvironmentDescription>,
+    /// What the camera sees where nothing is.
+    pub background: Option<Background>,
+    /// So many frames, 1 to 100,000, around what the camera looks at, in place of the way that it goes by itself: a picture of one is that of
+    /// [`Overrides::frame`], from 1 on.
+    pub turntable: Option<u32>,
+    /// What is shown of a glTF file, and from where.
+    pub gltf: GltfChoice,
     /// Values for any keys of the file, one after the other; the fields above go before them.
     pub define: Vec<Define>,
 }
@@ -65,9 +82,20 @@ impl Overrides {
         if let Some(error) = self.adaptive {
             adaptive_error(error).at("adaptive")?;
             let max_samples = (render.adaptive.as_ref()).and_then(|adaptive| adaptive.max_samples);
-            let description = AdaptiveDescription { error, max_samples };
-            adaptive(&description, &render.pixel_samples, integrator).at("adaptive")?;
-            render.adaptive = Some(description);
+            let further = AdaptiveDescription { error, max_samples };
+            adaptive(&further, &render.pixel_samples, integrator).at("adaptive")?;
+            render.adaptive = Some(further);
+        }
+        if let Some(environment) = &self.environment {
+            surround(description, environment);
+        }
+        if let Some(background) = self.background {
+            background.show(description).at("background")?;
+        }
+        if let Some(frames) = self.turntable
+            && description.camera.validate().is_ok()
+        {
+            description.camera = turning(&description.camera, frames).at("turntable")?;
         }
         Ok(())
     }
@@ -81,7 +109,7 @@ fn set_count(samples: &mut SamplesDescription, count: Option<u32>, integrator: I
 }
 
 impl Scene {
-    /// Reads and checks a scene file: JSON where its name ends in `.json`, else TOML.
+    /// Reads and checks a scene file: JSON where its name ends in `.json`, glTF where that is `.gltf` or `.glb`, else TOML.
     ///
     /// # Errors
     ///
@@ -96,28 +124,30 @@ impl Scene {
     ///
     /// The errors of [`Scene::load`], and bad overrides.
     pub fn load_with(path: impl AsRef<Path>, overrides: &Overrides) -> Result<Scene, SceneError> {
+        Scene::load_described(path, overrides).map(|(scene, _)| scene)
+    }
+
+    /// [`Scene::load_with`], and what the file describes, with the other values in their places; files that it names are relative to the file's
+    /// folder. A glTF file is described as one shape, with a camera and what lights it.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Scene::load_with`].
+    pub fn load_described(path: impl AsRef<Path>, overrides: &Overrides) -> Result<(Scene, Description), SceneError> {
         Scene::load_and_list(path.as_ref(), overrides, &mut BTreeSet::new())
     }
 
-    /// [`Scene::load_with`]. What files the scene is made of is told even if it breaks a rule.
+    /// [`Scene::load_described`]. What files the scene is made of is told even if it breaks a rule.
     pub(crate) fn load_and_list(
         path: &Path,
         overrides: &Overrides,
         files: &mut BTreeSet<PathBuf>,
-    ) -> Result<Scene, SceneError> {
-        let bytes = read(path).map_err(|error| SceneError::Read {
-            path: path.to_owned(),
-            error,
-        })?;
-        let origin = path.display().to_string();
-        match std::str::from_utf8(&bytes) {
-            Ok(text) => parse_beside(text, &origin, folder_of(path), overrides, files),
-            Err(error) => {
-                let text = String::from_utf8_lossy(&bytes);
-                // Up to there the lossy text is the file's.
-                Err(syntax_error(&text, &origin, error.valid_up_to(), NOT_UTF8))
-            }
+    ) -> Result<(Scene, Description), SceneError> {
+        if is_gltf(path) {
+            return load_gltf(path, overrides, files);
         }
+        let text = read_text(path)?;
+        parse_beside(&text, &path.display().to_string(), folder_of(path), overrides, files)
     }
 
     /// Reads and checks the text of a scene file; `origin` is the file's name in messages, which says by `.json` that
@@ -137,12 +167,45 @@ impl Scene {
     /// The errors of [`Scene::parse`], and bad overrides.
     pub fn parse_with(text: &str, origin: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
         let folder = folder_of(Path::new(origin));
-        parse_beside(text, origin, folder, overrides, &mut BTreeSet::new())
+        parse_beside(text, origin, folder, overrides, &mut BTreeSet::new()).map(|(scene, _)| scene)
     }
 }
 
-fn folder_of(path: &Path) -> &Path {
+pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent().unwrap_or(Path::new("."))
+}
+
+/// A glTF file as a scene of its own, with the values in place.
+fn load_gltf(
+    path: &Path,
+    overrides: &Overrides,
+    files: &mut BTreeSet<PathBuf>,
+) -> Result<(Scene, Description), SceneError> {
+    let (mut description, _kept) = describe(path, overrides, files)?;
+    if !overrides.define.is_empty() {
+        let mut defines = Defines::new(&overrides.define);
+        description = description.defined(&mut defines).map_err(SceneError::Override)?;
+    }
+    overrides.apply(&mut description).map_err(SceneError::Override)?;
+    // What is said of the shape of the file is said of the file.
+    let invalid = |problem: Problem| {
+        SceneError::Gltf(GltfError::File {
+            path: path.to_owned(),
+            message: match problem.key.to_string() == "shapes[0].file" {
+                true => problem.message,
+                false => problem.to_string(),
+            },
+        })
+    };
+    let assets = overrides.assets(folder_of(path), folder_of(path));
+    let mut scene = overrides.finish(description.validate_and_list(&assets, files), invalid, |_| {})?;
+    let name = format!("{}: ", path.file_name().unwrap_or_default().to_string_lossy());
+    for note in &mut scene.notes {
+        if let Some(rest) = note.strip_prefix(&name) {
+            *note = rest.to_owned();
+        }
+    }
+    Ok((scene, description))
 }
 
 fn parse_beside(
@@ -151,36 +214,80 @@ fn parse_beside(
     folder: &Path,
     overrides: &Overrides,
     files: &mut BTreeSet<PathBuf>,
-) -> Result<Scene, SceneError> {
+) -> Result<(Scene, Description), SceneError> {
     let mut defines = Defines::new(&overrides.define);
     let mut description = Description::parse_with(text, origin, &mut defines)?;
     overrides.apply(&mut description).map_err(SceneError::Override)?;
-    let mut assets = Assets::beside(folder);
+    if let Some(option) = overrides.gltf.first() {
+        let rule = format!("is for scenes that are glTF files, and {origin} is none");
+        return Err(SceneError::Override(Problem::of(option, rule)));
+    }
     let is_course = course::is_course(Path::new(origin));
-    if is_course {
-        assets.root = course::asset_root(folder);
+    let root = if is_course {
+        course::asset_root(folder)
+    } else {
+        folder.to_owned()
+    };
+    let assets = overrides.assets(folder, &root);
+    let invalid = |problem| match is_course {
+        true => course::invalid(text, origin, problem, &defines),
+        false => invalid(text, origin, problem, &defines),
+    };
+    let checked = description.validate_and_list(&assets, files);
+    let scene = overrides.finish(checked, invalid, |path| path.set_place(origin, line_of_path(text)))?;
+    Ok((scene, description))
+}
+
+impl Overrides {
+    /// Where the files of a scene in this folder are, which lie in a root of their own unless these say another.
+    pub(super) fn assets(&self, folder: &Path, root: &Path) -> Assets {
+        let mut assets = Assets::beside(folder);
+        if let Some(root) = self.asset_root.as_deref().or((root != folder).then_some(root)) {
+            assets.root = root.to_owned();
+        }
+        let around = self.environment.as_ref().and_then(|around| around.file.clone());
+        assets.elsewhere.extend(around.map(PathBuf::from));
+        assets
     }
-    if let Some(root) = &overrides.asset_root {
-        assets.root.clone_from(root);
-    }
-    let mut scene = description
-        .validate_and_list(&assets, files)
-        .map_err(|problem| match is_course {
-            true => course::invalid(text, origin, problem, &defines),
-            false => invalid(text, origin, problem, &defines),
+
+    /// A scene that was checked, at its frame, or why there is none.
+    fn finish(
+        &self,
+        checked: Result<Scene, Problem>,
+        invalid: impl Fn(Problem) -> SceneError,
+        place: impl Fn(&mut CameraPath),
+    ) -> Result<Scene, SceneError> {
+        let mut scene = checked.map_err(|problem| match self.environment {
+            Some(_) => of_option(problem).map_or_else(&invalid, SceneError::Override),
+            None => invalid(problem),
         })?;
-    if let Some(path) = &mut scene.camera_path {
-        path.set_place(origin, line_of_path(text));
+        if let Some(path) = &mut scene.camera_path {
+            place(path);
+        }
+        if let Some(frame) = self.frame {
+            scene.camera = scene.camera_at(frame)?;
+        }
+        // The count may be the default, and yet somebody asked for it.
+        let is_asked = self.light_samples.is_some() && scene.render.integrator == Integrator::Path;
+        if is_asked && !scene.notes.iter().any(|note| note == LIGHT_SAMPLES) {
+            scene.notes.push(LIGHT_SAMPLES.to_owned());
+        }
+        Ok(scene)
     }
-    if let Some(frame) = overrides.frame {
-        scene.camera = scene.camera_at(frame)?;
-    }
-    // The count may be the default, and yet somebody asked for it.
-    let is_asked = overrides.light_samples.is_some() && scene.render.integrator == Integrator::Path;
-    if is_asked && !scene.notes.iter().any(|note| note == LIGHT_SAMPLES) {
-        scene.notes.push(LIGHT_SAMPLES.to_owned());
-    }
-    Ok(scene)
+}
+
+/// The text of a file.
+fn read_text(path: &Path) -> Result<String, SceneError> {
+    let bytes = read(path).map_err(|error| SceneError::Read {
+        path: path.to_owned(),
+        error,
+    })?;
+    String::from_utf8(bytes).map_err(|error| {
+        let text = String::from_utf8_lossy(error.as_bytes());
+        // Up to there the lossy text is the file's.
+        let valid = error.utf8_error().valid_up_to();
+        syntax_error(&text, &path.display().to_string(), valid, NOT_UTF8)
+    })
 }
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
@@ -222,6 +329,10 @@ light_samples = { pattern = 'random', count = 5 }
             max_depth: None,
             asset_root: None,
             frame: None,
+            environment: None,
+            background: None,
+            turntable: None,
+            gltf: GltfChoice::default(),
             define: Vec::new(),
         };
         let scene = Scene::parse_with(SCENE, "s.toml", &overrides).unwrap();

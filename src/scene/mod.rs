@@ -3,13 +3,17 @@
 //! The way from the file: text → [`Description`] (what it says, field for field) → [`Scene`] (by
 //! [`Description::validate`] alone). Nothing behind a `Scene` checks again.
 
+mod around;
 mod camera_path;
 mod course;
 mod decode;
 mod define;
 mod description;
 mod error;
+pub(crate) mod framing;
+mod gltf;
 mod gray_exr;
+pub(crate) mod halves;
 pub(crate) mod image_file;
 mod load;
 mod mesh_file;
@@ -19,8 +23,10 @@ mod sky;
 mod spline;
 mod studio;
 pub(crate) mod texture;
+mod turntable;
 mod validate;
 mod view;
+mod write;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -28,14 +34,18 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
+use crate::gltf::Imported;
 use crate::mesh::Mesh;
 
+pub use around::Background;
 pub use camera_path::CameraPath;
 #[cfg(feature = "dev")]
 pub(crate) use course::is_course;
 pub use define::Define;
 pub use description::*;
 pub use error::{KeyPath, Problem, SceneError};
+pub use framing::{Framing, View, framed};
+pub use gltf::{GltfChoice, is_gltf};
 pub use image_file::Assets;
 pub use load::Overrides;
 pub use metals::MetalIndex;
@@ -82,6 +92,8 @@ pub struct Scene {
     pub files: Vec<PathBuf>,
     /// What a user should know of the scene and of its meshes, if anything: `rock.ply: 12 degenerate triangles dropped`.
     pub notes: Vec<String>,
+    /// The glTF files, as long as what was made of them is in use.
+    pub(crate) imported: Vec<Arc<Imported>>,
 }
 
 /// A camera: a position, an orthonormal basis and a projection.
@@ -248,6 +260,8 @@ pub struct Environment {
     pub image: Option<EnvironmentImage>,
     /// Whether the camera sees it. What mirrors or refracts shows it in either case.
     pub visible: bool,
+    /// What the camera sees in its place, if that is something else.
+    pub background: Option<DVec3>,
 }
 
 /// An equirectangular image around a scene: without a turn its middle is towards +x, its left and right edges towards -x, its
@@ -352,6 +366,8 @@ pub struct Principled {
     pub anisotropy: Value,
     /// The tangent's angle, counter-clockwise in radians.
     pub anisotropy_rotation: f64,
+    /// Index of an image whose red and green, from 0 to 1 as -1 to 1, are the tangent along u and v that is turned so.
+    pub anisotropy_direction: Option<usize>,
     /// Index of refraction of the dielectric, 1 to 100.
     pub ior: f64,
     /// Factor of what the dielectric reflects.
@@ -380,6 +396,62 @@ pub struct Principled {
     pub alpha_mode: AlphaMode,
     /// The least alpha of what is there, under [`AlphaMode::Mask`].
     pub alpha_cutoff: f64,
+    /// What the colours of a mesh's vertices are factors of.
+    pub vertex_colors: VertexColors,
+    /// Whether the camera sees its back. All else does.
+    pub double_sided: bool,
+}
+
+impl Material {
+    /// The textures that it looks up.
+    pub(crate) fn textures(&self) -> Vec<usize> {
+        let (mut colors, mut values, mut maps) = (vec![&self.emission], Vec::new(), vec![&self.normal_map]);
+        let mut direction = None;
+        match &self.reflection {
+            Reflection::Phong {
+                ambient,
+                diffuse,
+                specular,
+                ..
+            } => colors.extend([ambient, diffuse, specular]),
+            Reflection::Mirror { tint } | Reflection::Glass { tint, .. } => colors.push(tint),
+            Reflection::Diffuse { color, roughness } => {
+                colors.push(color);
+                values.push(roughness);
+            }
+            Reflection::Conductor { color, facets, .. } | Reflection::Dielectric { color, facets, .. } => {
+                colors.push(color);
+                values.push(&facets.roughness);
+            }
+            Reflection::Principled(principled) => {
+                colors.extend(principled.colors());
+                values.extend(principled.values());
+                maps.push(&principled.clearcoat_normal_map);
+                direction = principled.anisotropy_direction;
+            }
+        }
+        let colors = colors.into_iter().filter_map(|color| match color {
+            Color::Texture(i) => Some(*i),
+            Color::Plain(_) => None,
+        });
+        let values = values.into_iter().filter_map(|value| match value {
+            Value::Texture(i, _) => Some(*i),
+            Value::Plain(_) => None,
+        });
+        let maps = maps.into_iter().flatten().map(|map| map.texture);
+        colors.chain(values).chain(maps).chain(direction).collect()
+    }
+
+    /// Whether it has a direction along the surface beside that of its normal map: that of facets, or of the map of a coat.
+    pub(crate) fn has_direction(&self) -> bool {
+        match &self.reflection {
+            Reflection::Conductor { facets, .. } | Reflection::Dielectric { facets, .. } => facets.anisotropy > 0.0,
+            Reflection::Principled(principled) => {
+                principled.clearcoat_normal_map.is_some() || principled.anisotropy != Value::Plain(0.0)
+            }
+            _ => false,
+        }
+    }
 }
 
 impl Principled {

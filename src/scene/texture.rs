@@ -60,6 +60,8 @@ pub struct Texture {
     pub kind: TextureKind,
     /// Rows of the map from a surface's (u, v, 1) to the plane's (u, v); invertible.
     pub transform: [DVec3; 2],
+    /// Which of a mesh's sets of texture coordinates these u and v are of: 0 to 7, and 0 on what is no mesh.
+    pub uv_set: u32,
 }
 
 /// What is on a texture. Colours are linear RGB.
@@ -87,12 +89,14 @@ pub enum TextureKind {
     Image {
         /// The texels.
         image: Arc<Image>,
-        /// Beyond the square.
-        wrap: Wrap,
+        /// Beyond the square, along u and along v.
+        wrap: [Wrap; 2],
         /// How its colours are found.
         filter: TextureFilter,
         /// The largest ratio of a footprint's axes that [`TextureFilter::Ewa`] follows, at least 1.
         max_anisotropy: f64,
+        /// Factor of its colours: of a texture of alpha the same for all parts.
+        factor: DVec3,
     },
 }
 

@@ -147,7 +147,7 @@ fn names_that_do_not_tell_frames_apart_are_refused() {
     let place = Place::new();
     moving(&place, "linear");
     fs::create_dir(place.path("a#")).unwrap();
-    let rule = "must have # for the frame's number in its name, as in out.####.png, as --frames are 2";
+    let rule = "must have # for the frame's number in its name, as in out.####.png, as there are 2 frames";
     for name in ["out.png", "a#/out.png", "-", "/dev/null"] {
         let format = ["moving.toml", "--frames", "1-2", "--format", "png", "-o", name];
         refused(&place, &format, 2, &format!("--output: {name}: {rule}"));

@@ -5,6 +5,7 @@ mod commands;
 mod diff;
 mod files;
 mod frames;
+mod gltf;
 mod golden;
 mod jobs;
 mod messages;
@@ -12,6 +13,7 @@ mod options;
 mod output;
 mod outputs;
 mod pictures;
+mod scene_options;
 
 use std::path::Path;
 

@@ -2,6 +2,7 @@
 //! what they say last, or the last good one with the error beside it.
 
 mod faults;
+mod gltf;
 mod kernels;
 mod large;
 mod measure;

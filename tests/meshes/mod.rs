@@ -8,6 +8,7 @@ mod readers;
 mod sphere;
 mod tangents;
 mod trees;
+mod vertices;
 mod watertight;
 
 use wgray::mesh::{Mesh, Normals};

@@ -350,6 +350,34 @@ fn a_hidden_image_lights_and_is_mirrored() {
 }
 
 #[test]
+fn a_background_is_what_the_camera_sees_alone() {
+    let balls = "camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }\n\
+                 materials.m = { type = 'conductor', color = [1, 1, 1] }\n\
+                 [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 0.7\n";
+    let white = image(4, 2, |_, _| [1.0; 3]);
+    for environment in ["file = 'around'", "color = [1, 1, 1]", "color = [0, 0, 0]"] {
+        let lit = if environment.contains("[0") { 0.0 } else { 1.0 };
+        let ways = exact_ways().into_iter();
+        let films: Vec<_> = ways
+            .map(|way| {
+                let keys = format!("{environment}\nbackground = [0.5, 0.25, 8]");
+                let film = render(&described(&keys, Some(&white), (16, 4), balls), way);
+                let at = |i: usize| film.means().nth(i).unwrap_or_default();
+                assert_eq!(at(0), [0.5, 0.25, 8.0], "{environment}, {way:?}");
+                let [x, ..] = at(8 * 16 + 8);
+                assert!(
+                    (x - lit).abs() < 1e-5,
+                    "the mirror shows what lights: {environment}, {way:?}: {x}"
+                );
+                film
+            })
+            .collect();
+        let [first, .., last] = &films[..] else { continue };
+        assert_eq!(differing(first, last), 0, "{environment}");
+    }
+}
+
+#[test]
 fn a_factor_of_two_doubles_every_bit() {
     for way in both() {
         let film = |scale: f64| {

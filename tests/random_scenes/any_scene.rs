@@ -44,13 +44,14 @@ fn surroundings() -> BoxedStrategy<EnvironmentDescription> {
         select(AROUND),
         select(&[1.0, 0.3, 0.0][..]),
         prop::option::of(-180.0..180.0),
-        any::<bool>(),
+        prop_oneof![2 => Just((true, None)), 1 => Just((false, None)), 1 => color(2.0).prop_map(|seen| (true, Some(seen)))],
     );
-    let image = image.prop_map(|((file, ..), scale, turn, visible)| {
+    let image = image.prop_map(|((file, ..), scale, turn, (visible, background))| {
         let mut environment = EnvironmentDescription::image(file);
         environment.scale = scale;
         environment.rotate = turn.map(|turn| EnvironmentRotation::Any(Rotation::Angles(DVec3::new(turn, 20.0, -turn))));
         environment.visible = visible;
+        environment.background = background;
         environment
     });
     prop_oneof![1 => color(1.0).prop_map(EnvironmentDescription::new), 1 => image].boxed()

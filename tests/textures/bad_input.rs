@@ -92,9 +92,9 @@ fn bad_images_are_told() {
         ("huge.png", "must have at most 16384 texels along a side"),
         ("zero.png", "is damaged or cut short: "),
         ("zero.hdr", "must "),
-        ("empty.png", "must be a PNG, JPEG, EXR or HDR file"),
-        ("text.png", "must be a PNG, JPEG, EXR or HDR file"),
-        ("s.toml", "must be a PNG, JPEG, EXR or HDR file"),
+        ("empty.png", "must be a PNG, JPEG, WebP, EXR or HDR file"),
+        ("text.png", "must be a PNG, JPEG, WebP, EXR or HDR file"),
+        ("s.toml", "must be a PNG, JPEG, WebP, EXR or HDR file"),
         ("named.jpg", "must be what its name says; it is a file of type PNG"),
         (
             "nan.exr",
@@ -285,6 +285,26 @@ fn bad_values_are_told() {
             "6: textures.t.max_anisotropy: nan must be from 1 to 64",
         ),
         (
+            format!("{image}factor = [1, 1, 1, -1]"),
+            "6: textures.t.factor: -1 must be from 0 to 1e6",
+        ),
+        (
+            format!("{image}factor = [1, 2e6, 1, 1]"),
+            "6: textures.t.factor: 2e6 must be from 0 to 1e6",
+        ),
+        (
+            format!("{image}factor = [1, 1, 1]"),
+            "6: textures.t.factor: [1, 1, 1] must be a list of 4 numbers",
+        ),
+        (
+            format!("{image}uv_set = 8"),
+            "6: textures.t.uv_set: 8 must be from 0 to 7",
+        ),
+        (
+            format!("{image}uv_set = -1"),
+            "6: textures.t.uv_set: -1 must be a whole number from 0 to 7",
+        ),
+        (
             format!("{image}scale = [1, 0]"),
             "6: textures.t.scale: [1, 0] must be finite and not 0: from 1e-6 to 1e6, or negative",
         ),
@@ -392,8 +412,8 @@ fn bad_values_are_told() {
             "13: shapes[0].material: \"m\" must have no normal map here, as the sides of this shape have no tangents",
         ),
         (
-            format!("{linear}{}", mapped.replace("'t'", "'t', strength = -1")),
-            "10: materials.m.normal_map.strength: -1 must be from 0 to 100",
+            format!("{linear}{}", mapped.replace("'t'", "'t', strength = -101")),
+            "10: materials.m.normal_map.strength: -101 must be from -100 to 100",
         ),
     ] {
         let message = load(folder.path(), &text).expect_err(&text);

@@ -7,12 +7,14 @@ use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueP
 use wgray::film::Region;
 use wgray::image::Aov;
 use wgray::job::Tile;
-use wgray::scene::{Define, Integrator, Overrides, Pattern};
+use wgray::scene::{Define, Integrator, Overrides, Pattern, Scene, is_gltf};
 
 use super::frames::{Frame, Frames};
+use crate::cli::Usage;
 use crate::cli::outputs::{Layered, Outputs};
 use crate::cli::picture_options::PictureOptions;
 use crate::cli::progress::Mode;
+use crate::cli::scene_options::SceneOptions;
 
 /// The arguments as they are written.
 #[derive(Debug, clap::Args)]
@@ -26,6 +28,16 @@ pub struct Args {
     /// camera.path of the scene has it, and # in names of outputs stand for the number: out.####.png is out.0001.png
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     pub frames: Option<Frames>,
+
+    /// Renders N frames of a camera that goes once around what it looks at, as --frames 1-N does, or those of them that --frames
+    /// names. The way that the scene's camera goes by itself is left out
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub turntable: Option<u32>,
+
+    /// Frames of a second of the animations of a glTF file: frame N shows second N/F. If absent, 24 for --frames, and --turntable shows
+    /// one moment
+    #[arg(long, value_name = "F", value_parser = parse_fps, conflicts_with = "time")]
+    pub fps: Option<f64>,
 
     /// Leaves out each picture, or frame, of which all files are there
     #[arg(long)]
@@ -143,6 +155,9 @@ pub struct Args {
     pub verbose: bool,
 
     #[command(flatten)]
+    pub options: SceneOptions,
+
+    #[command(flatten)]
     pub pictures: PictureOptions,
 }
 
@@ -161,6 +176,28 @@ impl Args {
     /// How progress is shown.
     pub fn shown_progress(&self) -> Mode {
         if self.quiet { Mode::None } else { self.progress }
+    }
+
+    /// The frames to render; one that has no number, if none are asked for.
+    pub fn frames(&self) -> Vec<Frame> {
+        let around = self.turntable.map(Frames::first);
+        Frame::all(self.frames.as_ref().or(around.as_ref()))
+    }
+
+    /// Frames of a second, if frames are moments of the scene's animations.
+    pub fn fps(&self, scene: &Scene) -> Result<Option<f64>, Usage> {
+        let refused = |rule: &str| Err(Usage(format!("--fps: {rule}")));
+        // Of what another scene holds that one says the time.
+        let is_animated = scene.has_animations() && is_gltf(&self.scene);
+        match self.fps {
+            Some(_) if self.frames.is_none() && self.turntable.is_none() => refused("needs --frames or --turntable"),
+            Some(_) if !is_animated => refused("is for glTF files that have animations, and this scene is none"),
+            Some(fps) => Ok(Some(fps)),
+            None => {
+                let plays = self.frames.is_some() && self.turntable.is_none() && !self.options.has_time();
+                Ok((plays && is_animated).then_some(FPS))
+            }
+        }
     }
 
     /// Where a frame's pictures, or its part of one, and figures are written to.
@@ -207,7 +244,7 @@ impl Args {
 
     /// Values in place of the scene's.
     pub fn overrides(&self) -> Overrides {
-        Overrides {
+        self.options.over(Overrides {
             size: self.size,
             pixel_samples: self.pixel_samples,
             light_samples: self.light_samples,
@@ -217,9 +254,10 @@ impl Args {
             integrator: self.integrator,
             max_depth: self.max_depth,
             asset_root: self.asset_root.clone(),
-            frame: None,
+            turntable: self.turntable,
             define: self.define.clone(),
-        }
+            ..Overrides::default()
+        })
     }
 }
 
@@ -252,6 +290,14 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
         Some((Ok(width), Ok(height))) => Ok((width, height)),
         _ => Err("must be two whole numbers, such as 640x480".to_string()),
     }
+}
+
+/// Frames of a second, if nothing is said.
+const FPS: f64 = 24.0;
+
+fn parse_fps(text: &str) -> Result<f64, String> {
+    let fps = text.parse().ok().filter(|fps: &f64| (1e-3..=1e6).contains(fps));
+    fps.ok_or("must be a number from 0.001 to 1e6, such as 24 or 29.97".to_owned())
 }
 
 /// Some thirty years.

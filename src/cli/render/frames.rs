@@ -14,6 +14,13 @@ const MOST: usize = 100_000;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frames(Vec<u32>);
 
+impl Frames {
+    /// As many, from 1 on.
+    pub fn first(count: u32) -> Frames {
+        Frames((1..=count).collect())
+    }
+}
+
 impl FromStr for Frames {
     type Err = String;
 
@@ -102,7 +109,7 @@ impl Frame {
         }
         if !has_mark {
             return refused(&format!(
-                "must have # for the frame's number in its name, as in out.####.png, as --frames are {count}"
+                "must have # for the frame's number in its name, as in out.####.png, as there are {count} frames"
             ));
         }
         let Some(name) = name.to_str() else {
@@ -206,7 +213,7 @@ mod tests {
             assert_eq!(name(one(number, 2), pattern).unwrap(), wanted);
             assert_eq!(name(one(number, 1), pattern).unwrap(), wanted);
         }
-        let bad = "--output: a#/out.png: must have # for the frame's number in its name, as in out.####.png, as --frames are 2";
+        let bad = "--output: a#/out.png: must have # for the frame's number in its name, as in out.####.png, as there are 2 frames";
         assert_eq!(name(one(1, 2), "a#/out.png").unwrap_err(), bad);
         assert_eq!(name(one(1, 1), "a#/out.png").unwrap(), "a#/out.png");
         assert!(name(one(1, 2), "-").is_err());

@@ -16,7 +16,7 @@ use tracing::info;
 use wgray::device::DeviceInfo;
 use wgray::error::RenderError;
 use wgray::job::{Keeper, Nowhere};
-use wgray::scene::Scene;
+use wgray::scene::{Scene, is_gltf};
 
 use self::frames::Frame;
 use self::plan::Plan;
@@ -28,7 +28,6 @@ use super::stats::Stats;
 use super::{Interrupted, Usage, plain, progress, signal};
 
 pub use args::Args;
-#[cfg(feature = "dev")]
 pub use args::parse_size;
 
 pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
@@ -39,10 +38,11 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
         pool.build_global().context("threads")?; // before anything else is done in parallel
     }
-    let frames = Frame::all(args.frames.as_ref());
+    let frames = args.frames();
     let outputs: Vec<Outputs> = (frames.iter().map(|frame| args.outputs(*frame))).collect::<anyhow::Result<_>>()?;
     let said = Said::new(args.quiet);
     let mut scene = read(&args, &said)?;
+    let fps = args.fps(&scene)?;
     check(&args, &scene, frames.iter().zip(&outputs))?;
     info!(seconds = start.elapsed().as_secs_f64(), "scene read");
     let (mut stop, mut start, mut skipped) = (None, start, 0);
@@ -50,6 +50,16 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
         if args.skip_existing && outputs.are_there() {
             skipped += 1;
             continue;
+        }
+        if let Some((number, fps)) = frame.number.zip(fps) {
+            let mut overrides = args.overrides();
+            overrides.gltf.time = Some(f64::from(number) / fps);
+            let moment = super::load(&args.scene, &overrides)?;
+            let before = std::mem::replace(&mut scene, moment);
+            if args.options.is_framed(&scene) {
+                // Of the file at rest: it stands still, and a frame by itself is the same as in a run.
+                (scene.camera, scene.camera_path) = (before.camera, before.camera_path);
+            }
         }
         if let Some(number) = frame.number {
             scene.camera = scene.camera_at(number.into()).map_err(|error| plain(error.into()))?;
@@ -74,8 +84,12 @@ fn read(args: &Args, said: &Said) -> anyhow::Result<Scene> {
     let scene = progress::named(args.shown_progress(), "reading the scene", || {
         super::load(path, &overrides)
     })?;
-    let still = "it has no camera.path: all frames are the same";
-    let still = (args.frames.is_some() && scene.camera_path.is_none()).then_some(still);
+    let still = match is_gltf(path) {
+        true => "it has no animation: all frames are the same",
+        false => "it has no camera.path: all frames are the same",
+    };
+    let moves = scene.camera_path.is_some() || args.fps(&scene)?.is_some();
+    let still = (args.frames.is_some() && !moves).then_some(still);
     for note in scene.notes.iter().map(String::as_str).chain(still) {
         said.once(&format!("warning: {}: {note}", path.display()));
     }

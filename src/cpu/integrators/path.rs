@@ -31,9 +31,10 @@ use crate::cpu::sequence::sobol_bits;
 use crate::cpu::surface::{Surface, largest};
 use crate::cpu::texture::appearance;
 use crate::cpu::thin::thin_reflectance;
+use crate::cpu::vertices::with_vertex_colors;
 use crate::pack::{
-    DIFFUSE, EMITTER, FAR, GLASS, IMAGE_AROUND, INSTANCE, METAL, MOST_PASSED, Material, NOTHING, NOWHERE, OPAQUE,
-    PHONG, PRINCIPLED, Packed, RANDOM, ROUGH_GLASS, THIN, UNSEEN_AROUND,
+    BACKGROUND, DIFFUSE, EMITTER, FAR, GLASS, IMAGE_AROUND, INSTANCE, METAL, MOST_PASSED, Material, NOTHING, NOWHERE,
+    OPAQUE, PHONG, PRINCIPLED, Packed, RANDOM, ROUGH_GLASS, THIN, UNSEEN_AROUND,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,6 +104,10 @@ pub fn advance(scene: &Packed, before: PathState, pixel: UVec2) -> PathState {
         } else {
             scene.environment.radiance
         };
+        let arriving = match s.surroundings & BACKGROUND != 0 && path.depth == 0 {
+            true => scene.environment.background,
+            false => arriving,
+        };
         let found = path.throughput * arriving;
         return with_radiance(scene, state, found, shown, path.depth);
     }
@@ -111,11 +116,14 @@ pub fn advance(scene: &Packed, before: PathState, pixel: UVec2) -> PathState {
     let at = arrival_of(scene, &spot, hit, surface, path.ray, path.differential);
     let looked;
     let faceted;
-    let (mut material, normal, coat_normal) = if s.lookups == 0 {
+    let (mut material, normal, coat_normal) = if (s.lookups == 0) & (s.vertex_colors == 0) {
         let normal = surface.shading_normal;
         (material_of(scene, &spot), normal, normal)
     } else {
-        let look = appearance(scene, &spot, hit, material_of(scene, &spot), surface, at, s.lookups);
+        let mut look = appearance(scene, &spot, hit, material_of(scene, &spot), surface, at, s.lookups);
+        if s.vertex_colors != 0 {
+            look.material = with_vertex_colors(scene, &look.material, hit);
+        }
         looked = bounded(look.material);
         (&looked, look.normal, look.coat_normal)
     };

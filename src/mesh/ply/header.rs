@@ -46,6 +46,19 @@ impl Scalar {
         }
     }
 
+    /// The largest number of a type of whole numbers.
+    pub fn largest(self) -> Option<f64> {
+        Some(match self {
+            Scalar::I8 => i8::MAX.into(),
+            Scalar::U8 => u8::MAX.into(),
+            Scalar::I16 => i16::MAX.into(),
+            Scalar::U16 => u16::MAX.into(),
+            Scalar::I32 => i32::MAX.into(),
+            Scalar::U32 => u32::MAX.into(),
+            Scalar::F32 | Scalar::F64 => return None,
+        })
+    }
+
     pub fn is_whole(self) -> bool {
         !matches!(self, Scalar::F32 | Scalar::F64)
     }

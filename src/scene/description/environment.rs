@@ -27,6 +27,9 @@ pub struct EnvironmentDescription {
     /// Whether the camera sees it.
     #[serde(default = "yes")]
     pub visible: bool,
+    /// The radiance that the camera sees in its place; linear RGB.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub background: Option<DVec3>,
     /// How high the sun of `"sky"` stands, in degrees.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sun_elevation: Option<f64>,
@@ -71,6 +74,7 @@ impl EnvironmentDescription {
             scale: 1.0,
             rotate: None,
             visible: true,
+            background: None,
             sun_elevation: None,
             sun_azimuth: None,
             turbidity: None,
@@ -86,6 +90,19 @@ pub enum EnvironmentName {
     Studio,
     /// A clear sky with a sun.
     Sky,
+}
+
+impl EnvironmentName {
+    /// All of them.
+    pub const ALL: [EnvironmentName; 2] = [EnvironmentName::Studio, EnvironmentName::Sky];
+
+    /// The name in files and options.
+    pub const fn name(self) -> &'static str {
+        match self {
+            EnvironmentName::Studio => "studio",
+            EnvironmentName::Sky => "sky",
+        }
+    }
 }
 
 /// How surroundings are turned, counter-clockwise as seen against an axis.

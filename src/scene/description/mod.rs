@@ -7,6 +7,7 @@
 mod camera;
 mod camera_path;
 mod environment;
+mod gltf;
 mod light;
 mod material;
 mod mesh;
@@ -26,6 +27,7 @@ use super::{Assets, ViewTransform};
 pub use self::camera::*;
 pub use self::camera_path::*;
 pub use self::environment::*;
+pub use self::gltf::*;
 pub use self::light::*;
 pub use self::material::*;
 pub use self::mesh::*;
@@ -144,6 +146,7 @@ impl Description {
         });
         let shapes = self.shapes.iter().filter_map(|shape| match shape {
             ShapeDescription::Mesh(mesh) => Some(&mesh.file),
+            ShapeDescription::Gltf(gltf) => Some(&gltf.file),
             _ => None,
         });
         let meshes = self.meshes.values().map(|mesh| &mesh.file);

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{ColorDescription, NormalMapDescription, ValueDescription};
+use super::{ColorDescription, NormalMapDescription, TextureReference, ValueDescription};
 
 /// glTF's metallic-roughness material with its extensions, for `integrator = "path"`; glTF's defaults.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -19,6 +19,8 @@ pub struct PrincipledDescription {
     pub anisotropy: ValueDescription,
     /// The tangent's angle, counter-clockwise in degrees.
     pub anisotropy_rotation: f64,
+    /// An image whose red and green, as numbers from -1 to 1, are the direction along u and v that is turned so.
+    pub anisotropy_direction: Option<TextureReference>,
     /// Index of refraction of the dielectric.
     pub ior: f64,
     /// Factor of what the dielectric reflects, 0 to 1.
@@ -49,6 +51,10 @@ pub struct PrincipledDescription {
     pub alpha_mode: AlphaMode,
     /// The least alpha of what is there, under [`AlphaMode::Mask`].
     pub alpha_cutoff: f64,
+    /// What the colours of a mesh's vertices are factors of.
+    pub vertex_colors: VertexColors,
+    /// Whether the camera sees its back.
+    pub double_sided: bool,
     /// What bends its normals.
     pub normal_map: Option<NormalMapDescription>,
     /// Radiance that it sends out; black if absent.
@@ -65,6 +71,7 @@ impl Default for PrincipledDescription {
             roughness: 1.0.into(),
             anisotropy: 0.0.into(),
             anisotropy_rotation: 0.0,
+            anisotropy_direction: None,
             ior: 1.5,
             specular: 1.0.into(),
             specular_color: ColorDescription::default(),
@@ -80,6 +87,8 @@ impl Default for PrincipledDescription {
             alpha: 1.0.into(),
             alpha_mode: AlphaMode::Opaque,
             alpha_cutoff: 0.5,
+            vertex_colors: VertexColors::None,
+            double_sided: true,
             normal_map: None,
             emission: None,
             visible: None,
@@ -98,4 +107,17 @@ pub enum AlphaMode {
     Mask,
     /// That share of the light meets it; the rest passes straight on.
     Blend,
+}
+
+/// What the colours of a mesh's vertices do. In a file the names are in snake case: `"base_color"`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VertexColors {
+    /// Nothing.
+    #[default]
+    None,
+    /// They are factors of the base colour and of alpha.
+    BaseColor,
+    /// They are factors of the emission and of alpha.
+    Emission,
 }

@@ -4,6 +4,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
+use super::gltf::GltfDescription;
 use super::mesh::MeshDescription;
 use super::tagged::{ReadError, Tagged, tagged};
 
@@ -26,6 +27,8 @@ tagged! {
         "plane" => Plane(PlaneDescription),
         /// A mesh of triangles, from a file.
         "mesh" => Mesh(MeshDescription),
+        /// A glTF file: meshes, materials and lights.
+        "gltf" => Gltf(GltfDescription),
     }
 }
 

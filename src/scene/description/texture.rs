@@ -3,7 +3,7 @@
 use std::fmt;
 
 use glam::DVec3;
-use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer, StrDeserializer};
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use toml::Table;
@@ -276,7 +276,7 @@ pub struct ImageTextureDescription {
     pub encoding: Option<Encoding>,
     /// Beyond the edges.
     #[serde(default)]
-    pub wrap: Wrap,
+    pub wrap: WrapDescription,
     /// How its colours are found.
     #[serde(default)]
     pub filter: TextureFilter,
@@ -292,6 +292,12 @@ pub struct ImageTextureDescription {
     /// Added to u and v.
     #[serde(default)]
     pub offset: [f64; 2],
+    /// Factors of red, green, blue and alpha.
+    #[serde(default = "four_ones")]
+    pub factor: [f64; 4],
+    /// Which set of a mesh's texture coordinates it lies by.
+    #[serde(default)]
+    pub uv_set: u32,
 }
 
 impl ImageTextureDescription {
@@ -300,13 +306,72 @@ impl ImageTextureDescription {
         Self {
             file: file.into(),
             encoding: None,
-            wrap: Wrap::default(),
+            wrap: WrapDescription::default(),
             filter: TextureFilter::default(),
             max_anisotropy: sixteen(),
             scale: ones(),
             rotate: 0.0,
             offset: [0.0; 2],
+            factor: four_ones(),
+            uv_set: 0,
         }
+    }
+}
+
+/// An image beyond its edges: `"repeat"`, or `["repeat", "clamp"]` along u and along v.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(untagged)]
+pub enum WrapDescription {
+    /// In both directions.
+    Both(Wrap),
+    /// Along u, and along v.
+    Each([Wrap; 2]),
+}
+
+impl Default for WrapDescription {
+    fn default() -> Self {
+        Self::Both(Wrap::default())
+    }
+}
+
+impl From<[Wrap; 2]> for WrapDescription {
+    fn from([u, v]: [Wrap; 2]) -> Self {
+        if u == v { Self::Both(u) } else { Self::Each([u, v]) }
+    }
+}
+
+impl WrapDescription {
+    /// Along u, and along v.
+    pub fn each(self) -> [Wrap; 2] {
+        match self {
+            Self::Both(wrap) => [wrap; 2],
+            Self::Each(each) => each,
+        }
+    }
+}
+
+// By hand, as that of colours.
+impl<'de> Deserialize<'de> for WrapDescription {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct WrapVisitor;
+
+        impl<'de> Visitor<'de> for WrapVisitor {
+            type Value = WrapDescription;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a name, or a list of 2 names")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<Self::Value, E> {
+                Wrap::deserialize(StrDeserializer::new(name)).map(WrapDescription::Both)
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
+                <[Wrap; 2]>::deserialize(SeqAccessDeserializer::new(seq)).map(WrapDescription::Each)
+            }
+        }
+
+        deserializer.deserialize_any(WrapVisitor)
     }
 }
 
@@ -320,4 +385,8 @@ fn sixteen() -> f64 {
 
 fn ones() -> [f64; 2] {
     [1.0, 1.0]
+}
+
+fn four_ones() -> [f64; 4] {
+    [1.0; 4]
 }

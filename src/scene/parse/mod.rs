@@ -25,7 +25,7 @@ use super::description::{
     MaterialDescription, MeshFileDescription, ShapeDescription, TextureDescription,
 };
 use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
-use super::validate::{BLADES, DEEPEST, MOST, depths};
+use super::validate::{BLADES, DEEPEST, MOST, UV_SETS, depths};
 
 pub(super) use syntax::{NOT_UTF8, syntax_error};
 
@@ -44,6 +44,14 @@ impl Description {
     #[cfg(feature = "dev")]
     pub(crate) fn parse_defined(text: &str, origin: &str, values: &[Define]) -> Result<Self, SceneError> {
         Description::parse_with(text, origin, &mut Defines::new(values))
+    }
+
+    /// The same scene with other values in place of some of its own.
+    pub(super) fn defined(&self, defines: &mut Defines) -> Result<Description, Problem> {
+        let mut file = Table::try_from(self).map_err(|error| Problem::new(error.to_string()))?;
+        let put = defines.put(&[], &mut file, |_| false);
+        put.and_then(|()| read_file(file))
+            .map_err(|problem| problem.at("define"))
     }
 
     /// [`Description::parse`], with other values in place of some of the text's.
@@ -368,12 +376,19 @@ fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) -> Result<T, 
     }
 }
 
+/// So many keys of a table are told: all that any has.
+const MOST_KEYS: usize = 64;
+
 /// `"a", "b", "c"`, the first of them where there are many.
 pub(super) fn list<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
-    const MOST: usize = 24;
+    listed(names, 24)
+}
+
+/// The same, of so many at most.
+fn listed<S: AsRef<str>>(names: impl IntoIterator<Item = S>, most: usize) -> String {
     let mut text = String::new();
     let mut names = names.into_iter();
-    for name in names.by_ref().take(MOST) {
+    for name in names.by_ref().take(most) {
         let comma = if text.is_empty() { "" } else { ", " };
         // Writing to a String cannot fail.
         let _ = write!(text, "{comma}{:?}", cut(name.as_ref()));
@@ -440,7 +455,10 @@ fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator)
         // The first name is the key's, which is on the path already.
         let names = quoted(message).into_iter().skip(1);
         let tag = (tagged && path.len() == 1).then(|| "type".to_owned());
-        format!("unknown key; the keys here are {}", list(tag.into_iter().chain(names)))
+        format!(
+            "unknown key; the keys here are {}",
+            listed(tag.into_iter().chain(names), MOST_KEYS)
+        )
     } else if message.starts_with("missing field") {
         path.extend(quoted(message).into_iter().map(Segment::Key));
         "is missing".to_owned()
@@ -452,7 +470,13 @@ fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator)
             "a sequence of 3 f64 values" => "a list of 3 numbers",
             "an array of length 2" => "a list of 2 numbers",
             "an array of length 3" => "a list of 3 points",
-            "an array of length 4" if path.contains(&Segment::from("matrix")) => "a list of 4 numbers",
+            "an array of length 4"
+                if ["matrix", "factor"]
+                    .iter()
+                    .any(|key| path.contains(&Segment::from(*key))) =>
+            {
+                "a list of 4 numbers"
+            }
             "an array of length 4" => "a list of 4 points",
             "fewer elements in array" => "a shorter list",
             "a map" => "a table",
@@ -490,6 +514,7 @@ fn whole(key: Option<&Segment>, integrator: Integrator) -> String {
     }
     let (low, high) = match key {
         Some(Segment::Key(key)) if key == "seed" => (0, u32::MAX),
+        Some(Segment::Key(key)) if key == "uv_set" => (0, UV_SETS - 1),
         Some(Segment::Key(key)) if key == "max_depth" => depths(integrator),
         Some(Segment::Key(key)) if key == "rr_depth" => (0, DEEPEST),
         _ => (1, MOST),

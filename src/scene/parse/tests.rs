@@ -119,6 +119,16 @@ fn bad_text_is_told_with_its_line() {
             "materials.a.alpha_mode: true must be one of \"opaque\", \"mask\", \"blend\"",
         ),
         (
+            "[materials.a]\ntype = 'principled'\nvertex_colors = 'all'",
+            3,
+            "materials.a.vertex_colors: \"all\" must be one of \"none\", \"base_color\", \"emission\"",
+        ),
+        (
+            "[materials.a]\ntype = 'principled'\ndouble_sided = 1",
+            3,
+            "materials.a.double_sided: 1 must be true or false",
+        ),
+        (
             "[materials.a]\ntype = 'principled'\nalpha = { texture = 't', channel = 4 }",
             3,
             "materials.a.alpha.channel: 4 must be one of \"r\", \"g\", \"b\", \"a\"",
@@ -190,7 +200,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[[shapes]]\n[[shapes]]",
             1,
-            "shapes[0].type: is missing; it is one of \"rectangle\", \"disk\", \"ellipsoid\", \"sphere\", \"triangle\", \"tetrahedron\", \"plane\", \"mesh\"",
+            "shapes[0].type: is missing; it is one of \"rectangle\", \"disk\", \"ellipsoid\", \"sphere\", \"triangle\", \"tetrahedron\", \"plane\", \"mesh\", \"gltf\"",
         ),
         (
             "[[lights]]\ntype = 'directional'\ndirection = [0, 0, 1]\ncolor = [1, 1, 1]\n[[lights]]\ntype = 'point'\nvertex = 3",

@@ -10,13 +10,14 @@ use super::super::texture::{levels, words, words_around};
 use super::super::{
     Assets, Channel, ChannelReference, ColorDescription, ConductorDescription, Encoding, Facets, Image,
     ImageTextureDescription, Integrator, Material, MaterialDescription, MetalIndex, NormalMap, NormalMapDescription,
-    PhongDescription, Reflection, Texels, Texture, TextureDescription, TextureKind, Value, ValueDescription,
+    PhongDescription, Reflection, Texels, Texture, TextureDescription, TextureKind, TextureReference, Value,
+    ValueDescription,
 };
 use super::path::needs_path;
 use super::{At, BTreeMap, Checked, Color, Problem, between, check, color, list, number, show_pair};
 
 /// What all texels together may take, in bytes, as they are rendered from.
-const TEXEL_MEMORY: u64 = 1 << 30;
+pub(in crate::scene) const TEXEL_MEMORY: u64 = 1 << 30;
 /// The exponents of highlights.
 pub(super) const SHININESS: (f64, f64) = (1e-6, 1e6);
 /// Largest index of refraction.
@@ -27,6 +28,10 @@ const LONGEST_FOOTPRINT: f64 = 64.0;
 pub(super) const DARKEST: f64 = 1e6;
 /// The largest factor of, and addend to, a texture coordinate.
 const FARTHEST_COORDINATE: f64 = 1e6;
+/// The largest factor of an image's values.
+const LARGEST_FACTOR: f64 = 1e6;
+/// How many sets of texture coordinates a mesh may have.
+pub(in super::super) const UV_SETS: u32 = 8;
 
 pub(super) fn textures(
     descriptions: &BTreeMap<String, TextureDescription>,
@@ -139,6 +144,7 @@ pub(super) fn texture(description: &TextureDescription, images: &mut Images) -> 
         TextureDescription::Constant(constant) => Texture {
             kind: TextureKind::Constant(color(constant.color).at("color")?),
             transform: [DVec3::X, DVec3::Y],
+            uv_set: 0,
         },
         TextureDescription::Checker(checker) => Texture {
             kind: TextureKind::Checker {
@@ -146,6 +152,7 @@ pub(super) fn texture(description: &TextureDescription, images: &mut Images) -> 
                 odd: color(checker.odd).at("odd")?,
             },
             transform: transform(checker.scale, checker.rotate, checker.offset)?,
+            uv_set: 0,
         },
         TextureDescription::Lines(grid) => {
             let line_width = grid.line_width;
@@ -160,6 +167,7 @@ pub(super) fn texture(description: &TextureDescription, images: &mut Images) -> 
                     line_width,
                 },
                 transform: transform(grid.scale, grid.rotate, grid.offset)?,
+                uv_set: 0,
             }
         }
         TextureDescription::Image(texture) => image_texture(texture, Part::Colors(texture.encoding), images)?,
@@ -170,15 +178,27 @@ pub(super) fn texture(description: &TextureDescription, images: &mut Images) -> 
 fn image_texture(texture: &ImageTextureDescription, part: Part, images: &mut Images) -> Checked<Texture> {
     let max_anisotropy = between(texture.max_anisotropy, 1.0, LONGEST_FOOTPRINT).at("max_anisotropy")?;
     let transform = transform(texture.scale, texture.rotate, texture.offset)?;
+    for x in texture.factor {
+        between(x, 0.0, LARGEST_FACTOR).at("factor")?;
+    }
+    check(texture.uv_set < UV_SETS, || {
+        format!("{} must be from 0 to {}", texture.uv_set, UV_SETS - 1)
+    })
+    .at("uv_set")?;
     let image = images.image(texture, part).map_err(Problem::new).at("file")?;
     Ok(Texture {
         kind: TextureKind::Image {
             image,
-            wrap: texture.wrap,
+            wrap: texture.wrap.each(),
             filter: texture.filter,
             max_anisotropy,
+            factor: match part {
+                Part::Colors(_) => DVec3::from_slice(&texture.factor),
+                Part::Alpha => DVec3::splat(texture.factor[3]),
+            },
         },
         transform,
+        uv_set: texture.uv_set,
     })
 }
 
@@ -248,6 +268,10 @@ pub(super) fn alphas<'a>(
 
 impl Textures<'_> {
     fn find(&self, name: &str) -> Checked<usize> {
+        self.find_name(name).at("texture")
+    }
+
+    fn find_name(&self, name: &str) -> Checked<usize> {
         let unknown = || {
             Problem::new(match self.names.is_empty() {
                 true => format!("{name:?} is no texture; the file has none"),
@@ -255,7 +279,7 @@ impl Textures<'_> {
             })
         };
         // The names are sorted, as those of a map.
-        self.names.binary_search(&name).map_err(|_| unknown()).at("texture")
+        self.names.binary_search(&name).map_err(|_| unknown())
     }
 
     pub(super) fn color(&self, description: &ColorDescription) -> Checked<Color> {
@@ -272,7 +296,21 @@ impl Textures<'_> {
                 between(x, 0.0, 1.0)?;
             }
         }
-        self.color(description)
+        let color = self.color(description)?;
+        if let Color::Texture(texture) = color {
+            for x in self.factor_of(texture).to_array() {
+                bounded_factor(x)?;
+            }
+        }
+        Ok(color)
+    }
+
+    /// The factor of a texture's colours.
+    fn factor_of(&self, texture: usize) -> DVec3 {
+        match self.textures[texture].kind {
+            TextureKind::Image { factor, .. } => factor,
+            _ => DVec3::ONE,
+        }
     }
 
     pub(super) fn normal_map(&self, description: &Option<NormalMapDescription>) -> Checked<Option<NormalMap>> {
@@ -284,15 +322,37 @@ impl Textures<'_> {
             return Ok(None);
         };
         let texture = self.find(name)?;
-        let TextureKind::Image { image, .. } = &self.textures[texture].kind else {
+        let TextureKind::Image { image, factor, .. } = &self.textures[texture].kind else {
             return Err(Problem::new(format!("{name:?} must be a texture of type \"image\"")).at("texture"));
         };
         check(!matches!(image.texels, Texels::Bytes(Encoding::Srgb, _)), || {
             format!("{name:?} must have encoding = \"linear\" to be a normal map")
         })
         .at("texture")?;
-        let strength = between(*strength, 0.0, 100.0).at("strength")?;
+        check(*factor == DVec3::ONE, || {
+            format!("{name:?} must have no factor to be a normal map; its strength is the map's own")
+        })
+        .at("texture")?;
+        let strength = between(*strength, -100.0, 100.0).at("strength")?;
         Ok(Some(NormalMap { texture, strength }))
+    }
+
+    /// An image of directions.
+    pub(super) fn direction(&self, description: &Option<TextureReference>) -> Checked<Option<usize>> {
+        let Some(TextureReference { texture: name }) = description else {
+            return Ok(None);
+        };
+        let texture = self.find_name(name)?;
+        let TextureKind::Image { image, factor, .. } = &self.textures[texture].kind else {
+            return Err(Problem::new(format!("{name:?} must be a texture of type \"image\"")));
+        };
+        check(!matches!(image.texels, Texels::Bytes(Encoding::Srgb, _)), || {
+            format!("{name:?} must have encoding = \"linear\" to give directions")
+        })?;
+        check(factor.x == 1.0 && factor.y == 1.0, || {
+            format!("{name:?} must have no factor of red and green to give directions")
+        })?;
+        Ok(Some(texture))
     }
 
     pub(super) fn value(&self, description: &ValueDescription) -> Checked<Value> {
@@ -304,6 +364,12 @@ impl Textures<'_> {
                     (Channel::A, Some(alpha)) => alpha.clone().map_err(Problem::new).at("channel")?,
                     _ => found,
                 };
+                let factor = self.factor_of(texture);
+                bounded_factor(match reference.channel {
+                    Channel::R | Channel::A => factor.x,
+                    Channel::G => factor.y,
+                    Channel::B => factor.z,
+                })?;
                 Value::Texture(texture, reference.channel)
             }
         })
@@ -425,6 +491,16 @@ impl Textures<'_> {
         let factor = own.as_ref().or(phong.color.as_ref()).ok_or_else(missing);
         factor.and_then(|factor| self.color(factor)).at(key)
     }
+}
+
+/// Checks a texture's factor where the product must be from 0 to 1.
+fn bounded_factor(factor: f64) -> Checked<()> {
+    check(factor <= 1.0, || {
+        format!(
+            "its texture's factor is {}, and must be from 0 to 1 here",
+            number(factor)
+        )
+    })
 }
 
 /// Whether the camera sees a material.

@@ -22,7 +22,7 @@ const TURBIDITIES: (f64, f64) = (1.0, 10.0);
 const ELEVATION: f64 = 40.0;
 const TURBIDITY: f64 = 2.0;
 
-/// The surroundings: under the path tracer the section's, or the background, if they shine.
+/// The surroundings: under the path tracer the section's, or the background, if they shine or are seen.
 pub(super) fn environment(description: &Description, images: &mut Images) -> Checked<Option<Environment>> {
     let integrator = description.render.integrator;
     let background = description.render.background;
@@ -39,7 +39,10 @@ pub(super) fn environment(description: &Description, images: &mut Images) -> Che
         }
     };
     let shines = environment.color != DVec3::ZERO || environment.image.as_ref().is_some_and(|image| image.scale > 0.0);
-    Ok(shines.then_some(environment))
+    let is_seen = environment
+        .background
+        .is_some_and(|background| background != DVec3::ZERO);
+    Ok((shines || is_seen).then_some(environment))
 }
 
 fn plain(color: DVec3) -> Environment {
@@ -47,6 +50,7 @@ fn plain(color: DVec3) -> Environment {
         color,
         image: None,
         visible: true,
+        background: None,
     }
 }
 
@@ -59,11 +63,19 @@ fn described(description: &EnvironmentDescription, images: &mut Images) -> Check
         }
         Some(EnvironmentRotation::Any(rotation)) => turn(rotation).at("rotate")?,
     };
+    let background = description.background.map(|background| {
+        check(description.visible, || {
+            "must not be there beside visible = false, where the camera sees black".to_owned()
+        })?;
+        color(background)
+    });
+    let background = background.transpose().at("background")?;
     let sky = sky_of(description)?;
     let with = |image: Arc<Image>| Environment {
         color: DVec3::ZERO,
         image: Some(EnvironmentImage { image, scale, to_world }),
         visible: description.visible,
+        background,
     };
     let own = |name: &str, image: Image, images: &mut Images| {
         let kept = images.own(name, &image).map_err(Problem::new).at("name");
@@ -74,6 +86,7 @@ fn described(description: &EnvironmentDescription, images: &mut Images) -> Check
             color: color(plain).at("color")? * scale,
             image: None,
             visible: description.visible,
+            background,
         }),
         (None, Some(file), None) => Ok(with(images.around(file).map_err(Problem::new).at("file")?)),
         (None, None, Some(EnvironmentName::Studio)) => own("studio", studio(), images),

@@ -9,8 +9,8 @@ use super::super::error::cut;
 use super::super::image_file::Place;
 use super::super::mesh_file;
 use super::super::{
-    Assets, Color, Geometry, InstanceDescription, Material, MeshDescription, MeshFileDescription, Reflection, Rotation,
-    Scale, Shape, ShapeDescription, Up, Value,
+    Assets, Geometry, InstanceDescription, Material, MeshDescription, MeshFileDescription, Reflection, Rotation, Scale,
+    Shape, ShapeDescription, Up,
 };
 use super::mtl::Looks;
 use super::{At, Checked, FARTHEST, FLATTEST, LENGTHS, Problem, between, check, list, number, point, show, unit};
@@ -142,6 +142,9 @@ pub(super) fn notes(
 }
 
 fn load(file: &str, normals: Option<Normals>, known: &mut Known) -> Checked<Arc<Mesh>> {
+    if let Some(mesh) = known.assets.meshes.get(file) {
+        return Ok(Arc::clone(mesh));
+    }
     let place = known.assets.find(file).map_err(Problem::new).at("file")?;
     let Place::File(path) = place else {
         return Err(Problem::new(format!("{file:?} is an image in memory, and no mesh"))).at("file");
@@ -154,7 +157,8 @@ fn load(file: &str, normals: Option<Normals>, known: &mut Known) -> Checked<Arc<
 }
 
 fn placed(mesh: Arc<Mesh>, up: Up, file: &str, placement: &Placement, known: &mut Known) -> Checked<Shape> {
-    let to_world = transform(placement)? * turned_up(up);
+    let map = self::placement(placement.translate, placement.rotate, placement.scale, placement.matrix)?;
+    let to_world = map * turned_up(up);
     let corners: Vec<DVec3> = mesh.corners().map(|corner| to_world.transform_point3(corner)).collect();
     let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
     let high = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -269,31 +273,13 @@ fn names(group: &Group) -> impl Iterator<Item = &str> {
     std::iter::once(group.name.as_str()).chain(group.material.as_deref())
 }
 
+/// Whether what a material looks like depends on texture coordinates.
 fn has_textures(material: &Material) -> bool {
-    let is_texture = |color: &Color| matches!(color, Color::Texture(_));
-    material.normal_map.is_some()
-        || is_texture(&material.emission)
-        || match &material.reflection {
-            Reflection::Phong {
-                ambient,
-                diffuse,
-                specular,
-                ..
-            } => [ambient, diffuse, specular].into_iter().any(is_texture),
-            Reflection::Mirror { tint } | Reflection::Glass { tint, .. } => is_texture(tint),
-            Reflection::Diffuse { color, roughness } => is_texture(color) || matches!(roughness, Value::Texture(..)),
-            Reflection::Conductor { color, facets, .. } | Reflection::Dielectric { color, facets, .. } => {
-                is_texture(color) || matches!(facets.roughness, Value::Texture(..)) || facets.anisotropy > 0.0
-            }
-            Reflection::Principled(principled) => {
-                principled.clearcoat_normal_map.is_some()
-                    || principled.colors().into_iter().any(is_texture)
-                    || principled
-                        .values()
-                        .iter()
-                        .any(|value| matches!(value, Value::Texture(..)))
-            }
-        }
+    let is_streaked = match &material.reflection {
+        Reflection::Conductor { facets, .. } | Reflection::Dielectric { facets, .. } => facets.anisotropy > 0.0,
+        _ => false,
+    };
+    is_streaked || !material.textures().is_empty()
 }
 
 fn turned_up(up: Up) -> DAffine3 {
@@ -304,14 +290,13 @@ fn turned_up(up: Up) -> DAffine3 {
     })
 }
 
-fn transform(placement: &Placement) -> Checked<DAffine3> {
-    let Placement {
-        translate,
-        rotate,
-        scale,
-        matrix,
-        ..
-    } = placement;
+/// What keys of a placement say.
+pub(in crate::scene) fn placement(
+    translate: Option<DVec3>,
+    rotate: Option<Rotation>,
+    scale: Option<Scale>,
+    matrix: Option<&Vec<[f64; 4]>>,
+) -> Checked<DAffine3> {
     if let Some(matrix) = matrix {
         let others = translate.is_some() || rotate.is_some() || scale.is_some();
         check(!others, || {
@@ -322,12 +307,12 @@ fn transform(placement: &Placement) -> Checked<DAffine3> {
     }
     let scale = match scale {
         None => DVec3::ONE,
-        Some(Scale::All(s)) => factors(DVec3::splat(*s)).at("scale")?,
-        Some(Scale::Each(s)) => factors(*s).at("scale")?,
+        Some(Scale::All(s)) => factors(DVec3::splat(s)).at("scale")?,
+        Some(Scale::Each(s)) => factors(s).at("scale")?,
     };
     let rotation = match rotate {
         None => DMat3::IDENTITY,
-        Some(rotation) => turn(rotation).at("rotate")?,
+        Some(rotation) => turn(&rotation).at("rotate")?,
     };
     let translate = translate.map_or(Ok(DVec3::ZERO), point).at("translate")?;
     Ok(DAffine3::from_mat3_translation(

@@ -20,6 +20,7 @@ use self::appearance::{Images, Textures};
 use self::mesh::Known;
 use self::mtl::Looks;
 use super::error::{At, Problem, cut};
+use super::gltf::Expanded;
 use super::parse::list;
 use super::{
     Adaptive, AdaptiveDescription, Assets, Color, Description, EllipsoidDescription, Environment, Geometry,
@@ -28,7 +29,10 @@ use super::{
     ShapeDescription, Texture, ViewSettings,
 };
 
+pub(super) use self::appearance::TEXEL_MEMORY;
+pub(super) use self::appearance::UV_SETS;
 pub(super) use self::camera::BLADES;
+pub(super) use self::mesh::placement;
 pub(super) use self::path::LIGHT_SAMPLES;
 
 /// Largest absolute coordinate.
@@ -73,6 +77,23 @@ impl Description {
     /// [`Description::validate_with`]. What files the scene is made of is told even if it breaks a rule.
     pub(super) fn validate_and_list(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problem> {
         files.extend(self.files_beside(assets));
+        let has_gltf = self
+            .shapes
+            .iter()
+            .any(|shape| matches!(shape, ShapeDescription::Gltf(_)));
+        if !has_gltf {
+            return self.validate_plain(assets, files);
+        }
+        let expanded = Expanded::of(self, assets, files)?;
+        let scene = expanded.description.validate_plain(&expanded.assets, files);
+        let mut scene = scene.map_err(|problem| expanded.place(self, problem))?;
+        scene.notes.splice(0..0, expanded.notes);
+        scene.imported = expanded.imported;
+        Ok(scene)
+    }
+
+    /// The same of what names no glTF files.
+    fn validate_plain(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problem> {
         // A map is sorted: a material's index is its place among the names.
         let names = self.materials.keys().map(String::as_str);
         let indices: BTreeMap<_, _> = names.zip(0..).collect();
@@ -136,6 +157,7 @@ impl Description {
             instances: self.instances.len(),
             files,
             notes,
+            imported: Vec::new(),
         })
     }
 }
@@ -334,6 +356,7 @@ fn shape(description: &ShapeDescription, known: &mut Known) -> Checked<Shape> {
         ShapeDescription::Triangle(shape) => (triangle(shape.vertices).at("vertices")?, &shape.material),
         ShapeDescription::Tetrahedron(shape) => (tetrahedron(shape.vertices).at("vertices")?, &shape.material),
         ShapeDescription::Mesh(shape) => return mesh::mesh(shape, known),
+        ShapeDescription::Gltf(_) => return Err(Problem::new("is expanded before it is checked")),
         ShapeDescription::Plane(shape) => {
             let point = point(shape.point).at("point")?;
             let (tangent, bitangent) = frame(shape.normal, shape.tangent)?;
@@ -351,6 +374,13 @@ fn shape(description: &ShapeDescription, known: &mut Known) -> Checked<Shape> {
         has_tangents || known.looks.materials[material].normal_map.is_none(),
         || format!("{name:?} must have no normal map here, as the sides of this shape have no tangents"),
     )
+    .at("material")?;
+    let textures = known.looks.materials[material].textures();
+    let sets = textures.iter().map(|i| known.looks.textures[*i].uv_set);
+    let set = sets.max().unwrap_or(0);
+    check(set == 0, || {
+        format!("{name:?} must have no texture with uv_set = {set} here, as this shape has the set 0 alone")
+    })
     .at("material")?;
     if let Geometry::Plane { .. } = geometry {
         let emission = &known.looks.materials[material].emission;
@@ -456,7 +486,7 @@ pub(super) fn point(p: DVec3) -> Checked<DVec3> {
     Ok(p)
 }
 
-fn color(c: DVec3) -> Checked<DVec3> {
+pub(super) fn color(c: DVec3) -> Checked<DVec3> {
     for x in c.to_array() {
         check((0.0..=BRIGHTEST).contains(&x), || {
             let (x, limit) = (number(x), number(BRIGHTEST));

@@ -28,6 +28,10 @@ impl Textures<'_> {
             anisotropy_rotation: between(d.anisotropy_rotation, -360.0, 360.0)
                 .at("anisotropy_rotation")?
                 .to_radians(),
+            anisotropy_direction: self
+                .direction(&d.anisotropy_direction)
+                .at("texture")
+                .at("anisotropy_direction")?,
             ior: between(d.ior, IORS.0, IORS.1).at("ior")?,
             specular: self.value(&d.specular).at("specular")?,
             specular_color: self.color(&d.specular_color).at("specular_color")?,
@@ -42,6 +46,8 @@ impl Textures<'_> {
             alpha: self.value(&d.alpha).at("alpha")?,
             alpha_mode: d.alpha_mode,
             alpha_cutoff: between(d.alpha_cutoff, 0.0, 1.0).at("alpha_cutoff")?,
+            vertex_colors: d.vertex_colors,
+            double_sided: d.double_sided,
         })
     }
 }

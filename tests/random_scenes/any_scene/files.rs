@@ -20,6 +20,7 @@ pub const MESHES: &[(&str, bool, bool)] = &[
     ("ball.obj", true, true),
     ("cube.obj", true, false),
     ("rock.obj", true, true),
+    ("painted.ply", true, true),
 ];
 
 /// The folder that random scenes and their meshes are in.
@@ -32,13 +33,16 @@ pub fn folder() -> &'static Path {
             let form = match *name {
                 "soup.obj" => Form::soup(60, &random),
                 "slivers.obj" => Form::slivers(40, &random),
-                "ball.obj" => Form::icosphere(1),
+                "ball.obj" | "painted.ply" => Form::icosphere(1),
                 "cube.obj" => Form::cube(),
                 _ => bumpy(&random),
             };
             let uvs: Vec<[f64; 2]> = form.points.iter().map(|p| [p.x * 0.7 + p.z, p.y - 0.3 * p.x]).collect();
             let normals: Vec<DVec3> = form.points.iter().map(|p| p.normalize()).collect();
-            let text = form.obj(has_normals.then_some(&normals), has_uvs.then_some(&uvs));
+            let text = match *name {
+                "painted.ply" => painted(&form, &normals, &uvs, &random),
+                _ => form.obj(has_normals.then_some(&normals), has_uvs.then_some(&uvs)),
+            };
             // Whoever reads it sees one whole file.
             let draft = folder.join(format!("{name}.{}", std::process::id()));
             fs::write(&draft, text).expect("a place for a mesh");
@@ -52,6 +56,31 @@ pub fn folder() -> &'static Path {
         }
         folder
     })
+}
+
+/// A PLY file whose vertices have colours, some of them without any of one part, or beyond 1.
+fn painted(form: &Form, normals: &[DVec3], uvs: &[[f64; 2]], random: &Random) -> String {
+    let names = [
+        "x", "y", "z", "nx", "ny", "nz", "u", "v", "red", "green", "blue", "alpha",
+    ];
+    let properties: String = names.iter().map(|name| format!("property float {name}\n")).collect();
+    let (vertices, faces) = (form.points.len(), form.triangles.len());
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {vertices}\n{properties}element face {faces}\n\
+         property list uchar int vertex_indices\nend_header\n"
+    );
+    for ((p, n), [u, v]) in form.points.iter().zip(normals).zip(uvs) {
+        let [r, g, b] = [0, 1, 2].map(|_| random.pick(&[0.0, 0.3, 1.0, 2.5]));
+        let a = random.pick(&[0.0, 0.5, 0.9, 1.0]);
+        text += &format!(
+            "{} {} {} {} {} {} {u} {v} {r} {g} {b} {a}\n",
+            p.x, p.y, p.z, n.x, n.y, n.z
+        );
+    }
+    for [a, b, c] in &form.triangles {
+        text += &format!("3 {a} {b} {c}\n");
+    }
+    text
 }
 
 /// A sphere with dents and horns.

@@ -122,8 +122,12 @@ pub fn principled() -> impl Strategy<Value = MaterialDescription> {
         select(&[AlphaMode::Opaque, AlphaMode::Opaque, AlphaMode::Blend, AlphaMode::Mask][..]),
         share(),
     );
-    (paint(), shares, volume, alpha, -360.0..360.0).prop_map(
-        |(base, shares, (thickness, color, ior), (alpha_mode, alpha), anisotropy_rotation)| {
+    let vertices = (
+        select(&[VertexColors::None, VertexColors::BaseColor, VertexColors::Emission][..]),
+        prop::bool::weighted(0.8),
+    );
+    (paint(), shares, volume, alpha, (vertices, -360.0..360.0)).prop_map(
+        |(base, shares, (thickness, color, ior), (alpha_mode, alpha), (vertices, anisotropy_rotation))| {
             let mut shares = shares.into_iter();
             let mut next = || shares.next().unwrap();
             let mut m = PrincipledDescription::default();
@@ -136,6 +140,7 @@ pub fn principled() -> impl Strategy<Value = MaterialDescription> {
             (m.clearcoat, m.clearcoat_roughness, m.sheen_roughness) = (next(), next(), next());
             m.sheen_color = [0.0, 0.5, color.x].into();
             (m.alpha_mode, m.alpha) = (alpha_mode, alpha);
+            (m.vertex_colors, m.double_sided) = vertices;
             MaterialDescription::Principled(m)
         },
     )

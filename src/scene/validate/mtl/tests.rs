@@ -196,7 +196,7 @@ fn what_cannot_be_rendered_is_told_once() {
         ("map_Kd none.png", "\"red\": map_Kd: \"in/none.png\" cannot be read: "),
         (
             "map_Kd damaged.png",
-            "\"red\": map_Kd: \"in/damaged.png\" must be a PNG, JPEG, EXR or HDR file; Kd stands for it",
+            "\"red\": map_Kd: \"in/damaged.png\" must be a PNG, JPEG, WebP, EXR or HDR file; Kd stands for it",
         ),
         ("map_Kd ../../outside.png", "\"red\": map_Kd: \"in/../../outside.png\" "),
         (

@@ -113,7 +113,8 @@ fn a_scene_of_paths_is_what_its_file_says() {
         Some(Environment {
             color,
             image: None,
-            visible: true
+            visible: true,
+            background: None,
         })
     );
     assert_eq!(render.background, color);
@@ -304,7 +305,8 @@ fn the_background_is_the_surroundings() {
         Some(Environment {
             color,
             image: None,
-            visible: true
+            visible: true,
+            background: None,
         })
     );
     // A black one is none, and stands beside the section.

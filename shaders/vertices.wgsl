@@ -1,0 +1,79 @@
+// What vertices of meshes have beside positions, normals and their first texture coordinates: colours, and further sets of texture
+// coordinates.
+
+// The colour of what was hit, between those of its vertices; white where there are none.
+fn vertex_color(hit: Hit) -> vec4f {
+    if is_on_mesh(hit) {
+        let i = load_instance(hit.instance - 1u);
+        if i.colors != NOTHING {
+            let corners = meshes[i.triangles + hit.slot];
+            let c0 = bitcast<vec4f>(meshes[i.colors + corners.x]);
+            let c1 = bitcast<vec4f>(meshes[i.colors + corners.y]);
+            let c2 = bitcast<vec4f>(meshes[i.colors + corners.z]);
+            return color_between(c0, c1, c2, hit.barycentric);
+        }
+    }
+    return vec4f(1.0);
+}
+
+// A material with the colours of its vertices, as it asks for them.
+fn with_vertex_colors(before: Material, hit: Hit) -> Material {
+    var material = before;
+    if material.vertex_colors != NO_COLORS {
+        let color = vertex_color(hit);
+        let factor = color.xyz;
+        material.diffuse *= select(vec3f(1.0), factor, material.vertex_colors == COLORS_OF_BASE);
+        material.emission *= select(vec3f(1.0), factor, material.vertex_colors == COLORS_OF_EMISSION);
+        material.opacity *= color.w;
+    }
+    return material;
+}
+
+// Texture coordinates of a vertex in a further set, which the mesh has.
+fn load_further_uv(i: Instance, vertex: u32, uv_set: u32) -> vec2f {
+    let rows = (i.uv_sets + 1u) / 2u;
+    let row = bitcast<vec4f>(meshes[i.more_uvs + rows * vertex + (uv_set - 1u) / 2u]);
+    return select(row.zw, row.xy, (uv_set & 1u) == 1u);
+}
+
+// What was hit, with a set of texture coordinates in place of the first: 0 where the mesh has none such.
+fn spot_in_set(spot: Spot, hit: Hit, uv_set: u32) -> Spot {
+    var face = spot;
+    if is_on_mesh(hit) {
+        let i = load_instance(hit.instance - 1u);
+        face.uv_0 = vec2f(0.0);
+        face.uv_1 = vec2f(0.0);
+        face.uv_2 = vec2f(0.0);
+        if uv_set <= i.uv_sets {
+            let corners = meshes[i.triangles + hit.slot];
+            face.uv_0 = load_further_uv(i, corners.x, uv_set);
+            face.uv_1 = load_further_uv(i, corners.y, uv_set);
+            face.uv_2 = load_further_uv(i, corners.z, uv_set);
+        }
+    }
+    return face;
+}
+
+// Where a texture is looked up: in its own set of texture coordinates, where `first` is the place in the first one.
+fn uv_in_set(first: vec2f, spot: Spot, hit: Hit, uv_set: u32) -> vec2f {
+    if UV_SETS == 0u {
+        return first;
+    }
+    if uv_set == 0u {
+        return first;
+    }
+    return face_uv(spot_in_set(spot, hit, uv_set), hit.barycentric);
+}
+
+// The same of a footprint.
+fn footprint_in_set(first: Footprint, spot: Spot, hit: Hit, at: Arrival, uv_set: u32) -> Footprint {
+    if UV_SETS == 0u {
+        return first;
+    }
+    if uv_set == 0u {
+        return first;
+    }
+    let face = spot_in_set(spot, hit, uv_set);
+    let uv = face_uv(face, hit.barycentric);
+    return Footprint(uv, face_uv_derivative(face, at.x.position), face_uv_derivative(face, at.y.position));
+}

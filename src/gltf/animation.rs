@@ -1,0 +1,182 @@
+//! Animations: nodes at a time. Section 3.11 and appendix C.
+
+use ::gltf::json::animation::{Interpolation, Property};
+use ::gltf::json::validation::Checked;
+use glam::{DQuat, DVec3};
+
+use super::document::Document;
+use super::error::GltfError;
+use super::node::{Pose, quaternion};
+
+/// The most weights of morph targets that an animation gives to nodes.
+const MOST_WEIGHTS: usize = 1 << 24;
+
+impl Document {
+    /// Puts nodes where an animation has them at a time, in seconds. Before its first key and after its last it stands.
+    pub(super) fn animate(&self, poses: &mut [Pose], animation: usize, time: f64) -> Result<(), GltfError> {
+        let place = |channel: usize| format!("animations[{animation}].channels[{channel}]");
+        let animation = &self.json.animations[animation];
+        let mut weights = 0;
+        for (i, channel) in animation.channels.iter().enumerate() {
+            let node = channel.target.node.value();
+            let sampler = animation.samplers.get(channel.sampler.value());
+            let (Some(pose), Some(sampler)) = (poses.get_mut(node), sampler) else {
+                return Err(self.fault(place(i), "names a node or a sampler that is not there".to_owned()));
+            };
+            let times = self.vectors::<1>(sampler.input.value())?;
+            let times: Vec<f64> = times.iter().map(|[time]| f64::from(*time)).collect();
+            if times.is_empty() || !times.is_sorted() || !times.iter().all(|time| time.is_finite()) {
+                return Err(self.fault(place(i), "its times must be there, finite, and grow".to_owned()));
+            }
+            let Checked::Valid(interpolation) = sampler.interpolation else {
+                return Err(self.fault(place(i), "its interpolation is unknown".to_owned()));
+            };
+            let between = Between::of(&times, time, interpolation);
+            let fault = |got: usize| {
+                let wanted = between.values(times.len());
+                self.fault(place(i), format!("its output must have {wanted} values; it has {got}"))
+            };
+            match channel.target.path {
+                Checked::Valid(Property::Translation) => {
+                    let values = self.vectors::<3>(sampler.output.value())?;
+                    let value = between.value(&values, times.len()).ok_or_else(|| fault(values.len()))?;
+                    pose.take_apart();
+                    pose.translation = DVec3::from_array(value);
+                }
+                Checked::Valid(Property::Scale) => {
+                    let values = self.vectors::<3>(sampler.output.value())?;
+                    let value = between.value(&values, times.len()).ok_or_else(|| fault(values.len()))?;
+                    pose.take_apart();
+                    pose.scale = DVec3::from_array(value);
+                }
+                Checked::Valid(Property::Rotation) => {
+                    let values = self.vectors::<4>(sampler.output.value())?;
+                    let value = between
+                        .rotation(&values, times.len())
+                        .ok_or_else(|| fault(values.len()))?;
+                    pose.take_apart();
+                    pose.rotation = value;
+                }
+                Checked::Valid(Property::MorphTargetWeights) => {
+                    let values = self.vectors::<1>(sampler.output.value())?;
+                    let found = between.list(&values, times.len()).ok_or_else(|| fault(values.len()))?;
+                    weights += found.len();
+                    if weights > MOST_WEIGHTS {
+                        let rule = format!("all nodes together must have at most {MOST_WEIGHTS} weights");
+                        return Err(self.fault(place(i), rule));
+                    }
+                    pose.weights = Some(found);
+                }
+                Checked::Invalid => {} // a property of an extension
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Pose {
+    /// An animated node has no matrix; where a file breaks that rule the matrix is taken apart.
+    fn take_apart(&mut self) {
+        if let Some(matrix) = self.matrix.take() {
+            (self.scale, self.rotation, self.translation) = matrix.to_scale_rotation_translation();
+        }
+    }
+}
+
+/// A time between two keys.
+struct Between {
+    interpolation: Interpolation,
+    /// The key before it, and the one behind it.
+    keys: [usize; 2],
+    /// How far it is from the first to the second, 0 to 1.
+    share: f64,
+    /// The seconds between the two.
+    seconds: f64,
+}
+
+impl Between {
+    fn of(times: &[f64], time: f64, interpolation: Interpolation) -> Between {
+        let last = times.len() - 1;
+        let next = times.partition_point(|key| *key <= time);
+        let keys = match next {
+            0 => [0, 0],
+            next if next > last => [last, last],
+            next => [next - 1, next],
+        };
+        let seconds = times[keys[1]] - times[keys[0]];
+        let share = if seconds > 0.0 {
+            (time - times[keys[0]]) / seconds
+        } else {
+            0.0
+        };
+        Between {
+            interpolation,
+            keys,
+            share,
+            seconds,
+        }
+    }
+
+    /// How many values there are for so many keys.
+    fn values(&self, keys: usize) -> usize {
+        match self.interpolation {
+            Interpolation::CubicSpline => 3 * keys, // with tangents before and behind each
+            _ => keys,
+        }
+    }
+
+    /// A value of several numbers.
+    fn value<const N: usize>(&self, values: &[[f32; N]], keys: usize) -> Option<[f64; N]> {
+        if values.len() != self.values(keys) {
+            return None;
+        }
+        let mut found = [0.0; N];
+        for (k, found) in found.iter_mut().enumerate() {
+            *found = self.number(|i| f64::from(values[i][k]));
+        }
+        Some(found)
+    }
+
+    fn rotation(&self, values: &[[f32; 4]], keys: usize) -> Option<DQuat> {
+        if self.interpolation != Interpolation::Linear {
+            return self
+                .value(values, keys)
+                .map(|value| quaternion(value.map(|x| x as f32)));
+        }
+        if values.len() != keys {
+            return None;
+        }
+        let [a, b] = self.keys.map(|key| quaternion(values[key]));
+        Some(a.slerp(b, self.share)) // by the shorter way
+    }
+
+    /// A list of numbers at each key.
+    fn list(&self, values: &[[f32; 1]], keys: usize) -> Option<Vec<f32>> {
+        let each = self.values(keys);
+        let count = values.len() / each;
+        if count * each != values.len() {
+            return None;
+        }
+        let found = (0..count).map(|k| self.number(|i| f64::from(values[i * count + k][0])) as f32);
+        Some(found.collect())
+    }
+
+    /// Between the numbers at the keys; of a spline those are the second of three.
+    fn number(&self, at: impl Fn(usize) -> f64) -> f64 {
+        let ([a, b], t) = (self.keys, self.share);
+        match self.interpolation {
+            Interpolation::Step => at(a),
+            Interpolation::Linear if a == b => at(a),
+            Interpolation::Linear => at(a) * (1.0 - t) + at(b) * t,
+            Interpolation::CubicSpline => {
+                // Hermite's: appendix C.5 of the specification.
+                let (t2, t3) = (t * t, t * t * t);
+                let (before, behind) = (at(3 * a + 2) * self.seconds, at(3 * b) * self.seconds);
+                (2.0 * t3 - 3.0 * t2 + 1.0) * at(3 * a + 1)
+                    + (t3 - 2.0 * t2 + t) * before
+                    + (3.0 * t2 - 2.0 * t3) * at(3 * b + 1)
+                    + (t3 - t2) * behind
+            }
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! Buffers and views of them (specification, section 3.6): bytes of the container, of data URIs and of other files.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
+use gltf::json::Root;
+
+use super::error::Fault;
+use super::json::missing;
+use super::meshopt::{self, Compressed};
+use super::uri::{self, Folder};
+
+/// The most bytes of all buffers together, and of a file.
+pub(super) const MOST_BYTES: u64 = 8 << 30;
+/// The most bytes of all compressed views together, once they are decoded.
+const MOST_DECODED: u64 = 4 << 30;
+
+/// Where the bytes of a buffer are.
+enum Bytes {
+    /// Nobody asks for them.
+    Unused,
+    /// In the container.
+    Chunk(Range<usize>),
+    /// In memory, from a file or a data URI.
+    Read(Vec<u8>),
+}
+
+/// The bytes of all buffers that are used.
+pub(super) struct Buffers {
+    /// The container, or nothing.
+    file: Vec<u8>,
+    list: Vec<Bytes>,
+    /// For each view how it is compressed, if it is.
+    compressed: Vec<Option<Compressed>>,
+    /// What compressed views are, once somebody has asked.
+    decoded: Vec<OnceLock<Vec<u8>>>,
+}
+
+impl Buffers {
+    /// Reads what views refer to, and takes data URIs out of `root`. `file` is the container, `chunk` its binary part.
+    pub fn read(
+        root: &mut Root,
+        file: Vec<u8>,
+        chunk: Option<Range<usize>>,
+        folder: &Folder,
+        files: &mut BTreeSet<PathBuf>,
+    ) -> Result<Buffers, Fault> {
+        let mut used = vec![false; root.buffers.len()];
+        let mut compressed = Vec::with_capacity(root.buffer_views.len());
+        let mut decoded = 0u64;
+        for (i, view) in root.buffer_views.iter().enumerate() {
+            let how = match &view.extensions {
+                Some(all) => meshopt::compressed(&format!("bufferViews[{i}]"), &all.others, view.byte_length.0)?,
+                None => None,
+            };
+            // The buffer of a compressed view itself is for those who cannot decode it.
+            let buffer = how.map_or(view.buffer.value(), |how| how.buffer);
+            match used.get_mut(buffer) {
+                Some(used) => *used = true,
+                None => return Err(missing(format!("bufferViews[{i}]"), buffer, root.buffers.len())),
+            }
+            decoded = decoded.saturating_add(how.map_or(0, |how| how.size()));
+            if decoded > MOST_DECODED {
+                let rule = format!("all compressed views together must have at most {MOST_DECODED} bytes");
+                return Err(Fault::key(format!("bufferViews[{i}]"), rule));
+            }
+            compressed.push(how);
+        }
+        let mut total = 0;
+        let mut list = Vec::with_capacity(root.buffers.len());
+        for (i, buffer) in root.buffers.iter_mut().enumerate() {
+            if !used[i] {
+                list.push(Bytes::Unused);
+                continue;
+            }
+            let length = buffer.byte_length.0;
+            let key = || format!("buffers[{i}]");
+            let (bytes, has) = match (buffer.uri.take(), &chunk) {
+                (Some(data), _) if uri::is_data(&data) => {
+                    let bytes = uri::data(&data).map_err(|rule| Fault::key(format!("buffers[{i}].uri"), rule))?;
+                    let has = bytes.len();
+                    (Bytes::Read(bytes), has)
+                }
+                (Some(name), _) => {
+                    let fault = |rule| Fault::key(format!("buffers[{i}].uri"), rule);
+                    let path = folder.find(&name).map_err(fault)?;
+                    let left = MOST_BYTES.saturating_sub(total);
+                    let bytes =
+                        uri::read(&path, left).map_err(|error| fault(format!("{name:?} cannot be read: {error}")))?;
+                    files.insert(path);
+                    let has = bytes.len();
+                    buffer.uri = Some(name);
+                    (Bytes::Read(bytes), has)
+                }
+                (None, Some(chunk)) if i == 0 => (Bytes::Chunk(chunk.clone()), chunk.len()),
+                (None, _) => return Err(Fault::key(key(), "it must have a uri, as views refer to it")),
+            };
+            total = total.saturating_add(has as u64);
+            if total > MOST_BYTES {
+                let rule = format!("all buffers together must have at most {MOST_BYTES} bytes");
+                return Err(Fault::key(key(), rule));
+            }
+            if length > has as u64 {
+                let rule = format!("{length} bytes; its data has {has}");
+                return Err(Fault::key(format!("buffers[{i}].byteLength"), rule));
+            }
+            list.push(bytes);
+        }
+        Ok(Buffers {
+            file,
+            list,
+            compressed,
+            decoded: root.buffer_views.iter().map(|_| OnceLock::new()).collect(),
+        })
+    }
+
+    /// The bytes of a buffer, as many as it says that it has.
+    fn buffer(&self, root: &Root, index: usize) -> Result<&[u8], Fault> {
+        let key = || format!("buffers[{index}]");
+        let (Some(bytes), Some(buffer)) = (self.list.get(index), root.buffers.get(index)) else {
+            return Err(missing(key(), index, root.buffers.len()));
+        };
+        let bytes = match bytes {
+            Bytes::Chunk(range) => self.file.get(range.clone()),
+            Bytes::Read(bytes) => Some(bytes.as_slice()),
+            Bytes::Unused => None,
+        };
+        let length = usize::try_from(buffer.byte_length.0).ok();
+        bytes
+            .and_then(|bytes| bytes.get(..length?))
+            .ok_or_else(|| Fault::key(key(), "its data must be there"))
+    }
+
+    /// The bytes of a view.
+    pub fn view(&self, root: &Root, index: usize) -> Result<&[u8], Fault> {
+        let view =
+            (root.buffer_views.get(index)).ok_or_else(|| missing("bufferViews", index, root.buffer_views.len()))?;
+        if let (Some(Some(how)), Some(decoded)) = (self.compressed.get(index), self.decoded.get(index)) {
+            if let Some(bytes) = decoded.get() {
+                return Ok(bytes);
+            }
+            let key = format!("bufferViews[{index}].extensions.{}", how.name);
+            let stream = self.part(root, &key, how.buffer, how.offset, how.length)?;
+            let bytes = how.decode(stream).map_err(|rule| Fault::key(key, rule))?;
+            return Ok(decoded.get_or_init(|| bytes));
+        }
+        let offset = view.byte_offset.unwrap_or_default().0;
+        self.part(
+            root,
+            &format!("bufferViews[{index}]"),
+            view.buffer.value(),
+            offset,
+            view.byte_length.0,
+        )
+    }
+
+    /// A part of a buffer that something at `key` asks for.
+    fn part(&self, root: &Root, key: &str, buffer: usize, offset: u64, length: u64) -> Result<&[u8], Fault> {
+        let bytes = self.buffer(root, buffer)?;
+        let end = offset.checked_add(length).filter(|end| *end <= bytes.len() as u64);
+        let end = end.ok_or_else(|| {
+            let has = bytes.len();
+            Fault::key(
+                key,
+                format!("{length} bytes from byte {offset} on; buffers[{buffer}] has {has}"),
+            )
+        })?;
+        Ok(&bytes[offset as usize..end as usize])
+    }
+}

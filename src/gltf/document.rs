@@ -1,0 +1,191 @@
+//! A glTF file, opened and checked: its JSON, and the bytes of its buffers and images.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use gltf::json::Root;
+
+use super::buffer::{Buffers, MOST_BYTES};
+use super::error::{Fault, GltfError};
+use super::json::missing;
+use super::uri::{self, Folder};
+use super::{extension, glb, json};
+
+/// The largest file of an image, in bytes.
+const LARGEST_IMAGE: u64 = 512 << 20;
+/// The most bytes of all images together, each as often as it is asked for.
+const MOST_OF_IMAGES: u64 = 4 << 30;
+
+/// A file that is open. Every index in its JSON is there and every word is known, but for what the crate keeps raw; which node
+/// is whose child, and what numbers mean, nobody has looked at, but all are finite. What accessors have may be anything.
+pub(super) struct Document {
+    /// What the file says. Data URIs of buffers are taken out.
+    pub json: Root,
+    /// The file.
+    pub path: PathBuf,
+    /// What a user should know.
+    pub notes: Vec<String>,
+    folder: Folder,
+    buffers: Buffers,
+    /// How many bytes of images were asked for.
+    given: AtomicU64,
+}
+
+impl Document {
+    /// Opens a file, whose other files are beside it and inside `root`. Which files those are is put into `files`, even if
+    /// the file breaks a rule.
+    ///
+    /// # Errors
+    ///
+    /// Files that cannot be read or are no glTF 2.0, extensions that are required and not known, and buffers whose bytes are
+    /// not there.
+    pub fn open(path: &Path, root: &Path, files: &mut BTreeSet<PathBuf>) -> Result<Document, GltfError> {
+        files.insert(path.to_owned());
+        let file = uri::read(path, MOST_BYTES).map_err(|error| GltfError::Read {
+            path: path.to_owned(),
+            error,
+        })?;
+        Document::read(file, path, root, files).map_err(|fault| fault.of(path))
+    }
+
+    pub(super) fn read(
+        file: Vec<u8>,
+        path: &Path,
+        root: &Path,
+        files: &mut BTreeSet<PathBuf>,
+    ) -> Result<Document, Fault> {
+        let here = |path: &Path| match path.as_os_str().is_empty() {
+            true => PathBuf::from("."),
+            false => path.to_owned(),
+        };
+        let folder = Folder {
+            folder: here(path.parent().unwrap_or(Path::new(""))),
+            root: here(root),
+        };
+        let mut notes = Vec::new();
+        let (mut json, file, chunk) = match glb::is_container(&file) {
+            true => {
+                let chunks = glb::chunks(&file)?;
+                (json::root(&file[chunks.json], &mut notes)?, file, chunks.binary)
+            }
+            false => (json::root(&file, &mut notes)?, Vec::new(), None),
+        };
+        extension::check(&json, &mut notes)?;
+        for image in &json.images {
+            if let Some(name) = image.uri.as_ref().filter(|name| !uri::is_data(name))
+                && let Ok(path) = folder.find(name)
+            {
+                files.insert(path);
+            }
+        }
+        let buffers = Buffers::read(&mut json, file, chunk, &folder, files)?;
+        Ok(Document {
+            json,
+            path: path.to_owned(),
+            notes,
+            folder,
+            buffers,
+            given: AtomicU64::new(0),
+        })
+    }
+
+    /// An error at a value of the file.
+    pub fn fault(&self, key: impl Into<String>, message: impl Into<String>) -> GltfError {
+        Fault::key(key, message).of(&self.path)
+    }
+
+    /// The bytes of a view of a buffer, decompressed.
+    #[cfg(test)]
+    pub fn view(&self, view: usize) -> Result<&[u8], GltfError> {
+        self.bytes_of(view).map_err(|fault| fault.of(&self.path))
+    }
+
+    pub(super) fn bytes_of(&self, view: usize) -> Result<&[u8], Fault> {
+        self.buffers.view(&self.json, view)
+    }
+
+    /// The image of a texture: that of `EXT_texture_webp`, or else the core's.
+    pub fn image_of(&self, texture: usize) -> Result<usize, GltfError> {
+        self.source_of(texture).map_err(|fault| fault.of(&self.path))
+    }
+
+    fn source_of(&self, index: usize) -> Result<usize, Fault> {
+        let textures = &self.json.textures;
+        let texture = (textures.get(index)).ok_or_else(|| missing("textures", index, textures.len()))?;
+        let key = format!("textures[{index}]");
+        let others = texture.extensions.as_ref().map(|all| &all.others);
+        if let Some(webp) = others.and_then(|others| others.get("EXT_texture_webp"))
+            && let Some(source) = webp.get("source")
+        {
+            let count = self.json.images.len();
+            let source = source.as_u64().and_then(|source| usize::try_from(source).ok());
+            return source.filter(|source| *source < count).ok_or_else(|| {
+                let rule = format!("it must be the index of an image; there are {count}, counted from 0");
+                Fault::key(format!("{key}.extensions.EXT_texture_webp.source"), rule)
+            });
+        }
+        // What stands for none in the crate is an index that no list reaches.
+        match self.json.get(texture.source) {
+            Some(_) => Ok(texture.source.value()),
+            None => Err(match others.and_then(extension::unknown) {
+                Some(name) => extension::only_in(&key, name),
+                None => Fault::key(key, "it must have a source"),
+            }),
+        }
+    }
+
+    /// The bytes of an image, encoded as the file has it.
+    pub fn image_bytes(&self, image: usize) -> Result<Arc<[u8]>, GltfError> {
+        self.encoded(image).map_err(|fault| fault.of(&self.path))
+    }
+
+    fn encoded(&self, index: usize) -> Result<Arc<[u8]>, Fault> {
+        let images = &self.json.images;
+        let image = images
+            .get(index)
+            .ok_or_else(|| missing("images", index, images.len()))?;
+        if let Some(view) = image.buffer_view {
+            let bytes = self.bytes_of(view.value())?;
+            self.has_room(index, bytes.len() as u64)?;
+            return Ok(bytes.into());
+        }
+        let Some(name) = &image.uri else {
+            let key = format!("images[{index}]");
+            let others = image
+                .extensions
+                .as_ref()
+                .and_then(|all| extension::unknown(&all.others));
+            return Err(match others {
+                Some(name) => extension::only_in(&key, name),
+                None => Fault::key(key, "it must have a uri or a bufferView"),
+            });
+        };
+        let fault = |rule| Fault::key(format!("images[{index}].uri"), rule);
+        let bytes = match uri::is_data(name) {
+            true => uri::data(name).map_err(fault)?,
+            false => {
+                let path = self.folder.find(name).map_err(fault)?;
+                uri::read(&path, LARGEST_IMAGE)
+                    .map_err(|error| fault(format!("{} cannot be read: {error}", super::error::shown(name))))?
+            }
+        };
+        self.has_room(index, bytes.len() as u64)?;
+        Ok(bytes.into())
+    }
+
+    /// Refuses an image of so many bytes where it is too large, or all are: a small file may name the same bytes often.
+    fn has_room(&self, index: usize, bytes: u64) -> Result<(), Fault> {
+        let given = self.given.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
+        let fault = |rule: String| Err(Fault::key(format!("images[{index}]"), rule));
+        match (bytes > LARGEST_IMAGE, given > MOST_OF_IMAGES) {
+            (true, _) => fault(format!("{bytes} bytes; an image must have at most {LARGEST_IMAGE}")),
+            (_, true) => fault(format!("all images together must have at most {MOST_OF_IMAGES} bytes")),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,490 @@
+//! Files that are right, that are strange, and that are hostile.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use crate::gltf::document::Document;
+use crate::gltf::made::{container, json_of, read};
+
+fn told(json: &Value) -> String {
+    match read(json.to_string().into_bytes()) {
+        Ok(_) => "fine".to_owned(),
+        Err(fault) => fault.of(Path::new("a")).to_string(),
+    }
+}
+
+/// A small file with most of what this layer looks at.
+fn small() -> (Value, Vec<u8>) {
+    let mut binary: Vec<u8> = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+        .iter()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
+    binary.extend([0, 0, 1, 0, 2, 0, 1, 2]);
+    binary.extend([0x89, b'P', b'N', b'G']);
+    let views = json!([
+        { "buffer": 0, "byteLength": 36 },
+        { "buffer": 0, "byteOffset": 36, "byteLength": 8 },
+        { "buffer": 0, "byteOffset": 44, "byteLength": 4 },
+    ]);
+    let accessors = json!([
+        { "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] },
+        { "bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR" },
+        {
+            "componentType": 5126, "count": 3, "type": "VEC3",
+            "sparse": {
+                "count": 2,
+                "indices": { "bufferView": 1, "byteOffset": 6, "componentType": 5121 },
+                "values": { "bufferView": 0 },
+            },
+        },
+    ]);
+    let mut json = json_of(&binary, views, accessors);
+    json["images"] = json!([{ "bufferView": 2, "mimeType": "image/png" }, { "uri": "data:image/png;base64,iVBORw==" }]);
+    json["textures"] = json!([{ "source": 0 }, { "extensions": { "EXT_texture_webp": { "source": 1 } } }]);
+    json["materials"] = json!([{ "pbrMetallicRoughness": { "baseColorTexture": { "index": 1 } } }]);
+    json["meshes"] =
+        json!([{ "primitives": [{ "attributes": { "POSITION": 0, "_ID": 0 }, "indices": 1, "material": 0 }] }]);
+    json["nodes"] = json!([{ "mesh": 0, "translation": [1.0, 2, -0.5] }]);
+    json["scenes"] = json!([{ "nodes": [0] }]);
+    json["scene"] = json!(0);
+    (json, binary)
+}
+
+/// Asks for all that there is. What is refused is refused by a message.
+fn ask(document: &Document) -> usize {
+    let mut count = 0;
+    for i in 0..document.json.accessors.len() + 1 {
+        count += usize::from(document.components(i).is_ok());
+        count += document.vectors::<1>(i).map_or(0, |all| all.len());
+        count += document.vectors::<3>(i).map_or(0, |all| all.len());
+        count += document.indices(i).map_or(0, |all| all.len());
+    }
+    for i in 0..document.json.buffer_views.len() + 1 {
+        count += document.view(i).map_or(0, |bytes| bytes.len());
+    }
+    for i in 0..document.json.textures.len() + 1 {
+        count += usize::from(document.image_of(i).is_ok());
+    }
+    for i in 0..document.json.images.len() + 1 {
+        count += document.image_bytes(i).map_or(0, |bytes| bytes.len());
+    }
+    count
+}
+
+#[test]
+fn a_container_has_all_in_it() {
+    let (json, binary) = small();
+    let document = read(container(&json, &binary)).unwrap();
+    assert_eq!(document.vectors::<3>(0).unwrap()[1], [1.0, 0.0, 0.0]);
+    assert_eq!(document.indices(1).unwrap(), [0, 1, 2]);
+    assert_eq!(document.vectors::<3>(2).unwrap()[2], [1.0, 0.0, 0.0]);
+    for image in [0, 1] {
+        assert_eq!(*document.image_bytes(image).unwrap(), *b"\x89PNG");
+    }
+    assert_eq!([0, 1].map(|texture| document.image_of(texture).unwrap()), [0, 1]);
+    assert_eq!(document.notes, [""; 0]);
+    assert_eq!(document.json.nodes[0].translation, Some([1.0, 2.0, -0.5]));
+}
+
+#[test]
+fn other_files_are_read_and_listed() {
+    let outer = tempfile::tempdir().unwrap();
+    let folder = outer.path().join("model");
+    fs::create_dir(&folder).unwrap();
+    let (mut json, binary) = small();
+    fs::write(folder.join("the data.bin"), &binary).unwrap();
+    fs::write(folder.join("a.png"), b"image").unwrap();
+    fs::write(outer.path().join("out.png"), b"secret").unwrap();
+    json["buffers"][0]["uri"] = json!("the%20data.bin");
+    json["images"] = json!([
+        { "uri": "a.png" }, { "uri": "none.png" }, { "uri": "../out.png" }, { "name": "nothing" },
+        { "extensions": { "X_image": {} } },
+    ]);
+    let path = folder.join("small.txt"); // what it is, its text says
+    fs::write(&path, json.to_string()).unwrap();
+    let mut files = BTreeSet::new();
+    let document = Document::open(&path, &folder, &mut files).unwrap();
+    assert_eq!(document.indices(1).unwrap(), [0, 1, 2]);
+    assert_eq!(*document.image_bytes(0).unwrap(), *b"image");
+    let told = |image: usize| {
+        let text = document.image_bytes(image).unwrap_err().to_string();
+        text.strip_prefix(&format!("{}: ", path.display())).unwrap().to_owned()
+    };
+    assert!(
+        told(1).starts_with("images[1].uri: \"none.png\" cannot be read"),
+        "{}",
+        told(1)
+    );
+    assert!(
+        told(2).starts_with("images[2].uri: \"../out.png\" must not leave the folder"),
+        "{}",
+        told(2)
+    );
+    assert_eq!(told(3), "images[3]: it must have a uri or a bufferView");
+    assert_eq!(
+        told(4),
+        "images[4]: \"X_image\" is the only place of its data, and this extension is not known"
+    );
+    assert_eq!(told(5), "images: 5 is not there; there are 5, counted from 0");
+    let names: Vec<_> = files.iter().filter_map(|path| path.file_name()?.to_str()).collect();
+    assert_eq!(names.len(), 3);
+    for name in ["the data.bin", "a.png", "small.txt"] {
+        assert!(names.contains(&name), "{names:?}");
+    }
+    // A wider root lets more in.
+    let document = Document::open(&path, outer.path(), &mut BTreeSet::new()).unwrap();
+    assert_eq!(*document.image_bytes(2).unwrap(), *b"secret");
+    // A buffer that is too short, one that is not there, and one that nobody asks for.
+    fs::write(folder.join("the data.bin"), &binary[..47]).unwrap();
+    let fails = |json: &Value| {
+        fs::write(&path, json.to_string()).unwrap();
+        Document::open(&path, &folder, &mut BTreeSet::new())
+            .map(|_| ())
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(
+        fails(&json).ends_with("buffers[0].byteLength: 48 bytes; its data has 47"),
+        "{}",
+        fails(&json)
+    );
+    fs::remove_file(folder.join("the data.bin")).unwrap();
+    assert!(fails(&json).contains("buffers[0].uri: \"the%20data.bin\" cannot be read"));
+    json["bufferViews"] = json!([]);
+    json["accessors"] = json!([]);
+    json["meshes"] = json!([]);
+    json["nodes"] = json!([{}]);
+    fs::write(&path, json.to_string()).unwrap();
+    assert!(Document::open(&path, &folder, &mut BTreeSet::new()).is_ok());
+    assert!(matches!(
+        Document::open(&folder, &folder, &mut BTreeSet::new())
+            .map(|_| ())
+            .unwrap_err(),
+        crate::gltf::error::GltfError::Read { .. }
+    ));
+}
+
+#[test]
+fn buffers_may_be_data_uris() {
+    let (mut json, _) = small();
+    json["buffers"] = json!([{ "byteLength": 3, "uri": "data:application/octet-stream;base64,AAEC" }]);
+    json["bufferViews"] =
+        json!([{ "buffer": 0, "byteLength": 3 }, { "buffer": 0, "byteLength": 3 }, { "buffer": 0, "byteLength": 3 }]);
+    let document = read(json.to_string().into_bytes()).unwrap();
+    assert_eq!(document.view(0).unwrap(), [0, 1, 2]);
+    assert_eq!(document.json.buffers[0].uri, None);
+    json["buffers"][0]["byteLength"] = json!(4);
+    assert_eq!(told(&json), "a: buffers[0].byteLength: 4 bytes; its data has 3");
+    json["buffers"][0]["uri"] = json!("data:;base64,A");
+    assert!(told(&json).starts_with("a: buffers[0].uri: the data URI must be base64"));
+    // The chunk of a container is the first buffer alone.
+    json["buffers"] = json!([{ "byteLength": 3 }]);
+    assert_eq!(told(&json), "a: buffers[0]: it must have a uri, as views refer to it");
+    json["buffers"] = json!([{ "byteLength": 4 }, { "byteLength": 4 }]);
+    assert!(read(container(&json, b"1234")).is_ok());
+    json["bufferViews"][1]["buffer"] = json!(1);
+    let fault = read(container(&json, b"1234")).map(|_| ()).unwrap_err();
+    assert_eq!(fault.message, "it must have a uri, as views refer to it");
+}
+
+#[test]
+fn what_is_no_gltf_is_told() {
+    let json = |text: &str| match read(text.as_bytes().to_vec()) {
+        Ok(_) => "fine".to_owned(),
+        Err(fault) => fault.of(Path::new("a")).to_string(),
+    };
+    assert_eq!(json("\u{feff}{\"asset\":{\"version\":\"2.0\"}}  \n\0\0"), "fine");
+    assert_eq!(json(""), "a:1:1: EOF while parsing a value");
+    assert_eq!(json("{\n  x"), "a:2:3: key must be a string");
+    assert_eq!(json("[]"), "a:1:1: the JSON must be an object");
+    assert_eq!(json("{}"), "a: asset: it must be there, an object with the version");
+    assert_eq!(json("{\"asset\":{}}"), "a: asset.version: it must be there");
+    for (version, rule) in [
+        ("\"1.0\"", "a: asset.version: \"1.0\" must be \"2.x\""),
+        ("\"2\"", "a: asset.version: \"2\" must be \"2.x\""),
+        ("2.0", "a: asset.version: 2.0 must be \"2.x\""),
+        ("\"2.1\"", "fine"),
+        ("\"2.0\",\"minVersion\":\"2.0\"", "fine"),
+        (
+            "\"2.1\",\"minVersion\":\"2.1\"",
+            "a: asset.minVersion: \"2.1\" must be at most \"2.0\", which is what is read",
+        ),
+    ] {
+        assert_eq!(json(&format!("{{\"asset\":{{\"version\":{version}}}}}")), rule);
+    }
+    let bytes = |bytes: &[u8]| read(bytes.to_vec()).map(|_| ()).unwrap_err().message;
+    assert_eq!(
+        bytes(b"{\"asset\":{\"version\":\"2.0\xff\"}}"),
+        "invalid unicode code point"
+    );
+    // Deep, and wide.
+    let deep = format!(
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"extras\":{}1{}}}",
+        "[".repeat(1 << 20),
+        "]".repeat(1 << 20)
+    );
+    assert!(json(&deep).ends_with("recursion limit exceeded"), "{}", json(&deep));
+    let deep = format!("{{\"a\":{}", "[{\"a\":".repeat(1 << 16));
+    assert!(json(&deep).ends_with("recursion limit exceeded"), "{}", json(&deep));
+    let wide = format!("{{\"nodes\":[{}{{}}]}}", "{},".repeat(3 << 20));
+    assert_eq!(
+        json(&wide),
+        "a: the JSON has 3145730 objects; it must have at most 2097152"
+    );
+    let wide = format!("{{\"a\":[{}0]}}", "0,".repeat(33 << 20));
+    assert_eq!(
+        json(&wide),
+        "a: the JSON has 34603009 values; it must have at most 33554432"
+    );
+}
+
+#[test]
+fn every_index_and_word_is_checked() {
+    let (good, binary) = small();
+    let with = |key: &str, value: Value| {
+        let mut json = good.clone();
+        *json.pointer_mut(key).unwrap_or_else(|| panic!("{key}")) = value;
+        match read(container(&json, &binary)) {
+            Ok(document) => format!("fine {}", ask(&document) > 0),
+            Err(fault) => fault.of(Path::new("a")).to_string(),
+        }
+    };
+    assert_eq!(with("/scene", json!(0)), "fine true");
+    for (key, place) in [
+        ("/accessors/0/bufferView", "accessors[0].bufferView"),
+        (
+            "/accessors/2/sparse/indices/bufferView",
+            "accessors[2].sparse.indices.bufferView",
+        ),
+        (
+            "/accessors/2/sparse/values/bufferView",
+            "accessors[2].sparse.values.bufferView",
+        ),
+        ("/bufferViews/1/buffer", "bufferViews[1].buffer"),
+        ("/images/0/bufferView", "images[0].bufferView"),
+        (
+            "/meshes/0/primitives/0/attributes/POSITION",
+            "meshes[0].primitives[0].attributes",
+        ),
+        (
+            "/meshes/0/primitives/0/attributes/_ID",
+            "meshes[0].primitives[0].attributes",
+        ),
+        ("/meshes/0/primitives/0/indices", "meshes[0].primitives[0].indices"),
+        ("/meshes/0/primitives/0/material", "meshes[0].primitives[0].material"),
+        (
+            "/materials/0/pbrMetallicRoughness/baseColorTexture/index",
+            "materials[0].pbrMetallicRoughness.baseColorTexture.index",
+        ),
+        ("/nodes/0/mesh", "nodes[0].mesh"),
+        ("/scenes/0/nodes/0", "scenes[0].nodes[0]"),
+        ("/scene", "scene"),
+        ("/textures/0/source", "textures[0].source"),
+    ] {
+        let told = with(key, json!(99));
+        assert!(told.starts_with(&format!("a: {place}")), "{key}: {told}");
+        // Not one of its lower 32 bits, and no other kind of value.
+        for value in [
+            json!(1u64 << 32),
+            json!(-1),
+            json!(0.5),
+            json!("0"),
+            json!({}),
+            json!([]),
+        ] {
+            let told = with(key, value.clone());
+            assert!(told.starts_with("a: "), "{key}: {value}: {told}");
+        }
+        // Some writers write whole numbers so.
+        if key != "/textures/0/source" {
+            let same = good.pointer(key).unwrap().as_f64().unwrap();
+            assert_eq!(with(key, json!(same)), "fine true", "{key}");
+        }
+    }
+    for (key, place) in [
+        ("/accessors/0/componentType", "accessors[0].componentType"),
+        ("/accessors/0/type", "accessors[0].type"),
+    ] {
+        for value in [json!(5124), json!("VEC5"), json!(5126u64 + (1 << 32))] {
+            let told = with(key, value.clone());
+            assert!(told.starts_with(&format!("a: {place}")), "{key}: {value}: {told}");
+        }
+    }
+    assert!(with("/nodes/0/translation/0", json!(1e39)).starts_with("a: nodes[0].translation[0]: 1e39 must be"));
+    assert_eq!(with("/accessors/0/min", json!("none")), "fine true");
+    assert_eq!(with("/meshes/0/primitives/0/attributes", json!({})), "fine true");
+}
+
+#[test]
+fn what_writers_get_wrong_is_understood() {
+    let with = |key: &str, value: Value| {
+        let mut json = json!({ "asset": { "version": "2.0" }, "nodes": [{}] });
+        json[key] = value;
+        read(json.to_string().into_bytes()).map_err(|fault| fault.of(Path::new("a")).to_string())
+    };
+    assert_eq!(
+        with("scenes", json!([{ "name": "empty" }])).unwrap().json.scenes.len(),
+        1
+    );
+    let channel = |node: Value, path: &str| json!({ "sampler": 0, "target": { "node": node, "path": path } });
+    let animation = |channels: Value| json!([{ "channels": channels, "samplers": [{ "input": 0, "output": 0 }] }]);
+    let mut json = json!({
+        "asset": { "version": "2.0" }, "nodes": [{}],
+        "accessors": [{ "componentType": 5126, "count": 1, "type": "SCALAR" }],
+    });
+    json["animations"] = animation(json!([
+        channel(json!(0), "translation"),
+        channel(Value::Null, "translation"),
+        channel(json!(0), "pointer"),
+    ]));
+    let document = read(json.to_string().into_bytes()).unwrap();
+    assert_eq!(document.json.animations[0].channels.len(), 1);
+    assert_eq!(
+        document.notes,
+        ["animations: 2 channels that move something else than a node are left out"]
+    );
+    json["animations"] = animation(json!([channel(json!(1), "translation")]));
+    assert!(told(&json).starts_with("a: animations[0].channels[0].target.node: 1 is not there"));
+    let camera = |camera: Value| with("cameras", json!([camera])).map(|_| ());
+    assert!(camera(json!({ "type": "perspective", "perspective": { "yfov": 1, "znear": 0.1 } })).is_ok());
+    assert_eq!(
+        camera(json!({ "type": "orthographic", "perspective": { "yfov": 1, "znear": 0.1 } })).unwrap_err(),
+        "a: cameras[0].orthographic: it must be there, as that is its type"
+    );
+    assert!(camera(json!({ "type": "fisheye", "perspective": { "yfov": 1, "znear": 0.1 } })).is_err());
+    assert!(with("extras", json!({ "a": [1e300] })).is_ok());
+}
+
+#[test]
+fn extensions_are_refused_or_told_by_their_names() {
+    let with = |required: &[&str], used: &[&str]| {
+        let json = json!({ "asset": { "version": "2.0" }, "extensionsRequired": required, "extensionsUsed": used });
+        read(json.to_string().into_bytes())
+            .map(|document| document.notes)
+            .map_err(|fault| fault.of(Path::new("a")).to_string())
+    };
+    let known = ["KHR_materials_sheen", "KHR_mesh_quantization", "EXT_texture_webp"];
+    assert_eq!(with(&known, &known).unwrap(), [""; 0]);
+    for name in ["KHR_draco_mesh_compression", "KHR_texture_basisu"] {
+        assert_eq!(
+            with(&["KHR_mesh_quantization", name], &[]).unwrap_err(),
+            format!("a: extensionsRequired[1]: \"{name}\" is required, and it is not known")
+        );
+    }
+    assert_eq!(
+        with(&[], &["X_a", "KHR_materials_sheen", "X_a"]).unwrap(),
+        ["the extension \"X_a\" is not known, and is not looked at"]
+    );
+    let many: Vec<String> = (0..1000).map(|i| format!("X_{i}")).collect();
+    let many: Vec<&str> = many.iter().map(String::as_str).collect();
+    assert_eq!(with(&[], &many).unwrap().len(), 21);
+    // A primitive that has nothing but what an extension says.
+    let (mut json, binary) = small();
+    let draco = json!({ "KHR_draco_mesh_compression": { "bufferView": 0, "attributes": { "POSITION": 0 } } });
+    json["meshes"][0]["primitives"][0]["extensions"] = draco;
+    assert!(read(container(&json, &binary)).is_ok()); // its accessors have views
+    json["accessors"][1].as_object_mut().unwrap().remove("bufferView");
+    let fault = read(container(&json, &binary)).map(|_| ()).unwrap_err();
+    assert_eq!(
+        fault.of(Path::new("a")).to_string(),
+        "a: meshes[0].primitives[0]: \"KHR_draco_mesh_compression\" is the only place of its data, and this extension is not known"
+    );
+}
+
+#[test]
+fn a_texture_without_an_image_is_refused() {
+    let (mut json, binary) = small();
+    json["textures"] = json!([
+        {},
+        { "extensions": { "KHR_texture_basisu": { "source": 0 } } },
+        { "source": 1, "extensions": { "KHR_texture_basisu": { "source": 0 } } },
+        { "source": 0, "extensions": { "EXT_texture_webp": { "source": 2 } } },
+        { "source": 0, "extensions": { "EXT_texture_webp": { "source": -1 } } },
+        { "source": 0, "extensions": { "EXT_texture_webp": {} } },
+    ]);
+    let document = read(container(&json, &binary)).unwrap();
+    let told = |texture: usize| match document.image_of(texture) {
+        Ok(image) => image.to_string(),
+        Err(error) => error.to_string().replace("/none/a.gltf: ", ""),
+    };
+    assert_eq!(told(0), "textures[0]: it must have a source");
+    assert_eq!(
+        told(1),
+        "textures[1]: \"KHR_texture_basisu\" is the only place of its data, and this extension is not known"
+    );
+    assert_eq!(told(2), "1");
+    for texture in [3, 4] {
+        let key = format!("textures[{texture}].extensions.EXT_texture_webp.source");
+        assert_eq!(
+            told(texture),
+            format!("{key}: it must be the index of an image; there are 2, counted from 0")
+        );
+    }
+    assert_eq!(told(5), "0");
+    assert_eq!(told(6), "textures: 6 is not there; there are 6, counted from 0");
+}
+
+#[test]
+fn no_beginning_of_a_file_is_more_than_a_message() {
+    let (json, binary) = small();
+    let bytes = container(&json, &binary);
+    assert!(ask(&read(bytes.clone()).unwrap()) > 20);
+    for length in 0..bytes.len() {
+        assert!(read(bytes[..length].to_vec()).is_err(), "{length}");
+    }
+    let text = json.to_string().into_bytes();
+    for length in 0..text.len() {
+        assert!(read(text[..length].to_vec()).is_err(), "{length}");
+    }
+}
+
+#[test]
+fn no_byte_that_is_changed_is_more_than_a_message() {
+    let (json, binary) = small();
+    let bytes = container(&json, &binary);
+    let (mut good, mut bad) = (0, 0);
+    for at in 0..bytes.len() {
+        for byte in [
+            0,
+            b'0',
+            b'9',
+            b'-',
+            b'"',
+            b'}',
+            b',',
+            0x7f,
+            0xff,
+            bytes[at] ^ 1,
+            bytes[at] ^ 0x80,
+        ] {
+            let mut bytes = bytes.clone();
+            bytes[at] = byte;
+            match read(bytes) {
+                Ok(document) => {
+                    ask(&document);
+                    good += 1;
+                }
+                Err(_) => bad += 1,
+            }
+        }
+    }
+    // Both happen often.
+    assert!(good > 1000 && bad > 1000, "{good} {bad}");
+}
+
+#[test]
+fn a_million_accessors_are_read() {
+    let accessors =
+        "{\"bufferView\":0,\"componentType\":5126,\"count\":4294967295,\"type\":\"VEC3\"},".repeat(1_000_000);
+    let text = format!(
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"buffers\":[{{\"byteLength\":1,\"uri\":\"data:,a\"}}],\
+         \"bufferViews\":[{{\"buffer\":0,\"byteLength\":1}}],\"accessors\":[{}]}}",
+        accessors.trim_end_matches(',')
+    );
+    let document = read(text.into_bytes()).unwrap();
+    assert_eq!(document.json.accessors.len(), 1_000_000);
+    assert!(document.vectors::<3>(999_999).is_err());
+}

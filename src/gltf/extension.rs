@@ -1,0 +1,94 @@
+//! Extensions of glTF: which are known, and what becomes of those that are not (specification, section 3.12).
+
+use std::collections::BTreeSet;
+
+use gltf::json::Root;
+use gltf::json::accessor::Accessor;
+use gltf::json::mesh::Semantic;
+use gltf::json::validation::Checked;
+use serde_json::{Map, Value};
+
+use super::error::{Fault, shown};
+
+/// The extensions that are known.
+pub(super) const KNOWN: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_texture_transform",
+    // What a file says of its authors and its rights shows in no picture.
+    "KHR_xmp_json_ld",
+];
+
+fn is_known(name: &str) -> bool {
+    KNOWN.contains(&name)
+}
+
+/// Refuses a file that requires an extension that is not known, or has data in one alone; puts a note for each that is only
+/// used.
+pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), Fault> {
+    for (i, name) in root.extensions_required.iter().enumerate() {
+        if !is_known(name) {
+            let rule = "is required, and it is not known";
+            return Err(Fault::key(
+                format!("extensionsRequired[{i}]"),
+                format!("{} {rule}", shown(name)),
+            ));
+        }
+    }
+    for (i, mesh) in root.meshes.iter().enumerate() {
+        for (k, primitive) in mesh.primitives.iter().enumerate() {
+            let Some(name) = primitive.extensions.as_ref().and_then(|all| unknown(&all.others)) else {
+                continue;
+            };
+            let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+            let accessors = [positions, primitive.indices.as_ref()];
+            let is_empty = |accessor: &Accessor| accessor.buffer_view.is_none() && accessor.sparse.is_none();
+            let mut accessors = accessors.into_iter().flatten().filter_map(|index| root.get(*index));
+            if positions.is_none() || accessors.any(is_empty) {
+                return Err(only_in(&format!("meshes[{i}].primitives[{k}]"), name));
+            }
+        }
+    }
+    let unknown: BTreeSet<&String> = (root.extensions_used.iter())
+        .filter(|name| !is_known(name) && !root.extensions_required.contains(name))
+        .collect();
+    // A file may name any number of them.
+    const MOST: usize = 20;
+    for name in unknown.iter().take(MOST) {
+        notes.push(format!(
+            "the extension {} is not known, and is not looked at",
+            shown(name)
+        ));
+    }
+    if unknown.len() > MOST {
+        let more = unknown.len() - MOST;
+        notes.push(format!("{more} more extensions are not known, and are not looked at"));
+    }
+    Ok(())
+}
+
+/// The fault of data that nothing else has than an extension that is not known.
+pub(super) fn only_in(key: &str, name: &str) -> Fault {
+    let rule = "is the only place of its data, and this extension is not known";
+    Fault::key(key, format!("{} {rule}", shown(name)))
+}
+
+/// The first extension of an object that is not known.
+pub(super) fn unknown(others: &Map<String, Value>) -> Option<&str> {
+    others.keys().map(String::as_str).find(|name| !is_known(name))
+}

@@ -1,0 +1,136 @@
+//! The container of `.glb` files: a header and chunks (specification, section 4).
+
+use std::ops::Range;
+
+use super::error::{Fault, Place};
+
+const MAGIC: &[u8] = b"glTF";
+const HEADER: usize = 12;
+const CHUNK_HEADER: usize = 8;
+const JSON: u32 = 0x4E4F_534A;
+const BIN: u32 = 0x004E_4942;
+
+/// Where a container's parts are in its bytes.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Chunks {
+    pub json: Range<usize>,
+    pub binary: Option<Range<usize>>,
+}
+
+/// Whether these are the bytes of a container, whatever the file's name is.
+pub(super) fn is_container(bytes: &[u8]) -> bool {
+    bytes.starts_with(MAGIC)
+}
+
+/// Finds the chunks. Those of other kinds than JSON and BIN are skipped, and so is what follows the length in the header.
+pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, Fault> {
+    if bytes.len() < HEADER {
+        let rule = format!("the file ends after {} bytes; the header has {HEADER}", bytes.len());
+        return Err(Fault::new(Place::Byte(0), rule));
+    }
+    let version = word(bytes, 4);
+    if version != 2 {
+        let rule = format!("the version of the container is {version}; it must be 2");
+        return Err(Fault::new(Place::Byte(4), rule));
+    }
+    let length = word(bytes, 8) as usize;
+    if length > bytes.len() {
+        let rule = format!("the length is {length}; the file has {} bytes", bytes.len());
+        return Err(Fault::new(Place::Byte(8), rule));
+    }
+    let mut json = None;
+    let mut binary = None;
+    let mut at = HEADER;
+    // Fewer bytes than a chunk's header has are padding.
+    while length.saturating_sub(at) >= CHUNK_HEADER {
+        let (size, kind) = (word(bytes, at) as usize, word(bytes, at + 4));
+        let start = at + CHUNK_HEADER;
+        if size > length - start {
+            let rule = format!("the chunk has {size} bytes; {} are left", length - start);
+            return Err(Fault::new(Place::Byte(at as u64), rule));
+        }
+        let range = start..start + size;
+        match (kind, &json) {
+            (JSON, None) => json = Some(range),
+            (_, None) => return Err(Fault::new(Place::Byte(at as u64), "the first chunk must be JSON")),
+            (BIN, Some(_)) if binary.is_none() => binary = Some(range),
+            _ => {}
+        }
+        at = start + size;
+    }
+    let json = json.ok_or_else(|| Fault::new(Place::Byte(HEADER as u64), "there must be a chunk of JSON"))?;
+    Ok(Chunks { json, binary })
+}
+
+/// The caller has checked that it is there.
+fn word(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn made(length: u32, chunks: &[(u32, &[u8])]) -> Vec<u8> {
+        let mut bytes = MAGIC.to_vec();
+        for word in [2, length] {
+            bytes.extend(word.to_le_bytes());
+        }
+        for (kind, data) in chunks {
+            bytes.extend((data.len() as u32).to_le_bytes());
+            bytes.extend(kind.to_le_bytes());
+            bytes.extend(*data);
+        }
+        bytes
+    }
+
+    fn told(bytes: &[u8]) -> (Place, String) {
+        let fault = chunks(bytes).unwrap_err();
+        (fault.place, fault.message)
+    }
+
+    #[test]
+    fn chunks_are_found_and_others_are_skipped() {
+        let bytes = made(
+            12 + 8 + 4 + 8 + 4 + 8 + 4,
+            &[(JSON, b"{}  "), (7, b"1234"), (BIN, b"abcd")],
+        );
+        assert!(is_container(&bytes));
+        let found = chunks(&bytes).unwrap();
+        assert_eq!(&bytes[found.json], b"{}  ");
+        assert_eq!(&bytes[found.binary.unwrap()], b"abcd");
+        // The second of a kind is skipped, as is what follows the end.
+        let mut bytes = made(12 + 8 + 4 + 8 + 1, &[(JSON, b"{}  "), (BIN, b"a"), (BIN, b"b")]);
+        let found = chunks(&bytes).unwrap();
+        assert_eq!(&bytes[found.binary.unwrap()], b"a");
+        bytes[8] += 9;
+        assert_eq!(&bytes[chunks(&bytes).unwrap().binary.unwrap()], b"a");
+        assert_eq!(chunks(&made(24, &[(JSON, b"{}  ")])).unwrap().binary, None);
+    }
+
+    #[test]
+    fn every_length_is_checked() {
+        let byte = |offset: u64, rule: &str| (Place::Byte(offset), rule.to_owned());
+        assert_eq!(told(b"glTF"), byte(0, "the file ends after 4 bytes; the header has 12"));
+        let mut bytes = made(24, &[(JSON, b"{}  ")]);
+        bytes[4] = 1;
+        assert_eq!(told(&bytes), byte(4, "the version of the container is 1; it must be 2"));
+        assert_eq!(
+            told(&made(25, &[(JSON, b"{}  ")])),
+            byte(8, "the length is 25; the file has 24 bytes")
+        );
+        assert_eq!(
+            told(&made(23, &[(JSON, b"{}  ")])),
+            byte(12, "the chunk has 4 bytes; 3 are left")
+        );
+        let mut bytes = made(24, &[(JSON, b"{}  ")]);
+        bytes[12..16].fill(0xff);
+        assert_eq!(told(&bytes), byte(12, "the chunk has 4294967295 bytes; 4 are left"));
+        assert_eq!(
+            told(&made(24, &[(BIN, b"{}  ")])),
+            byte(12, "the first chunk must be JSON")
+        );
+        assert_eq!(told(&made(12, &[])), byte(12, "there must be a chunk of JSON"));
+        assert_eq!(told(&made(0, &[])), byte(12, "there must be a chunk of JSON"));
+    }
+}

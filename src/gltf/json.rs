@@ -1,0 +1,349 @@
+//! From the text of a glTF file to [`Root`]: limits, what files in the wild get wrong and the crate is strict about, and the
+//! crate's own validation.
+
+use gltf::json::camera::Type;
+use gltf::json::validation::{Checked, Error, Validate as _};
+use gltf::json::{Path, Root};
+use serde_json::{Map, Number, Value};
+
+use super::error::{Fault, Place, shown};
+
+/// The longest text, in bytes. Data URIs make texts long.
+pub(super) const LARGEST_TEXT: usize = 512 << 20;
+/// The most objects of a text: each takes up to a kilobyte when it is read.
+const MOST_OBJECTS: usize = 2 << 20;
+/// The most values in all objects and lists of a text.
+const MOST_VALUES: usize = 32 << 20;
+
+/// Keys whose values are indices, or codes of OpenGL. The crate takes numbers of 64 bits for them, and of these the lower 32.
+const INDICES: &[&str] = &[
+    "attributes",
+    "buffer",
+    "bufferView",
+    "camera",
+    "children",
+    "componentType",
+    "index",
+    "indices",
+    "input",
+    "inverseBindMatrices",
+    "joints",
+    "light",
+    "magFilter",
+    "material",
+    "mesh",
+    "minFilter",
+    "mode",
+    "node",
+    "nodes",
+    "output",
+    "sampler",
+    "scene",
+    "skeleton",
+    "skin",
+    "source",
+    "target",
+    "targets",
+    "texCoord",
+    "wrapS",
+    "wrapT",
+];
+
+/// Reads a text. What a user should know is put into `notes`.
+pub(super) fn root(text: &[u8], notes: &mut Vec<String>) -> Result<Root, Fault> {
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    // Some writers pad the chunk of a container by zeros in place of spaces.
+    let text = text.trim_ascii_end().trim_suffix_zeros();
+    if text.len() > LARGEST_TEXT {
+        return Err(Fault::file(format!(
+            "the JSON has {} bytes; it must have at most {LARGEST_TEXT}",
+            text.len()
+        )));
+    }
+    check_size(text)?;
+    let mut value: Value = serde_json::from_slice(text).map_err(|error| {
+        let message = error.to_string();
+        let message = message.split(" at line ").next().unwrap_or_default();
+        Fault::new(Place::Line(error.line().max(1), error.column().max(1)), message)
+    })?;
+    let Value::Object(top) = &mut value else {
+        return Err(Fault::new(Place::Line(1, 1), "the JSON must be an object"));
+    };
+    check_version(top)?;
+    tidy(&mut value, None).map_err(|(key, rule)| Fault::key(key.trim_start_matches('.'), rule))?;
+    repair(&mut value, notes);
+    let root: Root = serde_path_to_error::deserialize(value).map_err(|error| {
+        let key = error.path().to_string();
+        Fault::key(key, error.into_inner().to_string())
+    })?;
+    check(&root)?;
+    Ok(root)
+}
+
+trait TrimZeros {
+    fn trim_suffix_zeros(&self) -> &[u8];
+}
+
+impl TrimZeros for [u8] {
+    fn trim_suffix_zeros(&self) -> &[u8] {
+        let end = self.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+        &self[..end]
+    }
+}
+
+/// Refuses a text that takes far more memory when it is read than it has bytes.
+fn check_size(text: &[u8]) -> Result<(), Fault> {
+    let (mut objects, mut values) = (0usize, 0usize);
+    let mut bytes = text.iter();
+    while let Some(byte) = bytes.next() {
+        match byte {
+            b'"' => {
+                // To the end of the string.
+                while let Some(byte) = bytes.next() {
+                    match byte {
+                        b'\\' => drop(bytes.next()),
+                        b'"' => break,
+                        _ => {}
+                    }
+                }
+            }
+            b'{' => objects += 1,
+            b'[' | b',' => values += 1,
+            _ => {}
+        }
+    }
+    let told = |count: usize, what: &str, most: usize| {
+        Fault::file(format!("the JSON has {count} {what}; it must have at most {most}"))
+    };
+    if objects > MOST_OBJECTS {
+        return Err(told(objects, "objects", MOST_OBJECTS));
+    }
+    match values > MOST_VALUES {
+        true => Err(told(values, "values", MOST_VALUES)),
+        false => Ok(()),
+    }
+}
+
+/// Checks what the file says of its version (specification, section 3.2), before anything else, as all else depends on it.
+fn check_version(top: &Map<String, Value>) -> Result<(), Fault> {
+    let asset = top.get("asset").and_then(Value::as_object);
+    let asset = asset.ok_or_else(|| Fault::key("asset", "it must be there, an object with the version"))?;
+    let number = |text: &str| {
+        let (major, minor) = text.split_once('.')?;
+        Some((major.parse::<u32>().ok()?, minor.parse::<u32>().ok()?))
+    };
+    let said = |key: &str| asset.get(key).filter(|value| !value.is_null());
+    let version = said("version").ok_or_else(|| Fault::key("asset.version", "it must be there"))?;
+    match version.as_str().and_then(number) {
+        Some((2, _)) => {}
+        _ => {
+            return Err(Fault::key(
+                "asset.version",
+                format!("{} must be \"2.x\"", told(version)),
+            ));
+        }
+    }
+    match said("minVersion") {
+        None => Ok(()),
+        Some(least) => match least.as_str().and_then(number) {
+            Some(least) if least <= (2, 0) => Ok(()),
+            _ => Err(Fault::key(
+                "asset.minVersion",
+                format!("{} must be at most \"2.0\", which is what is read", told(least)),
+            )),
+        },
+    }
+}
+
+fn told(value: &Value) -> String {
+    match value {
+        Value::String(text) => shown(text),
+        Value::Object(_) => "an object".to_owned(),
+        Value::Array(_) => "a list".to_owned(),
+        other => other.to_string(),
+    }
+}
+
+/// Drops `extras`, makes whole numbers of those that are written with a fraction of zero, and checks that every number is one
+/// in 32 bits. The parser has bounded how deep this goes. The error is a key and a rule.
+fn tidy(value: &mut Value, index: Option<&str>) -> Result<(), (String, String)> {
+    match value {
+        Value::Object(map) => {
+            map.remove("extras");
+            for (key, value) in map {
+                // What is inside of `attributes`, `targets` and the like is indices too.
+                let is_index = INDICES.contains(&key.as_str());
+                let inner = index.filter(|outer| ["attributes", "targets"].contains(outer));
+                let index = if is_index { Some(key.as_str()) } else { inner };
+                tidy(value, index).map_err(|(path, rule)| (format!(".{key}{path}"), rule))?;
+            }
+        }
+        Value::Array(list) => {
+            for (i, value) in list.iter_mut().enumerate() {
+                tidy(value, index).map_err(|(path, rule)| (format!("[{i}]{path}"), rule))?;
+            }
+        }
+        Value::Number(number) => {
+            if let Some(x) = number.as_f64().filter(|_| number.is_f64()) {
+                if !(x.abs() <= f64::from(f32::MAX)) {
+                    return Err((String::new(), format!("{x:e} must be a number of 32 bits")));
+                }
+                if x.fract() == 0.0 && (0.0..9.007_199_254_740_992e15).contains(&x) {
+                    *number = Number::from(x as u64);
+                }
+            }
+            let is_too_large = number.as_u64().is_some_and(|x| x > u64::from(u32::MAX));
+            if index.is_some() && is_too_large {
+                return Err((String::new(), format!("{number} must be at most {}", u32::MAX)));
+            }
+        }
+        Value::Null | Value::Bool(_) | Value::String(_) => {}
+    }
+    Ok(())
+}
+
+/// Makes what the specification allows, or writers get wrong in ways that everyone understands, into what the crate reads.
+fn repair(top: &mut Value, notes: &mut Vec<String>) {
+    for scene in list(top, "scenes") {
+        default(scene, "nodes", Value::Array(Vec::new()));
+    }
+    for view in list(top, "bufferViews") {
+        let is_none = |stride: &Value| stride.as_u64() == Some(0);
+        if let Value::Object(view) = view
+            && view.get("byteStride").is_some_and(is_none)
+        {
+            view.remove("byteStride");
+        }
+    }
+    let mut left_out = 0;
+    for animation in list(top, "animations") {
+        default(animation, "channels", Value::Array(Vec::new()));
+        default(animation, "samplers", Value::Array(Vec::new()));
+        if let Some(Value::Array(channels)) = animation.get_mut("channels") {
+            let count = channels.len();
+            channels.retain(|channel| !is_of_an_extension(channel));
+            left_out += count - channels.len();
+        }
+    }
+    if left_out > 0 {
+        let (what, moves) = match left_out {
+            1 => ("channel", "moves"),
+            _ => ("channels", "move"),
+        };
+        notes.push(format!(
+            "animations: {left_out} {what} that {moves} something else than a node are left out"
+        ));
+    }
+}
+
+/// Whether a channel is not the core's, and so is ignored (specification, section 3.11): `KHR_animation_pointer` has some.
+fn is_of_an_extension(channel: &Value) -> bool {
+    let Some(Value::Object(target)) = channel.get("target") else {
+        return false;
+    };
+    let core = ["translation", "rotation", "scale", "weights"];
+    let has_node = target.get("node").is_some_and(|node| !node.is_null());
+    let path = target.get("path").and_then(Value::as_str);
+    !has_node || path.is_some_and(|path| !core.contains(&path))
+}
+
+fn list<'a>(of: &'a mut Value, key: &str) -> &'a mut [Value] {
+    match of.get_mut(key) {
+        Some(Value::Array(list)) => list,
+        _ => &mut [],
+    }
+}
+
+fn default(of: &mut Value, key: &str, value: Value) {
+    if let Value::Object(map) = of
+        && map.get(key).is_none_or(Value::is_null)
+    {
+        map.insert(key.to_owned(), value);
+    }
+}
+
+/// Checks what other parts rely on: that every index is there, and that every word is known.
+fn check(root: &Root) -> Result<(), Fault> {
+    // The crate's validation takes these for granted.
+    for (i, mesh) in root.meshes.iter().enumerate() {
+        for (k, primitive) in mesh.primitives.iter().enumerate() {
+            for (name, accessor) in &primitive.attributes {
+                if accessor.value() >= root.accessors.len() {
+                    let key = format!("meshes[{i}].primitives[{k}].attributes.{}", name.to_string());
+                    return Err(missing(key, accessor.value(), root.accessors.len()));
+                }
+            }
+        }
+    }
+    for (i, animation) in root.animations.iter().enumerate() {
+        for (k, channel) in animation.channels.iter().enumerate() {
+            let node = channel.target.node.value();
+            if node >= root.nodes.len() {
+                let key = format!("animations[{i}].channels[{k}].target.node");
+                return Err(missing(key, node, root.nodes.len()));
+            }
+            if matches!(channel.target.path, Checked::Invalid) {
+                let key = format!("animations[{i}].channels[{k}].target.path");
+                return Err(Fault::key(key, "it must be a name that is known"));
+            }
+        }
+    }
+    for (i, camera) in root.cameras.iter().enumerate() {
+        let (is_there, name) = match camera.type_ {
+            Checked::Valid(Type::Perspective) => (camera.perspective.is_some(), "perspective"),
+            Checked::Valid(Type::Orthographic) => (camera.orthographic.is_some(), "orthographic"),
+            Checked::Invalid => continue,
+        };
+        if !is_there {
+            return Err(Fault::key(
+                format!("cameras[{i}].{name}"),
+                "it must be there, as that is its type",
+            ));
+        }
+    }
+    let mut first = None;
+    root.validate(root, Path::new, &mut |path, error| {
+        if first.is_none() {
+            let path = path().0;
+            if !is_allowed(&path, error) {
+                first = Some((path, error));
+            }
+        }
+    });
+    match first {
+        None => Ok(()),
+        Some((path, error)) => Err(Fault::key(
+            path,
+            match error {
+                Error::IndexOutOfBounds => "nothing has this index",
+                Error::Invalid => "it must be a value that is known",
+                Error::Missing => "it must be there",
+                Error::Oversize => "it must be a size that this machine can have",
+                Error::Unsupported => "it must be an extension that is known",
+            },
+        )),
+    }
+}
+
+pub(super) fn missing(key: impl Into<String>, index: usize, count: usize) -> Fault {
+    Fault::key(key, format!("{index} is not there; there are {count}, counted from 0"))
+}
+
+/// What the crate's validation says and is no error here.
+fn is_allowed(path: &str, error: Error) -> bool {
+    let is_in = |list: &str| path.starts_with(list);
+    match error {
+        // Extensions have a table of their own.
+        Error::Unsupported => is_in("extensionsRequired["),
+        // Accessors without data are zero; bounds are never trusted; a primitive without positions draws nothing.
+        Error::Missing => {
+            is_in("accessors[") && path.ends_with("].bufferView")
+                || is_in("meshes[") && path.contains("attributes[\"POSITION\"]")
+        }
+        // Names of attributes that are not the core's, and strides out of the range that is good for GPUs.
+        Error::Invalid => {
+            is_in("meshes[") && path.contains(".attributes[") || is_in("bufferViews[") && path.ends_with("].byteStride")
+        }
+        Error::IndexOutOfBounds | Error::Oversize => false,
+    }
+}

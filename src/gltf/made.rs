@@ -1,0 +1,58 @@
+//! Files for the tests, made in memory.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use super::document::Document;
+use super::error::Fault;
+
+/// A container with this JSON and this binary chunk.
+pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
+    let mut text = json.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let mut data = binary.to_vec();
+    data.resize(data.len().next_multiple_of(4), 0);
+    let length = 12 + 8 + text.len() + 8 + data.len();
+    let mut bytes = b"glTF".to_vec();
+    let word = |x: usize| (x as u32).to_le_bytes();
+    bytes.extend([word(2), word(length), word(text.len())].concat());
+    bytes.extend(b"JSON");
+    bytes.extend(text);
+    bytes.extend(word(data.len()));
+    bytes.extend(b"BIN\0");
+    bytes.extend(data);
+    bytes
+}
+
+/// Reads a file from memory, in a folder that is empty.
+pub fn read(bytes: Vec<u8>) -> Result<Document, Fault> {
+    Document::read(
+        bytes,
+        Path::new("/none/a.gltf"),
+        Path::new("/none"),
+        &mut BTreeSet::new(),
+    )
+}
+
+/// JSON of a file with one buffer in the container, and the views and accessors of it.
+pub fn json_of(binary: &[u8], views: Value, accessors: Value) -> Value {
+    json!({
+        "asset": { "version": "2.0" },
+        "buffers": [{ "byteLength": binary.len() }],
+        "bufferViews": views,
+        "accessors": accessors,
+    })
+}
+
+/// A document with these views and accessors of bytes.
+pub fn document(binary: &[u8], views: Value, accessors: Value) -> Document {
+    read(container(&json_of(binary, views, accessors), binary)).unwrap()
+}
+
+/// A document of one view, all bytes, and one accessor.
+pub fn accessor(binary: &[u8], accessor: Value) -> Document {
+    let views = json!([{ "buffer": 0, "byteLength": binary.len() }]);
+    document(binary, views, json!([accessor]))
+}

@@ -1,0 +1,549 @@
+//! Meshes: section 3.7, with morph targets and skins as they are at the time that is shown.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use ::gltf::json::mesh::{Mode, Primitive, Semantic};
+use ::gltf::json::validation::Checked;
+use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
+
+use super::document::Document;
+use super::error::GltfError;
+use super::material::{Materials, Used};
+use super::node::{Nodes, Pose};
+use super::skin::Skin;
+use super::tangent::{generated, unturned};
+use super::texture::LAST_SET;
+use crate::mesh::{Draft, Group, LARGEST_COORDINATE, Mesh, unit};
+
+/// The most triangles of all meshes together.
+const MOST_TRIANGLES: usize = 1 << 28;
+/// The most vertices of a mesh, those among them that no triangle has.
+const MOST_VERTICES: usize = 1 << 27;
+
+/// What tells meshes apart.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Key {
+    pub mesh: usize,
+    pub skin: Option<usize>,
+    /// The bits of the weights of its morph targets, if the node has some of its own.
+    weights: Option<Vec<u32>>,
+    /// The bits of the map to the scene, where that leaves so little of an axis that an instance cannot have it: then the vertices
+    /// have gone there.
+    flat: Option<[u64; 12]>,
+}
+
+impl Key {
+    /// The mesh of a node.
+    pub fn of(document: &Document, node: usize, mesh: usize, pose: &Pose) -> Key {
+        let weights = pose.weights.as_ref();
+        Key {
+            mesh,
+            skin: document.json.nodes[node].skin.map(|skin| skin.value()),
+            weights: weights.map(|all| all.iter().map(|weight| weight.to_bits()).collect()),
+            flat: None,
+        }
+    }
+
+    /// The mesh where a map takes its vertices.
+    pub fn at(&self, map: &DAffine3) -> Key {
+        Key {
+            flat: Some(map.to_cols_array().map(f64::to_bits)),
+            ..self.clone()
+        }
+    }
+
+    /// Whether it is such a mesh.
+    pub fn is_flat(&self) -> bool {
+        self.flat.is_some()
+    }
+
+    fn flat(&self) -> Option<DAffine3> {
+        self.flat
+            .map(|bits| DAffine3::from_cols_array(&bits.map(f64::from_bits)))
+    }
+
+    fn weights(&self, document: &Document) -> Vec<f32> {
+        match &self.weights {
+            Some(own) => own.iter().map(|bits| f32::from_bits(*bits)).collect(),
+            None => (document.json.meshes.get(self.mesh))
+                .and_then(|mesh| mesh.weights.clone())
+                .unwrap_or_default(),
+        }
+    }
+}
+
+/// A mesh, and for each of its groups the number of its material.
+pub struct Built {
+    pub mesh: Mesh,
+    pub materials: Vec<usize>,
+}
+
+/// The meshes that are shown.
+pub struct Meshes<'a> {
+    document: &'a Document,
+    /// The primitives of each that have triangles.
+    parts: BTreeMap<usize, Vec<Part<'a>>>,
+    points: usize,
+    lines: usize,
+    /// How many there are, of all meshes that are built by now.
+    triangles: AtomicUsize,
+}
+
+/// A primitive.
+struct Part<'a> {
+    primitive: &'a Primitive,
+    place: String,
+    mode: Mode,
+    material: usize,
+}
+
+impl<'a> Meshes<'a> {
+    /// Looks at the primitives of meshes, whose materials are in use from here on.
+    pub fn of<'k>(
+        document: &'a Document,
+        materials: &mut Materials,
+        keys: impl Iterator<Item = &'k Key>,
+    ) -> Result<Meshes<'a>, GltfError> {
+        let mut meshes = Meshes {
+            document,
+            parts: BTreeMap::new(),
+            points: 0,
+            lines: 0,
+            triangles: AtomicUsize::new(0),
+        };
+        for key in keys {
+            if meshes.parts.contains_key(&key.mesh) {
+                continue;
+            }
+            let Some(mesh) = document.json.meshes.get(key.mesh) else {
+                let count = document.json.meshes.len();
+                return Err(document.fault("nodes", format!("{} is no mesh; there are {count}", key.mesh)));
+            };
+            let mut parts = Vec::new();
+            for (i, primitive) in mesh.primitives.iter().enumerate() {
+                let place = format!("meshes[{}].primitives[{i}]", key.mesh);
+                let Checked::Valid(mode) = primitive.mode else {
+                    return Err(document.fault(format!("{place}.mode"), "must be from 0 to 6"));
+                };
+                match mode {
+                    Mode::Points => meshes.points += 1,
+                    Mode::Lines | Mode::LineLoop | Mode::LineStrip => meshes.lines += 1,
+                    _ if attribute(primitive, Semantic::Positions).is_none() => {} // has no form: section 3.7.2.1
+                    _ => {
+                        let is_colored = attribute(primitive, Semantic::Colors(0)).is_some();
+                        let material = materials.number(primitive, &place, is_colored)?;
+                        parts.push(Part {
+                            primitive,
+                            place,
+                            mode,
+                            material,
+                        });
+                    }
+                }
+            }
+            meshes.parts.insert(key.mesh, parts);
+        }
+        Ok(meshes)
+    }
+
+    /// What is left out.
+    pub fn notes(&self) -> impl Iterator<Item = String> {
+        let told = |count: usize, of: &str| match count {
+            0 => None,
+            1 => Some(format!("1 primitive of {of} is left out: triangles alone are rendered")),
+            _ => Some(format!(
+                "{count} primitives of {of} are left out: triangles alone are rendered"
+            )),
+        };
+        [told(self.points, "points"), told(self.lines, "lines")]
+            .into_iter()
+            .flatten()
+    }
+
+    /// Makes a mesh; None if it has no triangles.
+    pub fn build(&self, key: &Key, nodes: &Nodes, materials: &Materials) -> Result<Option<Built>, GltfError> {
+        let parts = self.parts.get(&key.mesh).map_or(&[][..], Vec::as_slice);
+        let skin = key.skin.map(|skin| Skin::of(self.document, skin, nodes)).transpose()?;
+        let mut whole = Whole::default();
+        let mut numbers = Vec::new();
+        for part in parts {
+            let used = materials.get(part.material);
+            let first = whole.vertices(self.document, part, used, key, skin.as_ref())?;
+            let count = whole.counts[&first];
+            let triangles = self.triangles(part, count)?;
+            let mirrors = key.flat().is_some_and(|map| map.matrix3.determinant() < 0.0);
+            let triangles = match mirrors {
+                true => triangles.into_iter().map(|[a, b, c]| [a, c, b]).collect(),
+                false => triangles,
+            };
+            let (first, triangles) = whole.with_tangents(part, used, first, triangles);
+            whole.draft.begin(numbers.len() as u32);
+            whole.draft.groups.push(Group {
+                name: numbers.len().to_string(),
+                material: None,
+            });
+            numbers.push(part.material);
+            let placed = triangles
+                .into_iter()
+                .map(|triangle| triangle.map(|vertex| vertex + first as u32));
+            whole.draft.triangles.extend(placed);
+        }
+        if whole.draft.triangles.is_empty() {
+            return Ok(None);
+        }
+        let place = || format!("meshes[{}]", key.mesh);
+        let sets = parts.iter().flat_map(|part| materials.get(part.material).sets.iter());
+        let most = sets.copied().max();
+        let mesh = whole.finish(most).map_err(|rule| self.document.fault(place(), rule))?;
+        // Not what is so small that a scene cannot have it.
+        let has_size = |mesh: &Mesh| {
+            let corners: Vec<DVec3> = mesh.corners().collect();
+            (corners[7] - corners[0]).max_element() >= 1e-9
+        };
+        let mesh = mesh.filter(|mesh| !key.is_flat() || has_size(mesh));
+        let built = mesh.map(|mesh| Built {
+            mesh,
+            materials: numbers,
+        });
+        Ok(built)
+    }
+
+    /// The triangles of a primitive with so many vertices.
+    fn triangles(&self, part: &Part, count: usize) -> Result<Vec<[u32; 3]>, GltfError> {
+        let indices = match part.primitive.indices {
+            Some(accessor) => self.document.indices(accessor.value())?,
+            None => (0..count as u32).collect(),
+        };
+        if let Some(beyond) = indices.iter().find(|index| **index as usize >= count) {
+            let rule = format!("{beyond} is no vertex; there are {count}");
+            return Err(self.document.fault(format!("{}.indices", part.place), rule));
+        }
+        let most = match part.mode {
+            Mode::TriangleStrip | Mode::TriangleFan => indices.len(),
+            _ => indices.len() / 3,
+        };
+        if self.triangles.fetch_add(most, Ordering::Relaxed).saturating_add(most) > MOST_TRIANGLES {
+            let rule = format!("all meshes together must have at most {MOST_TRIANGLES} triangles");
+            return Err(self.document.fault(&part.place, rule));
+        }
+        let windows = indices.windows(3);
+        Ok(match part.mode {
+            Mode::TriangleStrip => {
+                let turned = |(i, of): (usize, &[u32])| [of[0], of[1 + i % 2], of[2 - i % 2]];
+                windows.enumerate().map(turned).collect()
+            }
+            Mode::TriangleFan => {
+                let around = indices.get(1..).unwrap_or_default().windows(2);
+                around.map(|of| [of[0], of[1], indices[0]]).collect()
+            }
+            _ => indices.chunks_exact(3).map(|of| [of[0], of[1], of[2]]).collect(),
+        })
+    }
+}
+
+/// Takes a vertex where a map does. Normals go by the map's cofactors, which flat maps have too.
+fn carry(
+    map: &DAffine3,
+    i: usize,
+    positions: &mut [DVec3],
+    normals: Option<&mut Vec<Vec3>>,
+    tangents: Option<&mut Vec<Vec4>>,
+) {
+    let DMat3 { x_axis, y_axis, z_axis } = map.matrix3;
+    positions[i] = map.transform_point3(positions[i]);
+    if let Some(normals) = normals {
+        let cofactors = DMat3::from_cols(y_axis.cross(z_axis), z_axis.cross(x_axis), x_axis.cross(y_axis));
+        normals[i] = unit(cofactors * normals[i].as_dvec3());
+    }
+    if let Some(tangents) = tangents {
+        let along = unit(map.matrix3 * tangents[i].truncate().as_dvec3());
+        let side = if map.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
+        tangents[i] = along.extend(tangents[i].w * side);
+    }
+}
+
+/// The accessor of an attribute, if it is there.
+fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<usize> {
+    let accessor = primitive.attributes.get(&Checked::Valid(semantic));
+    accessor.map(|accessor| accessor.value())
+}
+
+/// A mesh that is being made of its primitives' vertices.
+#[derive(Default)]
+struct Whole {
+    draft: Draft,
+    /// All sets of texture coordinates, for as many vertices as the last primitive that has them reaches to.
+    uvs: Vec<Vec<Vec2>>,
+    /// The first vertices of what primitives share, by the accessors that they are from, and how many there are.
+    known: HashMap<Vec<usize>, usize>,
+    counts: HashMap<usize, usize>,
+}
+
+impl Whole {
+    /// Adds the vertices of a primitive, unless they are there; the number of the first.
+    fn vertices(
+        &mut self,
+        document: &Document,
+        part: &Part,
+        used: &Used,
+        key: &Key,
+        skin: Option<&Skin>,
+    ) -> Result<usize, GltfError> {
+        let primitive = part.primitive;
+        let mut accessors = accessors(primitive);
+        accessors.push(usize::from(used.tangents.is_some()));
+        // What is turned differently is not the same.
+        let is_plain = used.tangents.as_ref().is_none_or(|slot| !slot.is_turned());
+        if let Some(first) = self.known.get(&accessors).filter(|_| is_plain) {
+            return Ok(*first);
+        }
+        let fault = |key: &str, rule: String| document.fault(format!("{}.{key}", part.place), rule);
+        let read = |semantic: Semantic| attribute(primitive, semantic);
+        let first = self.draft.positions.len();
+        let Some(positions) = read(Semantic::Positions) else {
+            return Ok(first);
+        };
+        let mut positions: Vec<Vec3> = document
+            .vectors::<3>(positions)?
+            .into_iter()
+            .map(Vec3::from_array)
+            .collect();
+        let count = positions.len();
+        if first + count > MOST_VERTICES {
+            let rule = format!("all primitives of a mesh together must have at most {MOST_VERTICES} vertices");
+            return Err(fault("attributes.POSITION", rule));
+        }
+        let same = |name: &str, other: usize| match other == count {
+            true => Ok(()),
+            false => Err(fault(
+                &format!("attributes.{name}"),
+                format!("has {other} elements; POSITION has {count}"),
+            )),
+        };
+        let triples = |name: &str, accessor: Option<usize>| -> Result<Option<Vec<Vec3>>, GltfError> {
+            let Some(accessor) = accessor else { return Ok(None) };
+            let vectors = document.vectors::<3>(accessor)?;
+            same(name, vectors.len())?;
+            Ok(Some(vectors.into_iter().map(Vec3::from_array).collect()))
+        };
+        let mut normals = triples("NORMAL", read(Semantic::Normals))?;
+        let tangents = read(Semantic::Tangents).filter(|_| used.tangents.is_some() && normals.is_some());
+        let mut tangents = match tangents {
+            None => None,
+            Some(accessor) => {
+                let vectors = document.vectors::<4>(accessor)?;
+                same("TANGENT", vectors.len())?;
+                Some(vectors.into_iter().map(Vec4::from_array).collect::<Vec<Vec4>>())
+            }
+        };
+        for (target, weight) in primitive.targets.iter().flatten().zip(key.weights(document)) {
+            if weight == 0.0 {
+                continue;
+            }
+            let moved = |accessor: Option<usize>| triples("targets", accessor);
+            if let Some(moves) = moved(target.positions.map(|accessor| accessor.value()))? {
+                positions.iter_mut().zip(moves).for_each(|(p, d)| *p += d * weight);
+            }
+            if let Some((normals, moves)) = normals
+                .as_mut()
+                .zip(moved(target.normals.map(|accessor| accessor.value()))?)
+            {
+                normals.iter_mut().zip(moves).for_each(|(n, d)| *n += d * weight);
+            }
+            if let Some((tangents, moves)) = tangents
+                .as_mut()
+                .zip(moved(target.tangents.map(|accessor| accessor.value()))?)
+            {
+                (tangents.iter_mut().zip(moves)).for_each(|(t, d)| *t += (d * weight).extend(0.0));
+            }
+        }
+        let mut placed: Vec<DVec3> = positions.into_iter().map(|p| p.as_dvec3()).collect();
+        if let Some(skin) = skin {
+            let maps = skin.maps(document, primitive, &part.place, count)?;
+            for (i, map) in maps.iter().enumerate() {
+                carry(map, i, &mut placed, normals.as_mut(), tangents.as_mut());
+            }
+        }
+        if let Some(map) = key.flat() {
+            (0..count).for_each(|i| carry(&map, i, &mut placed, normals.as_mut(), tangents.as_mut()));
+        }
+        if let Some(i) = placed
+            .iter()
+            .position(|p| !(p.is_finite() && p.abs().max_element() <= LARGEST_COORDINATE))
+        {
+            let rule = format!("vertex {i} is at {}; coordinates must be from -1e9 to 1e9", placed[i]);
+            return Err(fault("attributes.POSITION", rule));
+        }
+        self.draft.positions.extend(placed.iter().map(|p| *p + DVec3::ZERO));
+        if let Some(normals) = normals {
+            self.draft.normals.resize(first, Vec3::ZERO);
+            self.draft
+                .normals
+                .extend(normals.into_iter().map(|normal| unit(normal.as_dvec3())));
+        }
+        if let Some(tangents) = tangents {
+            self.draft.tangents.resize(first, Vec4::ZERO);
+            let normals = &self.draft.normals[first..];
+            let slot = used.tangents.as_ref();
+            let along = tangents.into_iter().zip(normals).map(|(tangent, normal)| {
+                let side = if tangent.w < 0.0 { -1.0 } else { 1.0 };
+                let tangent = unit(tangent.truncate().as_dvec3()).extend(side);
+                slot.map_or(tangent, |slot| unturned(tangent, *normal, slot))
+            });
+            let along = along.map(|tangent| {
+                if tangent.truncate() == Vec3::ZERO {
+                    Vec4::ZERO
+                } else {
+                    tangent
+                }
+            });
+            self.draft.tangents.extend(along);
+        }
+        for set in 0..=LAST_SET {
+            let Some(accessor) = read(Semantic::TexCoords(set)) else {
+                continue;
+            };
+            let vectors = document.vectors::<2>(accessor)?;
+            same(&format!("TEXCOORD_{set}"), vectors.len())?;
+            let set = set as usize;
+            if self.uvs.len() <= set {
+                self.uvs.resize(set + 1, Vec::new());
+            }
+            let finite = |x: f32| if x.is_finite() { x } else { 0.0 };
+            self.uvs[set].resize(first, Vec2::ZERO);
+            // An image's first row is at v = 0 there, and at v = 1 here.
+            let turned = vectors.into_iter().map(|[u, v]| Vec2::new(finite(u), 1.0 - finite(v)));
+            self.uvs[set].extend(turned);
+        }
+        if let Some(accessor) = read(Semantic::Colors(0)) {
+            let colors: Vec<Vec4> = match document.components(accessor)? {
+                3 => document
+                    .vectors::<3>(accessor)?
+                    .into_iter()
+                    .map(|[r, g, b]| Vec4::new(r, g, b, 1.0))
+                    .collect(),
+                _ => document
+                    .vectors::<4>(accessor)?
+                    .into_iter()
+                    .map(Vec4::from_array)
+                    .collect(),
+            };
+            same("COLOR_0", colors.len())?;
+            let inside = |x: f32| if x > 0.0 { x.min(1.0) } else { 0.0 };
+            self.draft.colors.resize(first, Vec4::ONE);
+            let colors = colors
+                .into_iter()
+                .map(|color| Vec4::from_array(color.to_array().map(inside)));
+            self.draft.colors.extend(colors);
+        }
+        if is_plain {
+            self.known.insert(accessors, first);
+        }
+        self.counts.insert(first, count);
+        Ok(first)
+    }
+
+    /// The vertices of a primitive with tangents, made where its material needs some and the file has none. Then the vertices are
+    /// its own: where its triangles have different tangents, more than one stands for one of the file.
+    fn with_tangents(
+        &mut self,
+        part: &Part,
+        used: &Used,
+        first: usize,
+        triangles: Vec<[u32; 3]>,
+    ) -> (usize, Vec<[u32; 3]>) {
+        let has_tangents = attribute(part.primitive, Semantic::Tangents).is_some();
+        let has_normals = attribute(part.primitive, Semantic::Normals).is_some();
+        let Some(slot) = used.tangents.as_ref().filter(|_| has_normals && !has_tangents) else {
+            return (first, triangles);
+        };
+        let count = self.counts[&first];
+        let Some(uvs) = self.uvs.get(slot.set as usize).filter(|uvs| uvs.len() >= first + count) else {
+            return (first, triangles);
+        };
+        let range = first..first + count;
+        let positions = &self.draft.positions[range.clone()];
+        let Some(made) = generated(positions, &self.draft.normals[range.clone()], &uvs[range], &triangles) else {
+            return (first, triangles);
+        };
+        let from = |vertex: u32| first + vertex as usize;
+        let own = self.draft.positions.len();
+        self.draft.tangents.resize(own, Vec4::ZERO);
+        fn again<T: Copy>(list: &mut Vec<T>, own: usize, from: impl Iterator<Item = usize>) {
+            if list.len() >= own {
+                let copies: Vec<T> = from.map(|i| list[i]).collect();
+                list.extend(copies);
+            }
+        }
+        let origins = || made.origins.iter().map(|vertex| from(*vertex));
+        // Lists end where the last primitive that has them does.
+        let reach = |length: usize| length >= first + count;
+        if reach(self.draft.normals.len()) {
+            self.draft.normals.resize(own, Vec3::ZERO);
+        }
+        if reach(self.draft.colors.len()) {
+            self.draft.colors.resize(own, Vec4::ONE);
+        }
+        for uvs in &mut self.uvs {
+            if reach(uvs.len()) {
+                uvs.resize(own, Vec2::ZERO);
+                again(uvs, own, origins());
+            }
+        }
+        again(&mut self.draft.positions, own, origins());
+        again(&mut self.draft.normals, own, origins());
+        again(&mut self.draft.colors, own, origins());
+        self.draft.tangents.extend(&made.tangents);
+        self.counts.insert(own, made.origins.len());
+        (own, made.triangles)
+    }
+
+    /// The mesh; None if no triangle has an area. `most` is the last set of texture coordinates that a material needs.
+    fn finish(mut self, most: Option<u32>) -> Result<Option<Mesh>, String> {
+        let count = self.draft.positions.len();
+        let fill = |list: &mut Vec<Vec2>| list.resize(count, Vec2::ZERO);
+        if !self.draft.normals.is_empty() {
+            self.draft.normals.resize(count, Vec3::ZERO);
+        }
+        if !self.draft.colors.is_empty() {
+            self.draft.colors.resize(count, Vec4::ONE);
+        }
+        if !self.draft.tangents.is_empty() {
+            self.draft.tangents.resize(count, Vec4::ZERO);
+        }
+        // A texture needs coordinates: where there are none they are 0.
+        let sets = most.map_or(0, |most| most as usize + 1).max(self.uvs.len().min(1));
+        self.uvs.resize(sets, Vec::new());
+        self.uvs.iter_mut().for_each(fill);
+        let mut uvs = self.uvs.into_iter();
+        self.draft.uvs = uvs.next().unwrap_or_default();
+        self.draft.more_uvs = uvs.collect();
+        self.draft.finish()
+    }
+}
+
+/// The accessors of a primitive's vertices.
+fn accessors(primitive: &Primitive) -> Vec<usize> {
+    let none = usize::MAX;
+    let attributes = primitive.attributes.iter();
+    let mut all: Vec<usize> = attributes.map(|(_, accessor)| accessor.value()).collect();
+    for target in primitive.targets.iter().flatten() {
+        let of = [target.positions, target.normals, target.tangents];
+        all.extend(of.map(|accessor| accessor.map_or(none, |accessor| accessor.value())));
+    }
+    // Two primitives may have the same accessors for different attributes.
+    let names = primitive.attributes.keys().map(|name| match name {
+        Checked::Valid(Semantic::Positions) => 0,
+        Checked::Valid(Semantic::Normals) => 1,
+        Checked::Valid(Semantic::Tangents) => 2,
+        Checked::Valid(Semantic::Colors(i)) => 16 + 8 * *i as usize,
+        Checked::Valid(Semantic::TexCoords(i)) => 17 + 8 * *i as usize,
+        Checked::Valid(Semantic::Joints(i)) => 18 + 8 * *i as usize,
+        Checked::Valid(Semantic::Weights(i)) => 19 + 8 * *i as usize,
+        _ => none,
+    });
+    let names: Vec<usize> = names.collect();
+    all.extend(names);
+    all
+}

@@ -1,0 +1,163 @@
+//! Mode 0 of the bitstream, attributes: bytes of elements, as what they differ by from those of the element before
+//! (`KHR_meshopt_compression`, appendix A).
+
+use super::{TOO_LONG, TOO_SHORT};
+
+/// The elements of a group, whose deltas have one width.
+const GROUP: usize = 16;
+/// The most elements of a block.
+const BLOCK: usize = 256;
+
+/// The widths of deltas in bits that two bits choose among: of version 0, and of the control modes 0 and 1.
+const WIDTHS: [[u32; 4]; 3] = [[0, 2, 4, 8], [0, 1, 2, 4], [1, 2, 4, 8]];
+
+/// How four bytes of an element follow from those of the one before.
+#[derive(Clone, Copy)]
+enum Channel {
+    Bytes,
+    Pairs,
+    /// Rotated by so many bits.
+    Xor(u32),
+}
+
+/// Decodes `count` elements of `stride` bytes, a multiple of 4 and at most 256.
+pub(super) fn attributes(stream: &[u8], count: usize, stride: usize) -> Result<Vec<u8>, &'static str> {
+    let (version, channels, smallest_tail) = match stream.first() {
+        Some(0xa0) => (0, 0, 32),
+        Some(0xa1) => (1, stride / 4, 24),
+        _ => return Err("the stream must begin with the byte 0xa0 or 0xa1"),
+    };
+    let tail = (stride + channels).max(smallest_tail);
+    let Some(end) = stream.len().checked_sub(tail).filter(|end| *end >= 1) else {
+        return Err(TOO_SHORT);
+    };
+    let mut data = &stream[1..end];
+    let (rest, modes) = stream.split_at(stream.len() - channels);
+    let mut last = [0; 256];
+    last[..stride].copy_from_slice(&rest[rest.len() - stride..]);
+    let mut kinds = [Channel::Bytes; 64];
+    for (kind, mode) in kinds.iter_mut().zip(modes) {
+        *kind = match (mode & 15, mode >> 4) {
+            (0, 0) => Channel::Bytes,
+            (1, 0) => Channel::Pairs,
+            (2, bits) => Channel::Xor(u32::from(bits)),
+            _ => return Err("the modes of the stream's channels must be 0, 1 or 2, only the last with a rotation"),
+        };
+    }
+    let most = ((8192 / stride) & !(GROUP - 1)).min(BLOCK);
+    // A block has a byte for four of an element at least, or else a file of no size could ask for any memory.
+    if count.div_ceil(most).saturating_mul(stride / 4) > data.len() {
+        return Err(TOO_SHORT);
+    }
+    let mut elements = vec![0; count * stride];
+    for block in elements.chunks_mut(most * stride) {
+        let length = block.len() / stride;
+        let groups = length.div_ceil(GROUP);
+        let controls = match version {
+            0 => &[],
+            _ => take(&mut data, stride / 4)?,
+        };
+        for (channel, kind) in kinds[..stride / 4].iter().enumerate() {
+            let mut deltas = [[0; BLOCK]; 4];
+            for (k, deltas) in deltas.iter_mut().enumerate() {
+                let widths = match controls.get(channel).map(|control| control >> (2 * k) & 3) {
+                    None => WIDTHS[0],
+                    Some(0) => WIDTHS[1],
+                    Some(1) => WIDTHS[2],
+                    Some(2) => continue, // zeros
+                    Some(_) => {
+                        deltas[..length].copy_from_slice(take(&mut data, length)?);
+                        continue;
+                    }
+                };
+                let headers = take(&mut data, groups.div_ceil(4))?;
+                for (i, group) in deltas.as_chunks_mut::<GROUP>().0[..groups].iter_mut().enumerate() {
+                    let width = widths[usize::from(headers[i / 4] >> (2 * (i % 4)) & 3)];
+                    *group = read_group(&mut data, width)?;
+                }
+            }
+            let at = 4 * channel;
+            let before = [last[at], last[at + 1], last[at + 2], last[at + 3]];
+            let after = undo(*kind, &deltas, before, &mut block[at..], stride, length);
+            last[at..at + 4].copy_from_slice(&after);
+        }
+    }
+    match data.is_empty() {
+        true => Ok(elements),
+        false => Err(TOO_LONG),
+    }
+}
+
+/// The next so many bytes.
+fn take<'a>(data: &mut &'a [u8], count: usize) -> Result<&'a [u8], &'static str> {
+    let (taken, rest) = data.split_at_checked(count).ok_or(TOO_SHORT)?;
+    *data = rest;
+    Ok(taken)
+}
+
+/// The deltas of a group: each in `width` bits, or, where all of these are ones, in a byte that follows them.
+fn read_group(data: &mut &[u8], width: u32) -> Result<[u8; GROUP], &'static str> {
+    let mut deltas = [0; GROUP];
+    if width == 0 {
+        return Ok(deltas);
+    }
+    let packed = take(data, 2 * width as usize)?;
+    if width == 8 {
+        deltas.copy_from_slice(packed);
+        return Ok(deltas);
+    }
+    let most = (1 << width) - 1;
+    let each = 8 / width;
+    for (i, delta) in deltas.iter_mut().enumerate() {
+        let i = i as u32;
+        let byte = packed[(i / each) as usize];
+        let place = i % each;
+        // Single bits begin at the lowest of a byte, others at the highest.
+        let shift = if width == 1 { place } else { 8 - width * (place + 1) };
+        *delta = byte >> shift & most;
+    }
+    for delta in &mut deltas {
+        if *delta == most {
+            *delta = take(data, 1)?[0];
+        }
+    }
+    Ok(deltas)
+}
+
+/// Puts four bytes of each element in their places, and gives those of the last.
+fn undo(
+    kind: Channel,
+    deltas: &[[u8; BLOCK]; 4],
+    before: [u8; 4],
+    places: &mut [u8],
+    stride: usize,
+    length: usize,
+) -> [u8; 4] {
+    let mut now = before;
+    for (i, place) in places.chunks_mut(stride).take(length).enumerate() {
+        let delta = [deltas[0][i], deltas[1][i], deltas[2][i], deltas[3][i]];
+        now = match kind {
+            Channel::Bytes => std::array::from_fn(|k| {
+                let delta = (delta[k] >> 1) ^ (delta[k] & 1).wrapping_neg();
+                now[k].wrapping_add(delta)
+            }),
+            Channel::Pairs => {
+                let pair = |k: usize| {
+                    let delta = u16::from_le_bytes([delta[k], delta[k + 1]]);
+                    let delta = (delta >> 1) ^ (delta & 1).wrapping_neg();
+                    u16::from_le_bytes([now[k], now[k + 1]])
+                        .wrapping_add(delta)
+                        .to_le_bytes()
+                };
+                let ([a, b], [c, d]) = (pair(0), pair(2));
+                [a, b, c, d]
+            }
+            Channel::Xor(bits) => {
+                let delta = u32::from_le_bytes(delta).rotate_right(bits);
+                (u32::from_le_bytes(now) ^ delta).to_le_bytes()
+            }
+        };
+        place[..4].copy_from_slice(&now);
+    }
+    now
+}

@@ -1,0 +1,150 @@
+//! Views of buffers that are compressed by `EXT_meshopt_compression` or `KHR_meshopt_compression` (Khronos Group, the
+//! extensions' specifications; the second has all of the first).
+//!
+//! Not by the crate `meshopt-rs` 0.1.2, which knows version 0 of the bitstream alone and has none of the filters' checks.
+
+mod attributes;
+mod filter;
+mod indices;
+
+use serde::Deserialize;
+use serde_json::{Map, Value};
+
+use self::filter::Filter;
+use super::error::{Fault, shown};
+
+/// The extensions' names, the one that goes first before the other.
+const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
+
+/// What the extension says of a view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Compressed {
+    /// Which of the two names it goes by.
+    pub name: &'static str,
+    /// The buffer with the stream.
+    pub buffer: usize,
+    pub offset: u64,
+    pub length: u64,
+    stride: usize,
+    count: usize,
+    mode: Mode,
+    filter: Filter,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Attributes,
+    Triangles,
+    Indices,
+}
+
+/// As the JSON has it.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Said {
+    buffer: u32,
+    #[serde(default)]
+    byte_offset: u64,
+    byte_length: u64,
+    byte_stride: u64,
+    count: u64,
+    mode: String,
+    #[serde(default)]
+    filter: Option<String>,
+}
+
+/// What a view's extensions say of its compression. `length` is how many bytes the view has.
+pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) -> Result<Option<Compressed>, Fault> {
+    let Some((name, said)) = NAMES.iter().find_map(|name| Some((*name, others.get(*name)?))) else {
+        return Ok(None);
+    };
+    let key = format!("{key}.extensions.{name}");
+    let said: Said = serde_path_to_error::deserialize(said)
+        .map_err(|error| Fault::key(format!("{key}.{}", error.path()), error.inner().to_string()))?;
+    let fault = |field: &str, value: &dyn std::fmt::Display, rule: &str| {
+        Err(Fault::key(format!("{key}.{field}"), format!("{value} {rule}")))
+    };
+    let stride = said.byte_stride;
+    let mode = match said.mode.as_str() {
+        "ATTRIBUTES" => Mode::Attributes,
+        "TRIANGLES" => Mode::Triangles,
+        "INDICES" => Mode::Indices,
+        other => return fault("mode", &shown(other), "must be ATTRIBUTES, TRIANGLES or INDICES"),
+    };
+    let filter = match said.filter.as_deref().unwrap_or("NONE") {
+        "NONE" => Filter::None,
+        "OCTAHEDRAL" => Filter::Octahedral,
+        "QUATERNION" => Filter::Quaternion,
+        "EXPONENTIAL" => Filter::Exponential,
+        "COLOR" => Filter::Color,
+        other => {
+            let rule = "must be NONE, OCTAHEDRAL, QUATERNION, EXPONENTIAL or COLOR";
+            return fault("filter", &shown(other), rule);
+        }
+    };
+    let rule = match mode {
+        Mode::Attributes if !(4..=256).contains(&stride) || !stride.is_multiple_of(4) => {
+            "must be a multiple of 4, from 4 to 256"
+        }
+        Mode::Triangles | Mode::Indices if stride != 2 && stride != 4 => "must be 2 or 4, as these are indices",
+        _ => match filter {
+            Filter::Octahedral | Filter::Color if stride != 4 && stride != 8 => "must be 4 or 8 for this filter",
+            Filter::Quaternion if stride != 8 => "must be 8 for this filter",
+            _ => "",
+        },
+    };
+    if !rule.is_empty() {
+        return fault("byteStride", &stride, rule);
+    }
+    if mode != Mode::Attributes && filter != Filter::None {
+        return fault("filter", &"a filter", "must go with the mode ATTRIBUTES");
+    }
+    if mode == Mode::Triangles && !said.count.is_multiple_of(3) {
+        return fault("count", &said.count, "must be a multiple of 3");
+    }
+    if said.count.checked_mul(stride) != Some(length) {
+        let rule = format!("elements of {stride} bytes must be the {length} bytes of the view");
+        return fault("count", &said.count, &rule);
+    }
+    let Ok(count) = usize::try_from(said.count) else {
+        return fault("count", &said.count, "must be a size that this machine can have");
+    };
+    Ok(Some(Compressed {
+        name,
+        buffer: said.buffer as usize,
+        offset: said.byte_offset,
+        length: said.byte_length,
+        stride: stride as usize,
+        count,
+        mode,
+        filter,
+    }))
+}
+
+impl Compressed {
+    /// How many bytes the view has.
+    pub fn size(&self) -> u64 {
+        self.count as u64 * self.stride as u64
+    }
+
+    /// Decodes the stream. The error is the rule that it breaks.
+    pub fn decode(&self, stream: &[u8]) -> Result<Vec<u8>, &'static str> {
+        match self.mode {
+            Mode::Triangles => indices::triangles(stream, self.count, self.stride),
+            Mode::Indices => indices::indices(stream, self.count, self.stride),
+            Mode::Attributes => {
+                let mut bytes = attributes::attributes(stream, self.count, self.stride)?;
+                self.filter.apply(&mut bytes, self.stride);
+                Ok(bytes)
+            }
+        }
+    }
+}
+
+/// A stream that has fewer bytes than its elements need.
+const TOO_SHORT: &str = "the stream must have bytes for all elements";
+/// A stream that has more.
+const TOO_LONG: &str = "the stream must end where its elements end";
+
+#[cfg(test)]
+mod tests;

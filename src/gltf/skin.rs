@@ -1,0 +1,104 @@
+//! Skins: section 3.7.3. A vertex goes with its joints, wherever the node of its mesh is.
+
+use ::gltf::json::mesh::{Primitive, Semantic};
+use ::gltf::json::validation::Checked;
+use glam::{DAffine3, DMat4};
+
+use super::document::Document;
+use super::error::GltfError;
+use super::node::Nodes;
+
+/// The joints of a skin, as maps from the mesh's coordinates to the scene's.
+pub struct Skin {
+    joints: Vec<DAffine3>,
+}
+
+impl Skin {
+    pub fn of(document: &Document, number: usize, nodes: &Nodes) -> Result<Skin, GltfError> {
+        let Some(skin) = document.json.skins.get(number) else {
+            let count = document.json.skins.len();
+            return Err(document.fault("nodes", format!("{number} is no skin; there are {count}")));
+        };
+        let place = |key: &str| format!("skins[{number}].{key}");
+        let bind = match skin.inverse_bind_matrices {
+            None => vec![DAffine3::IDENTITY; skin.joints.len()],
+            Some(accessor) => {
+                let matrices = document.vectors::<16>(accessor.value())?;
+                let map = |of: [f32; 16]| DAffine3::from_mat4(DMat4::from_cols_array(&of.map(f64::from)));
+                matrices.into_iter().map(map).collect()
+            }
+        };
+        if bind.len() < skin.joints.len() {
+            let (has, joints) = (bind.len(), skin.joints.len());
+            let rule = format!("has {has} matrices for {joints} joints; it must have one for each");
+            return Err(document.fault(place("inverseBindMatrices"), rule));
+        }
+        let mut joints = Vec::with_capacity(skin.joints.len());
+        for (joint, bind) in skin.joints.iter().zip(bind) {
+            match nodes.globals.get(joint.value()) {
+                Some(global) => joints.push(*global * bind),
+                None => {
+                    let rule = format!("{} is no node; there are {}", joint.value(), nodes.globals.len());
+                    return Err(document.fault(place("joints"), rule));
+                }
+            }
+        }
+        Ok(Skin { joints })
+    }
+
+    /// The map of each vertex of a primitive: the mean of its joints', by their weights.
+    pub fn maps(
+        &self,
+        document: &Document,
+        primitive: &Primitive,
+        place: &str,
+        count: usize,
+    ) -> Result<Vec<DAffine3>, GltfError> {
+        let fault = |key: String, rule: String| document.fault(format!("{place}.attributes.{key}"), rule);
+        let accessor = |semantic: Semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(|i| i.value());
+        let mut sums = vec![(DAffine3::ZERO, 0.0); count];
+        for set in 0.. {
+            let (Some(joints), Some(weights)) = (accessor(Semantic::Joints(set)), accessor(Semantic::Weights(set)))
+            else {
+                break;
+            };
+            let (joints, weights) = (document.vectors::<4>(joints)?, document.vectors::<4>(weights)?);
+            if joints.len() != count || weights.len() != count {
+                let rule = format!(
+                    "has {} elements, WEIGHTS_{set} {}; POSITION has {count}",
+                    joints.len(),
+                    weights.len()
+                );
+                return Err(fault(format!("JOINTS_{set}"), rule));
+            }
+            for (sum, (joints, weights)) in sums.iter_mut().zip(joints.iter().zip(&weights)) {
+                for (joint, weight) in joints.iter().zip(weights) {
+                    if *weight == 0.0 {
+                        continue;
+                    }
+                    if !weight.is_finite() {
+                        let rule = format!("has the weight {weight}; weights must be finite");
+                        return Err(fault(format!("WEIGHTS_{set}"), rule));
+                    }
+                    let Some(map) = self.joints.get(*joint as usize) else {
+                        let rule = format!("{joint} is no joint of the skin, which has {}", self.joints.len());
+                        return Err(fault(format!("JOINTS_{set}"), rule));
+                    };
+                    let weight = f64::from(*weight);
+                    sum.0.matrix3 += map.matrix3 * weight;
+                    sum.0.translation += map.translation * weight;
+                    sum.1 += weight;
+                }
+            }
+        }
+        let mean = |(sum, weight): (DAffine3, f64)| match weight > 0.0 {
+            // Weights that are rounded do not add up to 1.
+            true => DAffine3 {
+                matrix3: sum.matrix3 * (1.0 / weight),
+                translation: sum.translation / weight,
+            },
+            false => DAffine3::IDENTITY,
+        };
+        Ok(sums.into_iter().map(mean).collect())
+    }
+}

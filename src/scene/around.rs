@@ -1,0 +1,284 @@
+//! What surrounds a scene and what its camera sees there, in place of what its file says.
+
+use std::str::FromStr;
+
+use glam::DVec3;
+
+use super::error::{At, Problem};
+use super::image_file::srgb_to_linear;
+use super::validate::color;
+use super::{Description, EnvironmentDescription, EnvironmentName, Integrator};
+
+/// What the camera sees where nothing is, in place of what surrounds the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Background {
+    /// Nothing: the picture is transparent there. For [`Integrator::Path`] alone.
+    Transparent,
+    /// This radiance, in linear RGB.
+    Color(DVec3),
+}
+
+/// Puts other surroundings around a scene. Whether the camera sees them stays.
+pub(super) fn surround(description: &mut Description, environment: &EnvironmentDescription) {
+    let before = description.environment.take();
+    let (visible, background) = before.map_or((true, None), |before| (before.visible, before.background));
+    description.environment = Some(EnvironmentDescription {
+        visible,
+        background: environment.background.or(background),
+        ..environment.clone()
+    });
+    description.render.background = DVec3::ZERO;
+}
+
+impl Background {
+    /// Lets the camera see this. The scene is lit as before.
+    pub(super) fn show(self, description: &mut Description) -> Result<(), Problem> {
+        let render = &mut description.render;
+        let is_path = render.integrator == Integrator::Path;
+        match self {
+            Background::Transparent if is_path => {
+                render.alpha = Some(true);
+                if let Some(environment) = &mut description.environment {
+                    environment.background = None;
+                }
+            }
+            Background::Transparent => return Err(Problem::new("none needs integrator = \"path\"")),
+            Background::Color(seen) => {
+                let seen = color(seen)?;
+                if !is_path {
+                    render.background = seen;
+                    return Ok(());
+                }
+                render.alpha = None;
+                let light = &mut render.background;
+                let plain = || EnvironmentDescription::new(std::mem::take(light));
+                let environment = description.environment.get_or_insert_with(plain);
+                environment.background = Some(seen);
+                environment.visible = true;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A problem of the surroundings that stand in for a scene's, as one of the option.
+pub(super) fn of_option(problem: Problem) -> Result<Problem, Problem> {
+    let key = problem.key.to_string();
+    match key.strip_prefix("environment") {
+        Some("" | ".color" | ".file") => Ok(Problem::new(problem.message).at("environment")),
+        _ => Err(problem),
+    }
+}
+
+impl FromStr for Background {
+    type Err = String;
+
+    /// `none`, or a colour.
+    fn from_str(text: &str) -> Result<Background, String> {
+        match (text, color_of(text)) {
+            ("none", _) => Ok(Background::Transparent),
+            (_, Some(color)) => Ok(Background::Color(color)),
+            _ => Err(format!("must be none or a colour, {COLOR}")),
+        }
+    }
+}
+
+impl FromStr for EnvironmentDescription {
+    type Err = String;
+
+    /// One of the program's own by its name, a colour, or else an image by its path, relative to the current folder.
+    fn from_str(text: &str) -> Result<EnvironmentDescription, String> {
+        let own = EnvironmentName::ALL.into_iter().find(|name| name.name() == text);
+        if let Some(name) = own {
+            return Ok(EnvironmentDescription::named(name));
+        }
+        if let Some(color) = color_of(text) {
+            return Ok(EnvironmentDescription::new(color));
+        }
+        let rule = || format!("must be studio, sky, an image file or a colour, {COLOR}");
+        if text.starts_with('#') {
+            return Err(rule());
+        }
+        let path = std::path::absolute(text).map_err(|_| rule())?;
+        let path = path.to_str().ok_or("the current folder's name must be UTF-8")?;
+        Ok(EnvironmentDescription::image(path))
+    }
+}
+
+/// What colours are like, in messages.
+const COLOR: &str = "such as #ff8000 as displays have it, or 1,0.2,0 as linear light";
+
+/// `#rrggbb` by sRGB's curve, or three linear numbers.
+fn color_of(text: &str) -> Option<DVec3> {
+    if let Some(digits) = text.strip_prefix('#') {
+        let is_hex = digits.len() == 6 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+        let whole = u32::from_str_radix(digits, 16).ok().filter(|_| is_hex)?;
+        let [_, rgb @ ..] = whole.to_be_bytes();
+        return Some(DVec3::from_array(
+            rgb.map(|value| srgb_to_linear(f64::from(value) / 255.0)),
+        ));
+    }
+    let numbers: Vec<f64> = text
+        .split(',')
+        .map(|number| number.trim().parse().ok())
+        .collect::<Option<_>>()?;
+    Some(DVec3::from_array(numbers.try_into().ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Overrides, Scene, SceneError};
+
+    const SCENE: &str = "\
+image = { width = 4, height = 3 }
+camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
+";
+
+    fn load(more: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
+        Scene::parse_with(&format!("{SCENE}{more}"), "s.toml", overrides)
+    }
+
+    #[test]
+    fn colours_are_those_of_displays_or_light() {
+        let shown = |text: &str| match text.parse::<Background>() {
+            Ok(Background::Color(color)) => color.to_array(),
+            other => panic!("{text}: {other:?}"),
+        };
+        assert_eq!(shown("#ffffff"), [1.0; 3]);
+        assert_eq!(shown("#000000"), [0.0; 3]);
+        assert_eq!(shown("1,0.25, 20"), [1.0, 0.25, 20.0]);
+        // IEC 61966-2-1 by hand: 0x80 is 128 / 255 = 0.50196, and ((0.50196 + 0.055) / 1.055)^2.4 = 0.21586.
+        let [r, g, b] = shown("#8000Ff");
+        assert!((r - 0.21586).abs() < 1e-5 && g == 0.0 && b == 1.0, "{r} {g} {b}");
+        assert_eq!("none".parse(), Ok(Background::Transparent));
+        for bad in [
+            "", "#", "#fff", "#12345g", "#+12345", "#1234567", "1,2", "1,2,3,4", "1,2,x", "white", "None",
+        ] {
+            let told = bad.parse::<Background>().unwrap_err();
+            assert!(
+                told.starts_with("must be none or a colour, such as #ff8000"),
+                "{bad}: {told}"
+            );
+        }
+    }
+
+    #[test]
+    fn surroundings_are_named_coloured_or_files() {
+        let around = |text: &str| text.parse::<EnvironmentDescription>().unwrap();
+        assert_eq!(around("studio"), EnvironmentDescription::named(EnvironmentName::Studio));
+        assert_eq!(around("sky"), EnvironmentDescription::named(EnvironmentName::Sky));
+        assert_eq!(around("1,2,3"), EnvironmentDescription::new([1.0, 2.0, 3.0]));
+        let here = std::env::current_dir().unwrap();
+        for (text, path) in [("./studio", "studio"), ("a/b.hdr", "a/b.hdr"), ("1,2", "1,2")] {
+            let file = around(text).file.unwrap();
+            assert_eq!(std::path::Path::new(&file), here.join(path));
+        }
+        for bad in ["", "#ff"] {
+            let told = bad.parse::<EnvironmentDescription>().unwrap_err();
+            assert!(
+                told.starts_with("must be studio, sky, an image file or a colour"),
+                "{told}"
+            );
+        }
+    }
+
+    #[test]
+    fn other_surroundings_light_and_other_backgrounds_are_seen() {
+        let path = "render = { integrator = 'path', alpha = true, background = [1, 2, 3] }\n";
+        let color = |color: [f64; 3]| Some(Background::Color(color.into()));
+        let with = |environment: Option<&str>, background| Overrides {
+            environment: environment.map(|text| text.parse().unwrap()),
+            background,
+            ..Overrides::default()
+        };
+        let found = |more: &str, overrides: &Overrides| {
+            let scene = load(more, overrides).unwrap();
+            let around = scene
+                .environment
+                .map(|around| (around.color.to_array(), around.visible, around.background));
+            (around, scene.render.alpha)
+        };
+        let (light, red) = ([1.0, 2.0, 3.0], [1.0, 0.0, 0.0]);
+        assert_eq!(found(path, &with(None, None)), (Some((light, true, None)), true));
+        let seen = Some(DVec3::from(red));
+        assert_eq!(found(path, &with(None, color(red))), (Some((light, true, seen)), false));
+        let other = Some(([0.5; 3], true, None));
+        assert_eq!(found(path, &with(Some("0.5,0.5,0.5"), None)), (other, true));
+        assert_eq!(
+            found(path, &with(Some("0.5,0.5,0.5"), color(red))),
+            (Some(([0.5; 3], true, seen)), false)
+        );
+        let opaque = path.replace("alpha = true, ", "");
+        let clear = with(None, Some(Background::Transparent));
+        assert_eq!(found(&opaque, &clear), (Some((light, true, None)), true));
+        // A background is seen where nothing lights, and where what lights was not seen.
+        let dark = "render.integrator = 'path'\n";
+        assert_eq!(
+            found(dark, &with(None, color(red))),
+            (Some(([0.0; 3], true, seen)), false)
+        );
+        assert_eq!(found(dark, &with(None, color([0.0; 3]))), (None, false));
+        let unseen = format!("{dark}environment = {{ color = [1, 2, 3], visible = false }}\n");
+        assert_eq!(found(&unseen, &with(None, None)), (Some((light, false, None)), false));
+        assert_eq!(
+            found(&unseen, &with(Some("0.5,0.5,0.5"), None)),
+            (Some(([0.5; 3], false, None)), false)
+        );
+        assert_eq!(
+            found(&unseen, &with(None, color(red))),
+            (Some((light, true, seen)), false)
+        );
+        // Direct light has a background of its own.
+        let scene = load("render.background = [1, 2, 3]\n", &with(None, color(red))).unwrap();
+        assert_eq!((scene.render.background.to_array(), scene.environment), (red, None));
+    }
+
+    #[test]
+    fn bad_surroundings_are_told_as_the_options_that_they_are() {
+        let told = |more: &str, environment: Option<&str>, background: Option<&str>| {
+            let overrides = Overrides {
+                environment: environment.map(|text| text.parse().unwrap()),
+                background: background.map(|text| text.parse().unwrap()),
+                ..Overrides::default()
+            };
+            load(more, &overrides).unwrap_err()
+        };
+        let path = "render.integrator = 'path'\n";
+        for (more, environment, background, wanted) in [
+            ("", Some("sky"), None, "environment: needs integrator = \"path\""),
+            ("", None, Some("none"), "background: none needs integrator = \"path\""),
+            ("", None, Some("1,2,-1"), "background: -1 must be finite, from 0 to 1e6"),
+            (
+                path,
+                None,
+                Some("nan,2,1"),
+                "background: nan must be finite, from 0 to 1e6",
+            ),
+            (
+                path,
+                Some("1,2e6,0"),
+                None,
+                "environment: 2e6 must be finite, from 0 to 1e6",
+            ),
+            (
+                path,
+                Some("/nowhere/room.hdr"),
+                None,
+                "environment: \"/nowhere/room.hdr\" cannot be read: ",
+            ),
+        ] {
+            let error = told(more, environment, background);
+            assert!(matches!(error, SceneError::Override(_)), "{error}");
+            assert!(error.to_string().starts_with(wanted), "{error}: {wanted}");
+        }
+        // What the file says is its own.
+        let error = told(
+            &format!("{path}materials.a = {{ type = 'glass', ior = 0 }}\n"),
+            Some("sky"),
+            None,
+        );
+        assert!(error.to_string().starts_with("s.toml:4: materials.a.ior"), "{error}");
+    }
+}

@@ -1,0 +1,254 @@
+//! Shapes of type `gltf` as what they stand for: meshes in memory and their instances, textures of images in memory, materials
+//! and lights. What is behind this knows nothing of glTF.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+
+use super::super::error::{At, Problem, Segment, cut};
+use super::super::image_file::Place;
+use super::super::parse::list;
+use super::super::validate::placement;
+use super::super::{
+    Assets, ColorDescription, Description, GltfDescription, InstanceDescription, LightDescription, MaterialDescription,
+    MeshFileDescription, NormalMapDescription, ShapeDescription, TextureDescription, ValueDescription,
+};
+use super::fitting::longest_side;
+use crate::gltf::{Choice, Imported, load};
+
+/// A description without glTF files, and what it names.
+pub struct Expanded {
+    pub description: Description,
+    pub assets: Assets,
+    /// What a user should know of the files.
+    pub notes: Vec<String>,
+    /// The files as they were read, which are kept as long as the scene is.
+    pub imported: Vec<Arc<Imported>>,
+    origins: Vec<Origin>,
+}
+
+/// What a shape brought.
+struct Origin {
+    shape: usize,
+    /// With which the names of its meshes, materials and textures begin.
+    prefix: String,
+    instances: Range<usize>,
+    lights: Range<usize>,
+}
+
+impl Expanded {
+    /// Reads the files that shapes of type `gltf` name.
+    pub fn of(description: &Description, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Expanded, Problem> {
+        let mut expanded = Expanded {
+            description: description.clone(),
+            assets: assets.clone(),
+            notes: Vec::new(),
+            imported: Vec::new(),
+            origins: Vec::new(),
+        };
+        for (i, shape) in description.shapes.iter().enumerate() {
+            if let ShapeDescription::Gltf(gltf) = shape {
+                expanded.add(i, gltf, files).at(i).at("shapes")?;
+            }
+        }
+        if let Some((longest, bytes)) = longest_side(&expanded.description, &expanded.assets) {
+            expanded.assets.longest_side = Some(longest);
+            let gib = bytes as f64 / f64::from(1 << 30);
+            expanded.notes.push(format!(
+                "images of glTF files take {gib:.1} GiB: those with more than {longest} texels along a side are halved until they have no more, so that all fit 1 GiB"
+            ));
+        }
+        let is_gltf = |shape: &ShapeDescription| matches!(shape, ShapeDescription::Gltf(_));
+        expanded.description.shapes.retain(|shape| !is_gltf(shape));
+        Ok(expanded)
+    }
+
+    /// A problem of the expanded description, where it is in the one that was read.
+    pub fn place(&self, description: &Description, problem: Problem) -> Problem {
+        let brought = self.origins.iter().find(|origin| match problem.key.0.as_slice() {
+            [Segment::Key(list), Segment::Index(i), ..] if list == "instances" => origin.instances.contains(i),
+            [Segment::Key(list), Segment::Index(i), ..] if list == "lights" => origin.lights.contains(i),
+            [Segment::Key(_), Segment::Key(name), ..] => name.starts_with(&origin.prefix),
+            _ => false,
+        });
+        match (brought, problem.key.0.as_slice()) {
+            (Some(origin), _) => Problem::new(problem.to_string())
+                .at("file")
+                .at(origin.shape)
+                .at("shapes"),
+            (None, [Segment::Key(list), Segment::Index(i), rest @ ..]) if list == "shapes" => {
+                let plain = |(_, shape): &(usize, &ShapeDescription)| !matches!(shape, ShapeDescription::Gltf(_));
+                let number = description.shapes.iter().enumerate().filter(plain).nth(*i);
+                let mut moved = problem.clone();
+                moved.key.0 = [Segment::from("shapes"), number.map_or(*i, |(number, _)| number).into()]
+                    .into_iter()
+                    .chain(rest.iter().cloned())
+                    .collect();
+                moved
+            }
+            _ => problem,
+        }
+    }
+
+    fn add(&mut self, shape: usize, gltf: &GltfDescription, files: &mut BTreeSet<PathBuf>) -> Result<(), Problem> {
+        let transform = placement(gltf.translate, gltf.rotate, gltf.scale, gltf.matrix.as_ref())?;
+        let Place::File(path) = self.assets.find(&gltf.file).map_err(Problem::new).at("file")? else {
+            return Err(Problem::of(
+                "file",
+                format!("{:?} is in memory, and no glTF file", gltf.file),
+            ));
+        };
+        let choice = Choice::of(gltf)?;
+        let read = load(&path, &self.assets.root, &choice, files);
+        let imported = read.map_err(|error| Problem::new(error.to_string())).at("file")?;
+        let prefix = self.prefix(&gltf.file);
+        let names = self.materials(gltf, &imported, &prefix)?;
+        let mesh_name = |i: usize| format!("{prefix}meshes[{i}]");
+        for (i, mesh) in imported.meshes.iter().enumerate() {
+            let name = mesh_name(i);
+            self.assets.meshes.insert(name.clone(), Arc::clone(mesh));
+            let file = MeshFileDescription::new(&name);
+            self.description.meshes.insert(name, file);
+        }
+        for (name, bytes) in &imported.images {
+            let name = format!("{prefix}{name}");
+            self.assets.encoded.insert(name, Arc::clone(bytes));
+        }
+        let first = self.description.instances.len();
+        for placed in &imported.instances {
+            let materials = placed.materials.iter().enumerate();
+            let materials = materials.map(|(group, material)| (group.to_string(), names[*material].clone()));
+            self.description.instances.push(InstanceDescription {
+                mesh: mesh_name(placed.mesh),
+                material: None,
+                materials: materials.collect(),
+                translate: None,
+                rotate: None,
+                scale: None,
+                matrix: Some(rows(&(transform * placed.to_world))),
+            });
+        }
+        let first_light = self.description.lights.len();
+        let lights = imported.lights.iter().filter(|_| gltf.lights);
+        (self.description.lights).extend(lights.map(|light| moved(light, &transform)));
+        let notes = imported.notes.iter().map(|note| format!("{}: {note}", gltf.file));
+        self.notes.extend(notes);
+        self.origins.push(Origin {
+            shape,
+            prefix,
+            instances: first..self.description.instances.len(),
+            lights: first_light..self.description.lights.len(),
+        });
+        self.imported.push(imported);
+        Ok(())
+    }
+
+    /// What the names begin with that a file brings: another one for each shape.
+    fn prefix(&self, file: &str) -> String {
+        let is_taken = |prefix: &String| self.origins.iter().any(|origin| origin.prefix == *prefix);
+        let numbered = (2..).map(|i| format!("{file} ({i})/"));
+        let mut prefixes = std::iter::once(format!("{file}/")).chain(numbered);
+        prefixes.find(|prefix| !is_taken(prefix)).unwrap_or_default()
+    }
+
+    /// The names of the file's materials here: the scene's where it has others for them.
+    fn materials(&mut self, gltf: &GltfDescription, imported: &Imported, prefix: &str) -> Result<Vec<String>, Problem> {
+        let known: BTreeSet<&str> = imported.materials.iter().map(|material| &*material.name).collect();
+        for (name, own) in &gltf.materials {
+            if !known.contains(name.as_str()) {
+                let rule = format!("the file has no such material; there are {}", list(&known));
+                return Err(Problem::of(name, rule)).at("materials");
+            }
+            if !self.description.materials.contains_key(own) {
+                let names = list(self.description.materials.keys());
+                let rule = format!("{:?} is no material; there are {names}", cut(own));
+                return Err(Problem::of(name, rule)).at("materials");
+            }
+        }
+        let mut names = Vec::with_capacity(imported.materials.len());
+        for material in &imported.materials {
+            if let Some(own) = gltf.materials.get(&material.name) {
+                names.push(own.clone());
+                continue;
+            }
+            let name = format!("{prefix}{}", material.name);
+            let described = renamed(&material.description, prefix);
+            self.description.materials.insert(name.clone(), described);
+            for (texture, described) in &material.textures {
+                let mut described = described.clone();
+                if let TextureDescription::Image(image) = &mut described {
+                    image.file = format!("{prefix}{}", image.file);
+                }
+                self.description
+                    .textures
+                    .insert(format!("{prefix}{texture}"), described);
+            }
+            names.push(name);
+        }
+        Ok(names)
+    }
+}
+
+/// The rows of a map.
+fn rows(map: &DAffine3) -> Vec<[f64; 4]> {
+    let rows = map.matrix3.transpose();
+    let row = |i: usize| rows.col(i).extend(map.translation[i]).to_array();
+    vec![row(0), row(1), row(2)]
+}
+
+/// A light in other coordinates. What it sends out stays.
+fn moved(light: &LightDescription, map: &DAffine3) -> LightDescription {
+    let turned = |direction: DVec3| map.transform_vector3(direction);
+    let mut light = light.clone();
+    match &mut light {
+        LightDescription::Point(point) => point.position = map.transform_point3(point.position),
+        LightDescription::Directional(sun) => sun.direction = turned(sun.direction),
+        LightDescription::Spot(spot) => {
+            spot.position = map.transform_point3(spot.position);
+            spot.direction = spot.direction.map(turned);
+        }
+        LightDescription::Rectangle(_) => {} // glTF has none
+    }
+    light
+}
+
+/// A material whose textures have a prefix.
+fn renamed(material: &MaterialDescription, prefix: &str) -> MaterialDescription {
+    let mut material = material.clone();
+    let MaterialDescription::Principled(of) = &mut material else {
+        return material;
+    };
+    let rename = |name: &mut String| *name = format!("{prefix}{name}");
+    let colors = [&mut of.base_color, &mut of.specular_color, &mut of.sheen_color];
+    for color in colors.into_iter().chain(&mut of.emission) {
+        if let ColorDescription::Texture(reference) = color {
+            rename(&mut reference.texture);
+        }
+    }
+    let values = [
+        &mut of.metallic,
+        &mut of.roughness,
+        &mut of.anisotropy,
+        &mut of.specular,
+        &mut of.transmission,
+        &mut of.clearcoat,
+        &mut of.clearcoat_roughness,
+        &mut of.sheen_roughness,
+        &mut of.alpha,
+    ];
+    for value in values {
+        if let ValueDescription::Texture(reference) = value {
+            rename(&mut reference.texture);
+        }
+    }
+    let directions = of.anisotropy_direction.iter_mut();
+    directions.for_each(|direction| rename(&mut direction.texture));
+    let maps = [&mut of.normal_map, &mut of.clearcoat_normal_map];
+    for NormalMapDescription { texture, .. } in maps.into_iter().flatten() {
+        rename(texture);
+    }
+    material
+}

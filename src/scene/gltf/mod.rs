@@ -1,0 +1,197 @@
+//! glTF files as scenes: one is described as a shape of type `gltf`, with a camera and light around it, and rendered as what
+//! that shape stands for.
+
+mod expand;
+mod fitting;
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::error::{Problem, SceneError};
+use super::load::{Overrides, folder_of};
+use super::{
+    Description, EnvironmentDescription, EnvironmentName, Framing, GltfDescription, ImageDescription, Integrator,
+    RenderDescription, SamplesDescription, Scene, Selection, View, ViewTransform, framed,
+};
+use crate::gltf::{Choice, GltfError, Imported, ImportedCamera, STILL, load};
+
+pub(super) use self::expand::Expanded;
+
+/// The longer side of a picture in pixels, and the samples of a pixel, if nothing is said.
+const LONGER_SIDE: u32 = 1024;
+const SAMPLES: u32 = 64;
+/// What is behind it: the grey in the middle of what a display shows.
+const BACKGROUND: DVec3 = DVec3::splat(0.18);
+
+/// What is shown of a glTF file, and from where.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GltfChoice {
+    /// Which of its scenes; without, the one that the file names, else the first.
+    pub scene: Option<Selection>,
+    /// Which of its cameras; without, the first, if there is any.
+    pub camera: Option<Selection>,
+    /// From where it is seen as a whole, in place of any camera of its own; if it has none, [`View::Corner`].
+    pub view: Option<View>,
+    /// At which second of an animation.
+    pub time: Option<f64>,
+    /// Which of its animations; without, the first, where a time is said.
+    pub animation: Option<Selection>,
+    /// Which of its variants of materials.
+    pub variant: Option<Selection>,
+}
+
+impl GltfChoice {
+    /// The first thing that is chosen, as a command line calls it.
+    pub(super) fn first(&self) -> Option<&'static str> {
+        let all = [
+            (self.scene.is_some(), "gltf_scene"),
+            (self.camera.is_some(), "camera"),
+            (self.view.is_some(), "view"),
+            (self.time.is_some(), "time"),
+            (self.animation.is_some(), "animation"),
+            (self.variant.is_some(), "variant"),
+        ];
+        let chosen = all.into_iter().find(|(is_chosen, _)| *is_chosen);
+        chosen.map(|(_, name)| name)
+    }
+
+    /// An error of the file, or a problem of what is chosen of it.
+    fn told(&self, error: GltfError) -> SceneError {
+        let GltfError::Key { key, message, .. } = &error else {
+            return SceneError::Gltf(error);
+        };
+        let chosen = [
+            ("scenes", "gltf_scene", &self.scene),
+            ("animations", "animation", &self.animation),
+            ("variants", "variant", &self.variant),
+        ];
+        let is_still = message.starts_with(STILL);
+        if key == "animations" && is_still && self.time.is_some() && self.animation.is_none() {
+            return SceneError::Override(Problem::of("time", message.as_str()));
+        }
+        let is_it = |wanted: &Option<Selection>| {
+            let start = wanted.as_ref().map(|wanted| format!("{wanted} is no "));
+            start.is_some_and(|start| message.starts_with(&start))
+        };
+        match chosen.iter().find(|(list, _, wanted)| list == key && is_it(wanted)) {
+            Some((_, option, _)) => SceneError::Override(Problem::of(option, message.as_str())),
+            None => SceneError::Gltf(error),
+        }
+    }
+}
+
+/// Whether a file of this name is a glTF file: it ends in `.gltf` or `.glb`.
+pub fn is_gltf(name: &Path) -> bool {
+    let ending = name.extension();
+    ending.is_some_and(|ending| ["gltf", "glb"].iter().any(|known| ending.eq_ignore_ascii_case(known)))
+}
+
+impl Scene {
+    /// Whether it has a glTF file with animations, of which [`GltfChoice::time`] shows a moment.
+    pub fn has_animations(&self) -> bool {
+        self.imported.iter().any(|imported| imported.animations > 0)
+    }
+
+    /// Whether it has a glTF file with cameras.
+    pub fn has_model_cameras(&self) -> bool {
+        self.imported.iter().any(|imported| !imported.cameras.is_empty())
+    }
+}
+
+/// A glTF file as a scene of its own, and the file, which is kept until the scene has it.
+pub(super) fn describe(
+    path: &Path,
+    overrides: &Overrides,
+    files: &mut BTreeSet<PathBuf>,
+) -> Result<(Description, Arc<Imported>), SceneError> {
+    let GltfChoice {
+        scene,
+        camera,
+        view,
+        time,
+        animation,
+        variant,
+    } = overrides.gltf.clone();
+    let file = path.file_name().unwrap_or_default().to_string_lossy();
+    let shape = GltfDescription {
+        scene,
+        time,
+        animation,
+        variant,
+        ..GltfDescription::new(file)
+    };
+    let folder = folder_of(path);
+    let root = overrides.assets(folder, folder).root;
+    let whole = path.canonicalize().map_err(|error| SceneError::Read {
+        path: path.to_owned(),
+        error,
+    })?;
+    let choice = Choice::of(&shape).map_err(SceneError::Override)?;
+    let imported = load(&whole, &root, &choice, files).map_err(|error| overrides.gltf.told(error))?;
+    let camera = match view {
+        Some(_) => None,
+        None => chosen(&imported.cameras, camera.as_ref()).map_err(SceneError::Override)?,
+    };
+    let (width, height) = overrides
+        .size
+        .unwrap_or_else(|| size(camera.and_then(|camera| camera.aspect)));
+    let framing = Framing {
+        view: view.unwrap_or_default(),
+        aspect: f64::from(width.max(1)) / f64::from(height.max(1)),
+        turns: overrides.turntable.is_some(),
+    };
+    let camera = match camera {
+        Some(camera) => camera.description.clone(),
+        None => framed(imported.points().iter().copied(), framing).into(),
+    };
+    let render = RenderDescription {
+        integrator: Integrator::Path,
+        pixel_samples: SamplesDescription::new(SAMPLES),
+        ..RenderDescription::default()
+    };
+    let mut description = Description::new(width, height, camera)
+        .with_render(render)
+        .with_shape(shape);
+    description.image = ImageDescription {
+        view_transform: ViewTransform::KhronosPbrNeutral,
+        ..description.image
+    };
+    if imported.lights.is_empty() {
+        // What is shown stands before grey, not before the studio's lamps, unless surroundings are asked for.
+        description = description.with_environment(EnvironmentDescription {
+            background: overrides.environment.is_none().then_some(BACKGROUND),
+            ..EnvironmentDescription::named(EnvironmentName::Studio)
+        });
+    }
+    Ok((description, imported))
+}
+
+/// The camera that is asked for, or the first.
+fn chosen<'a>(
+    cameras: &'a [ImportedCamera],
+    wanted: Option<&Selection>,
+) -> Result<Option<&'a ImportedCamera>, Problem> {
+    let Some(wanted) = wanted else {
+        return Ok(cameras.first());
+    };
+    let names: Vec<Option<&str>> = cameras.iter().map(|camera| camera.name.as_deref()).collect();
+    let found = wanted.among(&names).and_then(|i| cameras.get(i));
+    let unknown = || Problem::of("camera", crate::gltf::unknown("camera", wanted, &names));
+    found.map(Some).ok_or_else(unknown)
+}
+
+/// A size of this aspect.
+fn size(aspect: Option<f64>) -> (u32, u32) {
+    let side = |ratio: f64| {
+        (f64::from(LONGER_SIDE) * ratio)
+            .round()
+            .clamp(1.0, f64::from(LONGER_SIDE)) as u32
+    };
+    match aspect {
+        Some(aspect) if aspect > 0.0 => (side(aspect), side(1.0 / aspect)),
+        _ => (LONGER_SIDE, LONGER_SIDE),
+    }
+}

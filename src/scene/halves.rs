@@ -1,0 +1,88 @@
+//! Images of half the size: for the levels of pyramids, and where images are too large to be kept.
+
+use glam::DVec3;
+
+use super::image_file::{linear_to_srgb, srgb_to_linear};
+use super::{Encoding, Image, Texels};
+
+/// A level in linear light.
+pub(crate) struct Level {
+    pub width: usize,
+    pub height: usize,
+    pub texels: Vec<DVec3>,
+}
+
+/// The texels of an image in linear light, in its own order.
+pub(crate) fn linear(image: &Image) -> impl Fn(usize) -> DVec3 {
+    let texel: Box<dyn Fn(usize) -> DVec3> = match &image.texels {
+        Texels::Bytes(encoding, bytes) => {
+            let decode = |value: u32| match encoding {
+                Encoding::Srgb => srgb_to_linear(f64::from(value) / 255.0),
+                Encoding::Linear => f64::from(value) / 255.0,
+            };
+            let table: Vec<f64> = (0..256).map(decode).collect();
+            Box::new(move |i| DVec3::from_array(bytes[i].map(|byte| table[usize::from(byte)])))
+        }
+        Texels::Floats(floats) => Box::new(|i| DVec3::from_array(floats[i].map(f64::from))),
+    };
+    texel
+}
+
+/// The level after one: each texel the mean over the part of that level that it covers.
+pub(crate) fn half(width: usize, height: usize, texel: impl Fn(usize) -> DVec3) -> Level {
+    let (columns, rows) = (covers(width, (width / 2).max(1)), covers(height, (height / 2).max(1)));
+    let mut texels = Vec::with_capacity(columns.len() * rows.len());
+    for row in &rows {
+        for column in &columns {
+            let mut sum = DVec3::ZERO;
+            for (y, v) in row {
+                for (x, u) in column {
+                    sum += texel(y * width + x) * (u * v);
+                }
+            }
+            texels.push(sum);
+        }
+    }
+    Level {
+        width: columns.len(),
+        height: rows.len(),
+        texels,
+    }
+}
+
+/// Which of `from` texels in a line each of `to` covers, and with what weight; `to` is half of `from`, rounded down.
+fn covers(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
+    let size = from as f64 / to as f64;
+    let cover = |i: usize| {
+        let (start, end) = (i as f64 * size, (i + 1) as f64 * size);
+        let inside = move |j: usize| (end.min((j + 1) as f64) - start.max(j as f64)) / size;
+        let touched = start as usize..from.min(end.ceil() as usize);
+        touched
+            .map(move |j| (j, inside(j)))
+            .filter(|(_, weight)| *weight > 0.0)
+            .collect()
+    };
+    (0..to).map(cover).collect()
+}
+
+/// An image of half its width and height, each rounded down, but at least 1.
+pub(super) fn halved(image: &Image) -> Image {
+    let texel = linear(image);
+    let Level { width, height, texels } = half(image.width as usize, image.height as usize, texel);
+    let texels = match &image.texels {
+        Texels::Floats(_) => Texels::Floats(texels.into_iter().map(|color| color.as_vec3().to_array()).collect()),
+        Texels::Bytes(encoding, _) => {
+            let byte = |x: f64| match encoding {
+                Encoding::Srgb => (linear_to_srgb(x) * 255.0).round() as u8,
+                Encoding::Linear => (x * 255.0).round() as u8,
+            };
+            let bytes = texels.into_iter().map(|color| color.to_array().map(byte));
+            Texels::Bytes(*encoding, bytes.collect())
+        }
+    };
+    Image {
+        width: width as u32,
+        height: height as u32,
+        texels,
+    }
+}

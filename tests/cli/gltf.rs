@@ -1,0 +1,418 @@
+//! glTF files on the command line: what is shown of them, and the scenes that `wgray convert` makes of them.
+
+use std::fs;
+
+use super::{Place, SCENE, read_png};
+use crate::model::Model;
+
+/// Small and quick.
+const QUICK: [&str; 6] = ["--size", "24x16", "--spp", "2", "--device", "cpu"];
+
+fn place(model: &Model) -> Place {
+    let place = Place::with_file("small.toml", SCENE);
+    model.write_glb(place.folder(), "box.glb");
+    model.write_gltf(place.folder(), "box");
+    place
+}
+
+fn with_cameras() -> Model {
+    Model {
+        cameras: true,
+        ..Model::default()
+    }
+}
+
+fn quietly(place: &Place, arguments: &[&str]) {
+    place.quietly(&[&["render"], arguments, &QUICK].concat());
+}
+
+/// The bits of what is rendered with these options.
+fn bits(place: &Place, arguments: &[&str]) -> Vec<u32> {
+    quietly(place, &[arguments, &["-o", "bits.exr"]].concat());
+    pixels(place, "bits.exr")
+}
+
+fn pixels(place: &Place, name: &str) -> Vec<u32> {
+    let picture = image::open(place.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
+    picture.into_rgb32f().into_raw().into_iter().map(f32::to_bits).collect()
+}
+
+fn refused(place: &Place, arguments: &[&str], code: i32, told: &str) {
+    let before = place.files();
+    let ran = place.run(arguments);
+    assert_eq!(
+        (ran.code, ran.stdout.as_str()),
+        (code, ""),
+        "{arguments:?}: {}",
+        ran.stderr
+    );
+    assert!(ran.stderr.contains(told), "{arguments:?}: {}\n{told}", ran.stderr);
+    assert_eq!(place.files(), before, "{arguments:?}");
+}
+
+#[test]
+fn a_model_by_itself_is_a_picture() {
+    let place = place(&Model::default());
+    let ran = place.run(&["check", "box.glb", "box.gltf"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    for line in ran.stdout.lines() {
+        assert!(line.contains(": good; 1024 x 1024 pixels, 64 samples each"), "{line}");
+        assert!(line.contains("instances of them: 2"), "{line}");
+    }
+    // The picture is the model's in any form, and reaches its margins: 5 % of 24 x 16 pixels are less than one.
+    quietly(
+        &place,
+        &["box.glb", "--background", "none", "-o", "box.png", "-o", "box.exr"],
+    );
+    assert_eq!(
+        pixels(&place, "box.exr"),
+        bits(&place, &["box.gltf", "--background", "none"])
+    );
+    let picture = image::open(place.path("box.png")).unwrap().into_rgba8();
+    let covered: Vec<(u32, u32)> = picture
+        .enumerate_pixels()
+        .filter(|(_, _, p)| p.0[3] > 0)
+        .map(|(x, y, _)| (x, y))
+        .collect();
+    let ends = |values: &mut dyn Iterator<Item = u32>| values.fold((u32::MAX, 0), |(a, b), x| (a.min(x), b.max(x)));
+    let (left, right) = ends(&mut covered.iter().map(|(x, _)| *x));
+    let (top, bottom) = ends(&mut covered.iter().map(|(_, y)| *y));
+    assert!(
+        left + right == 23 || top + bottom == 15,
+        "{left} {right} {top} {bottom}"
+    );
+    assert!(
+        (left <= 2 && right >= 21) || (top <= 1 && bottom >= 14),
+        "{left} {right} {top} {bottom}"
+    );
+    let middle = picture.get_pixel(12, 10).0;
+    assert!(middle[0] > middle[2], "the box is of clay: {middle:?}");
+    // Without a word on its name.
+    quietly(&place, &["box.gltf"]);
+    assert_eq!(read_png(&place.path("box.png")).0, 24);
+}
+
+#[test]
+fn each_option_shows_something_else_and_names_and_numbers_are_alike() {
+    let place = place(&with_cameras());
+    let plain = bits(&place, &["box.glb"]);
+    let mut seen = vec![plain.clone()];
+    let other = |options: &[&[&str]], seen: &mut Vec<Vec<u32>>| {
+        let of = |options: &&[&str]| bits(&place, &[&["box.glb"], *options].concat());
+        let all: Vec<_> = options.iter().map(of).collect();
+        assert!(all.iter().all(|bits| *bits == all[0]), "{options:?} are the same");
+        assert!(!seen.contains(&all[0]), "{options:?} show something else");
+        seen.push(all[0].clone());
+    };
+    other(&[&["--camera", "side camera"], &["--camera", "1"]], &mut seen);
+    other(&[&["--view", "front"]], &mut seen);
+    other(&[&["--view", "corner"]], &mut seen);
+    other(&[&["--gltf-scene", "one"], &["--gltf-scene", "1"]], &mut seen);
+    other(
+        &[
+            &["--time", "0.5"],
+            &["--time", "0.5", "--animation", "rise"],
+            &["--time", "0.5", "--animation", "0"],
+        ],
+        &mut seen,
+    );
+    other(&[&["--variant", "golden"], &["--variant", "0"]], &mut seen);
+    other(&[&["--environment", "sky"]], &mut seen);
+    // What is chosen anyway, and the first camera.
+    for options in [
+        ["--camera", "front camera"],
+        ["--camera", "0"],
+        ["--gltf-scene", "all"],
+        ["--time", "0"],
+    ] {
+        assert_eq!(
+            bits(&place, &[&["box.glb"], &options[..]].concat()),
+            plain,
+            "{options:?}"
+        );
+    }
+    // The camera's aspect is the picture's, unless a size is named.
+    for (options, size) in [
+        (&["--camera", "0"][..], "1024 x 683"),
+        (&["--camera", "1"], "1024 x 1024"),
+        (&["--view", "iso"], "1024 x 1024"),
+    ] {
+        let ran = place.run(&[&["check", "box.glb"], options].concat());
+        assert!(ran.stdout.contains(size), "{options:?}: {}{}", ran.stdout, ran.stderr);
+    }
+}
+
+#[test]
+fn what_is_not_there_is_told_with_what_is() {
+    let place = place(&with_cameras());
+    for (option, value, told) in [
+        (
+            "--camera",
+            "above",
+            "--camera: \"above\" is no camera; the file has 2: 0 (\"front camera\"), 1 (\"side camera\")",
+        ),
+        ("--camera", "2", "--camera: 2 is no camera; the file has 2: 0 (\"front"),
+        (
+            "--gltf-scene",
+            "two",
+            "--gltf-scene: \"two\" is no scene; the file has 2: 0 (\"all\"), 1 (\"one\")",
+        ),
+        (
+            "--animation",
+            "fall",
+            "--animation: \"fall\" is no animation; the file has 1: 0 (\"rise\")",
+        ),
+        (
+            "--variant",
+            "red",
+            "--variant: \"red\" is no variant; the file has 1: 0 (\"golden\")",
+        ),
+        ("--time", "-1", "--time: -1 must be from 0 to 1e9 seconds"),
+        ("--time", "nan", "--time: NaN must be from 0 to 1e9 seconds"),
+        ("--view", "above", "invalid value 'above' for '--view"),
+    ] {
+        for command in ["render", "check"] {
+            refused(&place, &[command, "box.glb", option, value], 2, told);
+        }
+        refused(
+            &place,
+            &["convert", "box.glb", "-o", "box.toml", option, value],
+            2,
+            told,
+        );
+    }
+    refused(
+        &place,
+        &["render", "box.glb", "--camera", "0", "--view", "top"],
+        2,
+        "cannot be used with",
+    );
+    for (option, value) in [
+        ("--camera", "0"),
+        ("--view", "top"),
+        ("--time", "0"),
+        ("--gltf-scene", "0"),
+        ("--animation", "0"),
+        ("--variant", "0"),
+    ] {
+        let told = format!("error: {option}: is for scenes that are glTF files, and small.toml is none");
+        refused(&place, &["render", "small.toml", option, value], 2, &told);
+    }
+    let still = Model {
+        animated: false,
+        ..Model::default()
+    };
+    still.write_glb(place.folder(), "still.glb");
+    refused(
+        &place,
+        &["render", "still.glb", "--time", "1"],
+        2,
+        "--time: the file has none that a time could be of",
+    );
+    refused(
+        &place,
+        &["render", "still.glb", "--frames", "1-2", "--fps", "10"],
+        2,
+        "--fps: is for glTF files that have animations",
+    );
+    refused(
+        &place,
+        &["render", "box.glb", "--fps", "10"],
+        2,
+        "--fps: needs --frames or --turntable",
+    );
+    refused(
+        &place,
+        &["render", "box.glb", "--frames", "1-2", "--fps", "10", "--time", "1"],
+        2,
+        "cannot be used with",
+    );
+    let empty = r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{}] }"#;
+    fs::write(place.path("empty.gltf"), empty).unwrap();
+    refused(&place, &["render", "empty.gltf"], 3, "has no triangles");
+    fs::write(place.path("bad.glb"), "no model").unwrap();
+    refused(&place, &["render", "bad.glb"], 3, "bad.glb:1:2: ");
+    refused(&place, &["render", "none.glb"], 3, "none.glb: cannot be read");
+}
+
+#[test]
+fn frames_are_moments_of_the_animation() {
+    let place = place(&with_cameras());
+    quietly(&place, &["box.glb", "--frames", "0-12:6", "-o", "f.##.exr"]);
+    quietly(&place, &["box.glb", "--frames", "5", "--fps", "10", "-o", "fps.exr"]);
+    for (frame, time) in [
+        ("f.00.exr", "0"),
+        ("f.06.exr", "0.25"),
+        ("f.12.exr", "0.5"),
+        ("fps.exr", "0.5"),
+    ] {
+        assert_eq!(pixels(&place, frame), moment(&place, time), "{frame}");
+    }
+    assert_ne!(pixels(&place, "f.00.exr"), pixels(&place, "f.12.exr"));
+    // A moment that is named stays.
+    let ran = place.run(
+        &[
+            &[
+                "render",
+                "box.glb",
+                "--frames",
+                "12",
+                "--time",
+                "0.25",
+                "-o",
+                "named.exr",
+            ],
+            &QUICK[..],
+        ]
+        .concat(),
+    );
+    assert_eq!(ran.code, 0);
+    assert!(ran.stderr.contains("all frames are the same"), "{}", ran.stderr);
+    assert_eq!(pixels(&place, "named.exr"), moment(&place, "0.25"));
+    // A camera that frames it stands still: what rises does not make the rest smaller.
+    Model::default().write_glb(place.folder(), "box.glb");
+    quietly(&place, &["box.glb", "--frames", "0-18:6", "-o", "s##.exr"]);
+    quietly(&place, &["box.glb", "--frames", "18", "-o", "alone.exr"]);
+    assert_eq!(pixels(&place, "s00.exr"), bits(&place, &["box.glb"]));
+    assert_eq!(pixels(&place, "s18.exr"), pixels(&place, "alone.exr"));
+    assert_ne!(pixels(&place, "s18.exr"), moment(&place, "0.75"));
+    assert_ne!(pixels(&place, "s18.exr"), pixels(&place, "s12.exr"));
+}
+
+fn moment(place: &Place, time: &str) -> Vec<u32> {
+    bits(place, &["box.glb", "--time", time])
+}
+
+#[test]
+fn a_converted_scene_has_the_same_bits() {
+    let place = place(&with_cameras());
+    fs::create_dir_all(place.path("scenes/models")).unwrap();
+    fs::copy(place.path("box.glb"), place.path("scenes/models/a box.glb")).unwrap();
+    let model = "scenes/models/a box.glb";
+    let mut seen = Vec::new();
+    for options in [
+        &[][..],
+        &["--camera", "1"],
+        &["--view", "iso"],
+        &["--time", "0.3", "--animation", "rise"],
+        &["--variant", "golden", "--gltf-scene", "all"],
+        &["--background", "1,0,0.5"],
+        &["--environment", "sky", "--background", "none"],
+        &["-D", "render.max_depth=1"],
+    ] {
+        place.quietly(
+            &[
+                &[
+                    "convert",
+                    model,
+                    "-o",
+                    "scenes/box.toml",
+                    "--size",
+                    "24x16",
+                    "--spp",
+                    "2",
+                ],
+                options,
+            ]
+            .concat(),
+        );
+        let wanted = bits(&place, &[&[model], options].concat());
+        place.quietly(&["render", "scenes/box.toml", "-o", "bits.exr", "--device", "cpu"]);
+        assert_eq!(pixels(&place, "bits.exr"), wanted, "{options:?}");
+        assert!(!seen.contains(&wanted), "{options:?}: the comparison cannot fail");
+        seen.push(wanted);
+        let text = String::from_utf8(place.read("scenes/box.toml")).unwrap();
+        assert!(text.starts_with("# a box.glb, as a scene."), "{text}");
+        assert!(text.contains("file = \"models/a box.glb\""), "{text}");
+        assert!(text.lines().count() < 45, "{text}");
+    }
+    // The file is a scene like any other.
+    let ran = place.run(&["check", "scenes/box.toml"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+}
+
+#[test]
+fn a_conversion_keeps_what_it_reads_and_names_files_from_where_it_is() {
+    let place = place(&Model::default());
+    let same = ["convert", "small.toml", "-o", "./small.toml"];
+    refused(&place, &same, 2, "is a file that the scene is made of, and must stay");
+    refused(
+        &place,
+        &["convert", "box.glb", "-o", "box.json"],
+        2,
+        "--output: box.json: must end in .toml",
+    );
+    refused(&place, &["convert", "box.glb", "-o", "none/box.toml"], 8, "none");
+    fs::create_dir(place.path("sub")).unwrap();
+    let ran = place.run(&[
+        "convert",
+        "box.gltf",
+        "-o",
+        "sub/box.toml",
+        "--size",
+        "24x16",
+        "--spp",
+        "2",
+    ]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("note: sub/box.toml names files outside of"),
+        "{}",
+        ran.stderr
+    );
+    let wanted = bits(&place, &["box.gltf"]);
+    place.quietly(&[
+        "render",
+        "sub/box.toml",
+        "--asset-root",
+        ".",
+        "-o",
+        "bits.exr",
+        "--device",
+        "cpu",
+    ]);
+    assert_eq!(pixels(&place, "bits.exr"), wanted);
+    refused(
+        &place,
+        &["render", "sub/box.toml"],
+        3,
+        "must not leave the scene's folder",
+    );
+    // A scene in TOML is written anew.
+    place.quietly(&["convert", "small.toml", "-o", "other.toml"]);
+    place.quietly(&["render", "small.toml", "-o", "a.exr", "--device", "cpu"]);
+    place.quietly(&["render", "other.toml", "-o", "b.exr", "--device", "cpu"]);
+    assert_eq!(pixels(&place, "a.exr"), pixels(&place, "b.exr"));
+}
+
+#[test]
+fn a_turntable_shows_a_model_from_all_around() {
+    let place = place(&Model::default());
+    // 5 % of these are two pixels and more.
+    let small = ["--size", "60x40", "--spp", "1", "--device", "cpu"];
+    let around = [
+        "render",
+        "box.glb",
+        "--turntable",
+        "5",
+        "--background",
+        "none",
+        "-o",
+        "t#.png",
+    ];
+    place.quietly(&[&around[..], &small].concat());
+    let mut seen = Vec::new();
+    for frame in 1..=5 {
+        let picture = image::open(place.path(&format!("t{frame}.png"))).unwrap().into_rgba8();
+        let edge = |x: u32, y: u32| x == 0 || y == 0 || x == 59 || y == 39;
+        let covered = |at_edge: bool| {
+            picture
+                .enumerate_pixels()
+                .any(|(x, y, p)| edge(x, y) == at_edge && p.0[3] > 0)
+        };
+        assert!(covered(false) && !covered(true), "frame {frame} is whole");
+        let bytes = picture.into_raw();
+        assert!(!seen.contains(&bytes), "frame {frame} is like another");
+        seen.push(bytes);
+    }
+}

@@ -1,0 +1,116 @@
+//! glTF files in the development mode: shown, and shown anew as they are saved.
+
+use std::fs;
+use std::path::Path;
+
+use tempfile::TempDir;
+use wgray::dev::{Command, Move, Sources};
+use wgray::scene::Overrides;
+
+use super::running::Running;
+use crate::model::Model;
+
+fn model(color: [f64; 3]) -> Model {
+    Model {
+        color,
+        ..Model::default()
+    }
+}
+
+const RED: [f64; 3] = [0.8, 0.05, 0.05];
+const GREEN: [f64; 3] = [0.05, 0.8, 0.05];
+const BLUE: [f64; 3] = [0.05, 0.05, 0.8];
+
+fn start(folder: &Path, name: &str) -> Running {
+    let sources = Sources {
+        scene: folder.join(name),
+        overrides: Overrides {
+            size: Some((24, 16)),
+            pixel_samples: Some(2),
+            ..Overrides::default()
+        },
+        shaders: None,
+    };
+    Running::start(sources, None)
+}
+
+/// Waits for a whole picture in whose middle, on the large box, this channel is the strongest.
+fn wait_for(running: &Running, strongest: [f64; 3]) {
+    let wanted = strongest.map(|value| value > 0.5);
+    running.wait("the picture of the file", |running| {
+        let frame = running.frame().filter(|frame| frame.header.done)?;
+        let pixels = match &frame.content {
+            wgray::dev::Content::Color(pixels) => &pixels.colors,
+            _ => return None,
+        };
+        let middle = pixels.get(11 * 24 + 12)?;
+        let most = middle.iter().fold(0.0_f32, |most, value| most.max(*value));
+        let is_shown = middle.map(|value| value == most && most > 0.0) == wanted;
+        (is_shown && running.state().problems.is_empty()).then_some(())
+    });
+}
+
+#[test]
+fn a_model_is_shown_anew_when_it_is_saved() {
+    let folder = TempDir::new().unwrap();
+    let write = |color: [f64; 3]| model(color).write_glb(folder.path(), "box.glb");
+    write(RED);
+    let running = start(folder.path(), "box.glb");
+    wait_for(&running, RED);
+    // In place, as exporters write, and by another file that takes the name.
+    write(GREEN);
+    wait_for(&running, GREEN);
+    model(BLUE).write_glb(folder.path(), "new~");
+    fs::rename(folder.path().join("new~"), folder.path().join("box.glb")).unwrap();
+    wait_for(&running, BLUE);
+    // Half of it is told, and the rest follows.
+    let whole = model(RED).glb();
+    fs::write(folder.path().join("box.glb"), &whole[..whole.len() / 2]).unwrap();
+    assert!(running.wait_problem().message.contains("box.glb: "));
+    fs::write(folder.path().join("box.glb"), whole).unwrap();
+    wait_for(&running, RED);
+}
+
+#[test]
+fn what_a_model_names_is_watched_too() {
+    let folder = TempDir::new().unwrap();
+    model(RED).write_gltf(folder.path(), "box");
+    let running = start(folder.path(), "box.gltf");
+    wait_for(&running, RED);
+    model(GREEN).write_gltf(folder.path(), "box");
+    wait_for(&running, GREEN);
+    // The buffer alone: without it there is an error, and with it the picture.
+    let buffer = folder.path().join("box.bin");
+    let bytes = fs::read(&buffer).unwrap();
+    fs::remove_file(&buffer).unwrap();
+    assert!(running.wait_problem().message.contains("box.bin"));
+    fs::write(&buffer, &bytes).unwrap();
+    wait_for(&running, GREEN);
+    let revision = running.revision();
+    let larger: Vec<u8> = bytes[..96]
+        .chunks(4)
+        .flat_map(|x| (f32::from_le_bytes([x[0], x[1], x[2], x[3]]) * 0.5).to_le_bytes())
+        .collect();
+    fs::write(&buffer, [&larger, &bytes[96..]].concat()).unwrap();
+    running.wait_done(revision);
+}
+
+#[test]
+fn the_camera_moves_and_is_not_saved_into_a_model() {
+    let folder = TempDir::new().unwrap();
+    model(RED).write_glb(folder.path(), "box.glb");
+    let before = fs::read(folder.path().join("box.glb")).unwrap();
+    let running = start(folder.path(), "box.glb");
+    wait_for(&running, RED);
+    let (still, revision) = (running.colors(), running.revision());
+    running.session.send(Command::Move(Move::Orbit(0.5, 0.1)));
+    running.wait_done(revision);
+    assert_ne!(running.colors(), still);
+    running.session.send(Command::SaveCamera);
+    running.wait("why not", |running| {
+        let told = format!("{:?}", running.state());
+        told.contains("must be TOML for a camera to be saved into it; it is glTF")
+            .then_some(())
+    });
+    assert_eq!(fs::read(folder.path().join("box.glb")).unwrap(), before);
+}

@@ -1,0 +1,386 @@
+//! Animations at a time, and skins.
+
+use glam::{DMat4, DQuat, DVec3};
+use serde_json::{Value, json};
+
+use super::build::{Builder, Component, QUAD};
+use super::read::{assert_corners, refusal, scene, scene_by};
+
+/// A quad whose node is moved by one channel.
+fn moving<const N: usize>(path: &str, interpolation: &str, times: &[f64], values: &[[f64; N]]) -> Builder {
+    let mut builder = Builder::new();
+    let mesh = builder.quad(None);
+    let node = builder.root_node(json!({ "mesh": mesh }));
+    animate(&mut builder, node, path, interpolation, times, values, "go");
+    builder
+}
+
+fn animate<const N: usize>(
+    builder: &mut Builder,
+    node: usize,
+    path: &str,
+    interpolation: &str,
+    times: &[f64],
+    values: &[[f64; N]],
+    name: &str,
+) {
+    let times: Vec<[f64; 1]> = times.iter().map(|time| [*time]).collect();
+    let input = builder.samples(&times);
+    let output = builder.samples(values);
+    builder.add(
+        "animations",
+        json!({
+            "name": name,
+            "channels": [{ "sampler": 0, "target": { "node": node, "path": path } }],
+            "samplers": [{ "input": input, "output": output, "interpolation": interpolation }],
+        }),
+    );
+}
+
+/// The corners of [`QUAD`] after a map.
+fn quad_by(map: impl Fn(DVec3) -> DVec3) -> [[[f64; 3]; 3]; 2] {
+    let p = QUAD.map(|corner| map(DVec3::from_array(corner)).to_array());
+    [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
+}
+
+/// Holds a file at times to maps of the quad.
+fn assert_at(builder: &Builder, name: &str, known: impl Fn(f64) -> Box<dyn Fn(DVec3) -> DVec3>, times: &[f64]) {
+    for (i, time) in times.iter().enumerate() {
+        let name = format!("{name}-{i}");
+        assert_corners(
+            &scene_by(builder, &name, &format!("time = {time:?}")),
+            &quad_by(known(*time)),
+        );
+    }
+}
+
+#[test]
+fn steps_stay_until_the_next_key() {
+    let builder = moving("translation", "STEP", &[1.0, 2.0], &[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]);
+    let known = |time: f64| -> Box<dyn Fn(DVec3) -> DVec3> {
+        let x = if time < 2.0 { 1.0 } else { 2.0 };
+        Box::new(move |p| p + DVec3::X * x)
+    };
+    assert_at(&builder, "step", known, &[0.0, 1.0, 1.5, 1.999, 2.0, 7.0]);
+    // Without a time it is as its nodes say, and not as any key.
+    assert_corners(&scene(&builder, "step"), &quad_by(|p| p));
+}
+
+#[test]
+fn linear_values_go_straight_and_stay_beyond_their_keys() {
+    let builder = moving(
+        "translation",
+        "LINEAR",
+        &[1.0, 3.0],
+        &[[0.0, 2.0, 0.0], [4.0, 0.0, 1.0]],
+    );
+    let known = |time: f64| -> Box<dyn Fn(DVec3) -> DVec3> {
+        let t = (time.clamp(1.0, 3.0) - 1.0) / 2.0;
+        Box::new(move |p| p + DVec3::new(0.0, 2.0, 0.0).lerp(DVec3::new(4.0, 0.0, 1.0), t))
+    };
+    assert_at(&builder, "linear", known, &[0.0, 0.5, 1.0, 1.5, 2.75, 3.0, 100.0]);
+    let scaled = moving("scale", "LINEAR", &[0.0, 1.0], &[[1.0, 1.0, 1.0], [3.0, 2.0, 1.0]]);
+    let known = |time: f64| -> Box<dyn Fn(DVec3) -> DVec3> {
+        Box::new(move |p| p * DVec3::new(1.0 + 2.0 * time, 1.0 + time, 1.0))
+    };
+    assert_at(&scaled, "linear-scale", known, &[0.0, 0.25, 1.0]);
+}
+
+#[test]
+fn cubic_splines_are_hermites() {
+    // In-tangent, value and out-tangent of two keys 2 s apart: glTF 2.0, C.5.
+    let keys = [
+        [9.0; 3],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 2.0, 0.0],
+        [2.0, 1.0, 0.0],
+        [9.0; 3],
+    ];
+    let builder = moving("translation", "CUBICSPLINE", &[1.0, 3.0], &keys);
+    let known = |time: f64| -> Box<dyn Fn(DVec3) -> DVec3> {
+        let t = (time.clamp(1.0, 3.0) - 1.0) / 2.0;
+        let [from, out, into, to] = [keys[1], keys[2], keys[3], keys[4]].map(DVec3::from_array);
+        let value = (2.0 * t.powi(3) - 3.0 * t * t + 1.0) * from
+            + 2.0 * (t.powi(3) - 2.0 * t * t + t) * out
+            + (-2.0 * t.powi(3) + 3.0 * t * t) * to
+            + 2.0 * (t.powi(3) - t * t) * into;
+        Box::new(move |p| p + value)
+    };
+    assert_at(&builder, "cubic", known, &[0.0, 1.0, 1.3, 2.0, 2.9, 3.0, 4.0]);
+}
+
+#[test]
+fn turns_go_the_shortest_way_at_constant_speed() {
+    let turn = |degrees: f64| DQuat::from_axis_angle(DVec3::Z, degrees.to_radians());
+    // The same turn has two quaternions: from the one of the other sign the way is as short.
+    for sign in [1.0, -1.0] {
+        let values = [turn(10.0).to_array(), turn(130.0).to_array().map(|x| sign * x)];
+        let builder = moving("rotation", "LINEAR", &[0.0, 1.0], &values);
+        let known = move |time: f64| -> Box<dyn Fn(DVec3) -> DVec3> {
+            Box::new(move |p| turn(10.0 + 120.0 * time.clamp(0.0, 1.0)) * p)
+        };
+        assert_at(&builder, &format!("turn{sign}"), known, &[0.0, 0.25, 0.5, 1.0]);
+    }
+    // Keys that are nearly the same.
+    let values = [turn(10.0).to_array(), turn(10.001).to_array()];
+    let builder = moving("rotation", "LINEAR", &[0.0, 1.0], &values);
+    let known = move |_: f64| -> Box<dyn Fn(DVec3) -> DVec3> { Box::new(move |p| turn(10.0005) * p) };
+    assert_at(&builder, "turn-small", known, &[0.5]);
+}
+
+#[test]
+fn turns_on_splines_are_normalized() {
+    let (a, b) = (DQuat::IDENTITY, DQuat::from_axis_angle(DVec3::Z, 2.0));
+    let keys = [[0.0; 4], a.to_array(), [0.0; 4], [0.0; 4], b.to_array(), [0.0; 4]];
+    let builder = moving("rotation", "CUBICSPLINE", &[0.0, 1.0], &keys);
+    // Half way between two keys without slopes the sum is that of both.
+    let half = (a + b).normalize();
+    let known = move |_: f64| -> Box<dyn Fn(DVec3) -> DVec3> { Box::new(move |p| half * p) };
+    assert_at(&builder, "turn-cubic", known, &[0.5]);
+}
+
+#[test]
+fn turns_may_be_whole_numbers() {
+    for component in [Component::I8, Component::U8, Component::I16, Component::U16] {
+        let mut builder = Builder::new();
+        let mesh = builder.quad(None);
+        let node = builder.root_node(json!({ "mesh": mesh }));
+        let input = builder.samples(&[[0.0], [1.0]]);
+        let one = component.one();
+        let output = builder.accessor("VEC4", component, &[0.0, 0.0, 0.0, one, 0.0, 0.0, one, 0.0]);
+        builder.get("accessors")[output]["normalized"] = json!(true);
+        builder.add(
+            "animations",
+            json!({
+                "channels": [{ "sampler": 0, "target": { "node": node, "path": "rotation" } }],
+                "samplers": [{ "input": input, "output": output }],
+            }),
+        );
+        let scene = scene_by(&builder, &format!("turn-{component:?}"), "time = 0.5");
+        assert_corners(&scene, &quad_by(|p| DVec3::new(-p.y, p.x, p.z)));
+    }
+}
+
+#[test]
+fn an_animation_is_chosen_by_its_name_or_number() {
+    let mut builder = Builder::new();
+    let mesh = builder.quad(None);
+    let node = builder.root_node(json!({ "mesh": mesh }));
+    animate(
+        &mut builder,
+        node,
+        "translation",
+        "STEP",
+        &[0.0],
+        &[[1.0, 0.0, 0.0]],
+        "walk",
+    );
+    animate(
+        &mut builder,
+        node,
+        "translation",
+        "STEP",
+        &[0.0],
+        &[[2.0, 0.0, 0.0]],
+        "run",
+    );
+    let at = |x: f64| quad_by(|p| p + DVec3::X * x);
+    assert_corners(&scene_by(&builder, "chosen-first", "time = 0"), &at(1.0));
+    assert_corners(
+        &scene_by(&builder, "chosen-name", "time = 0\nanimation = \"run\""),
+        &at(2.0),
+    );
+    assert_corners(
+        &scene_by(&builder, "chosen-number", "time = 0\nanimation = 1"),
+        &at(2.0),
+    );
+    let message = refusal(&builder, "time = 0\nanimation = \"swim\"");
+    assert!(message.contains("walk") && message.contains("run"), "{message}");
+}
+
+#[test]
+fn weights_of_targets_may_be_animated() {
+    let mut builder = Builder::new();
+    let attributes = builder.quad_attributes();
+    let indices = builder.indices(&[0, 1, 2, 0, 2, 3]);
+    let right = builder.floats(&[[1.0, 0.0, 0.0]; 4]);
+    let up = builder.floats(&[[0.0, 1.0, 0.0]; 4]);
+    let primitive = json!({
+        "attributes": attributes, "indices": indices, "targets": [{ "POSITION": right }, { "POSITION": up }],
+    });
+    let mesh = builder.add("meshes", json!({ "primitives": [primitive] }));
+    let node = builder.root_node(json!({ "mesh": mesh }));
+    animate(
+        &mut builder,
+        node,
+        "weights",
+        "LINEAR",
+        &[0.0, 1.0],
+        &[[0.0], [1.0], [2.0], [0.0]],
+        "go",
+    );
+    let known =
+        |time: f64| -> Box<dyn Fn(DVec3) -> DVec3> { Box::new(move |p| p + DVec3::new(2.0 * time, 1.0 - time, 0.0)) };
+    assert_at(&builder, "weights", known, &[0.0, 0.25, 1.0]);
+    // Of splines each key has its slopes of all targets, then the values, then slopes again.
+    let mut builder = builder.clone();
+    let keys = [
+        [0.0],
+        [0.0],
+        [0.0],
+        [1.0],
+        [0.0],
+        [0.0],
+        [0.0],
+        [0.0],
+        [2.0],
+        [0.0],
+        [0.0],
+        [0.0],
+    ];
+    animate(
+        &mut builder,
+        node,
+        "weights",
+        "CUBICSPLINE",
+        &[0.0, 1.0],
+        &keys,
+        "spline",
+    );
+    let scene = scene_by(&builder, "weights-spline", "time = 0.5\nanimation = \"spline\"");
+    assert_corners(&scene, &quad_by(|p| p + DVec3::new(1.0, 0.5, 0.0)));
+}
+
+/// A strip of two squares, one above the other, on two joints: the lower corners follow the first, the upper the second.
+fn arm(component: Component) -> Builder {
+    let mut builder = Builder::new();
+    let points = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 2.0, 0.0], [1.0, 2.0, 0.0]];
+    let position = builder.floats(&points);
+    let joints = [[0.0; 4], [0.0; 4], [0.0, 1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]];
+    let joints = builder.attribute(Component::U8, false, &joints);
+    let weights = [
+        [1.0, 0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0],
+        [0.4, 0.6, 0.0, 0.0],
+    ];
+    let weights = builder.attribute(component, component != Component::F32, &weights);
+    let indices = builder.indices(&[0, 1, 3, 0, 3, 2]);
+    let attributes = json!({ "POSITION": position, "JOINTS_0": joints, "WEIGHTS_0": weights });
+    let mesh = builder.add(
+        "meshes",
+        json!({ "primitives": [{ "attributes": attributes, "indices": indices }] }),
+    );
+    // The second joint is one unit above the first, and so the mesh was bound.
+    let matrices = [DMat4::IDENTITY, DMat4::from_translation(-DVec3::Y)].map(|m| m.to_cols_array());
+    let inverse = builder.accessor("MAT4", Component::F32, matrices.as_flattened());
+    let elbow = builder.add("nodes", json!({ "translation": [0, 1, 0] }));
+    let shoulder = builder.root_node(json!({ "children": [elbow] }));
+    let skin = builder.add(
+        "skins",
+        json!({ "joints": [shoulder, elbow], "inverseBindMatrices": inverse }),
+    );
+    // What the node of a skinned mesh says of its place is ignored: glTF 2.0, 3.7.3.3.
+    builder.root_node(json!({ "mesh": mesh, "skin": skin }));
+    builder
+}
+
+fn arm_corners(map: impl Fn(DVec3) -> DVec3) -> [[[f64; 3]; 3]; 2] {
+    let lower = [DVec3::new(-1.0, 0.0, 0.0), DVec3::new(1.0, 0.0, 0.0)];
+    let left = map(DVec3::new(-1.0, 2.0, 0.0));
+    let rest = DVec3::new(1.0, 2.0, 0.0);
+    let right = 0.4 * rest + 0.6 * map(rest);
+    let [a, b, c, d] = [lower[0], lower[1], left, right].map(|p| p.to_array());
+    [[a, b, d], [a, d, c]]
+}
+
+#[test]
+fn skinned_corners_follow_their_joints() {
+    for component in [Component::F32, Component::U8, Component::U16] {
+        let mut builder = arm(component);
+        assert_corners(
+            &scene(&builder, &format!("skin-rest-{component:?}")),
+            &arm_corners(|p| p),
+        );
+        let turn = DQuat::from_axis_angle(DVec3::Z, std::f64::consts::FRAC_PI_2);
+        builder.get("nodes")[0]["rotation"] = json!(turn.to_array());
+        let known = arm_corners(|p| turn * (p - DVec3::Y) + DVec3::Y);
+        assert_corners(&scene(&builder, &format!("skin-bent-{component:?}")), &known);
+    }
+}
+
+#[test]
+fn the_place_of_a_skinned_node_is_ignored() {
+    let mut builder = arm(Component::F32);
+    builder.get("nodes")[2]["translation"] = json!([5, 6, 7]);
+    assert_corners(&scene(&builder, "skin-moved-node"), &arm_corners(|p| p));
+    // That of its joints is not.
+    builder.get("nodes")[1]["translation"] = json!([0, 0, 3]);
+    let known = arm_corners(|p| p).map(|t| t.map(|[x, y, z]| [x, y, z + 3.0]));
+    assert_corners(&scene(&builder, "skin-moved-joint"), &known);
+}
+
+#[test]
+fn joints_may_be_animated() {
+    let mut builder = arm(Component::F32);
+    let turn = |angle: f64| DQuat::from_axis_angle(DVec3::Z, angle);
+    let values = [turn(0.0).to_array(), turn(1.5).to_array()];
+    animate(&mut builder, 0, "rotation", "LINEAR", &[0.0, 1.0], &values, "bend");
+    let known = arm_corners(|p| turn(0.6) * (p - DVec3::Y) + DVec3::Y);
+    assert_corners(&scene_by(&builder, "skin-animated", "time = 0.4"), &known);
+}
+
+#[test]
+fn a_vertex_may_have_eight_joints() {
+    let mut builder = Builder::new();
+    let position = builder.floats(&QUAD);
+    let first = builder.attribute(Component::U8, false, &[[0.0, 1.0, 2.0, 3.0]; 4]);
+    let second = builder.attribute(Component::U16, false, &[[4.0, 0.0, 0.0, 0.0]; 4]);
+    let most = builder.floats(&[[0.1, 0.1, 0.1, 0.1]; 4]);
+    let rest = builder.floats(&[[0.6, 0.0, 0.0, 0.0]; 4]);
+    let attributes = json!({
+        "POSITION": position, "JOINTS_0": first, "WEIGHTS_0": most, "JOINTS_1": second, "WEIGHTS_1": rest,
+    });
+    let mesh = builder.quad_with(attributes, None);
+    let parent = builder.root_node(json!({}));
+    let joints: Vec<usize> = (0..5)
+        .map(|i| builder.add("nodes", json!({ "translation": [i, 0, 0] })))
+        .collect();
+    builder.get("nodes")[parent]["children"] = json!(joints);
+    // Without matrices they are ones.
+    let skin = builder.add("skins", json!({ "joints": joints }));
+    builder.root_node(json!({ "mesh": mesh, "skin": skin }));
+    let x = 0.1 * (1.0 + 2.0 + 3.0) + 0.6 * 4.0;
+    assert_corners(&scene(&builder, "skin-eight"), &quad_by(|p| p + DVec3::X * x));
+}
+
+#[test]
+fn targets_come_before_joints() {
+    let mut builder = arm(Component::F32);
+    let target = builder.floats(&[[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]);
+    let mesh = &mut builder.get("meshes")[0];
+    mesh["primitives"][0]["targets"] = json!([{ "POSITION": target }]);
+    mesh["weights"] = json!([1.0]);
+    let turn = DQuat::from_axis_angle(DVec3::Z, 1.0);
+    builder.get("nodes")[0]["rotation"] = json!(turn.to_array());
+    let bent = |p: DVec3| turn * (p - DVec3::Y) + DVec3::Y;
+    let mut known = arm_corners(bent);
+    known[1][2] = bent(DVec3::new(-1.0, 3.0, 0.0)).to_array();
+    assert_corners(&scene(&builder, "skin-morph"), &known);
+}
+
+#[test]
+fn a_pointer_to_what_is_not_animated_here_is_left_out() {
+    let mut builder = moving("translation", "STEP", &[0.0], &[[1.0, 0.0, 0.0]]);
+    builder.uses("KHR_animation_pointer");
+    let animation = &mut builder.get("animations")[0];
+    animation["channels"].as_array_mut().expect("a list").push(json!({
+        "sampler": 0,
+        "target": {
+            "path": "pointer",
+            "extensions": { "KHR_animation_pointer": { "pointer": "/nodes/0/translation" } },
+        },
+    }) as Value);
+    assert_corners(&scene_by(&builder, "pointer", "time = 0"), &quad_by(|p| p + DVec3::X));
+}

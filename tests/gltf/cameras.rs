@@ -1,0 +1,110 @@
+//! Cameras of a file, and the one that it is seen by where it has none.
+
+use glam::{DQuat, DVec3};
+use serde_json::{Value, json};
+use wgray::Scene;
+use wgray::scene::Projection;
+
+use super::build::{Builder, Packing};
+use super::read::{assert_near, to_file, triangles};
+use crate::place::Place;
+
+/// A quad, and a camera on a turned node below a moved and scaled one.
+fn seen_by(camera: Value) -> Builder {
+    let mut builder = Builder::new();
+    let mesh = builder.quad(None);
+    builder.root_node(json!({ "mesh": mesh }));
+    let camera = builder.add("cameras", camera);
+    let turn = DQuat::from_rotation_y(0.5).to_array();
+    let node = builder.add(
+        "nodes",
+        json!({ "camera": camera, "rotation": turn, "translation": [0, 0, 1] }),
+    );
+    builder.root_node(json!({ "translation": [1, 2, 3], "scale": [2, 2, 2], "children": [node] }));
+    builder
+}
+
+fn load(builder: &Builder, name: &str) -> Scene {
+    let place = Place::with_file("a", "");
+    let file = builder.write(place.folder(), name, Packing::Binary);
+    Scene::load(&file).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn the_files_camera_is_where_its_node_is() {
+    let perspectives = [
+        (
+            "camera",
+            json!({ "yfov": 0.7, "znear": 0.1, "zfar": 100, "aspectRatio": 2 }),
+        ),
+        ("camera-infinite", json!({ "yfov": 0.7, "znear": 0.1 })),
+    ];
+    for (name, perspective) in perspectives {
+        let wide = perspective["aspectRatio"].is_number();
+        let builder = seen_by(json!({ "type": "perspective", "perspective": perspective }));
+        let scene = load(&builder, name);
+        // The picture has the camera's aspect, where it has one.
+        assert_eq!((scene.width, scene.height), (1024, if wide { 512 } else { 1024 }));
+        let camera = scene.camera;
+        assert_near(to_file(camera.position).to_array(), [1.0, 2.0, 5.0]);
+        // It looks along -z of its node; its scale is without effect.
+        let forward = DQuat::from_rotation_y(0.5) * -DVec3::Z;
+        assert_near(to_file(camera.forward).to_array(), forward.to_array());
+        assert_near(to_file(camera.up).to_array(), [0.0, 1.0, 0.0]);
+        let right = DQuat::from_rotation_y(0.5) * DVec3::X;
+        assert_near(to_file(camera.right).to_array(), right.to_array());
+        match camera.projection {
+            Projection::Perspective { fov } => assert_near([fov], [0.7]),
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn an_orthographic_camera_sees_twice_its_ymag() {
+    let camera = json!({ "type": "orthographic", "orthographic": { "xmag": 3, "ymag": 2, "znear": 0, "zfar": 10 } });
+    let camera = load(&seen_by(camera), "camera-orthographic").camera;
+    match camera.projection {
+        Projection::Orthographic { height } => assert_near([height], [4.0]),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_file_without_a_camera_is_in_the_picture() {
+    for (i, scale) in [
+        [1.0, 1.0, 1.0],
+        [1e-3, 1.0, 1.0],
+        [1e4, 1e4, 1e4],
+        [1e-5, 1e-5, 1e-5],
+        [50.0, 0.1, 1.0],
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let mut builder = Builder::new();
+        let mesh = builder.quad(None);
+        builder.root_node(json!({ "mesh": mesh, "scale": scale, "translation": [3, -7, 2] }));
+        builder.root_node(
+            json!({ "mesh": mesh, "scale": scale, "translation": [3, -7, 2], "rotation": [0, 0.6, 0, 0.8] }),
+        );
+        let scene = load(&builder, &format!("framed-{i}"));
+        let camera = &scene.camera;
+        let Projection::Perspective { fov } = camera.projection else {
+            panic!("{:?}", camera.projection);
+        };
+        let mut most: f64 = 0.0;
+        for corner in triangles(&scene).iter().flat_map(|triangle| triangle.corners) {
+            let to = corner - to_file(camera.position);
+            let away = to.dot(to_file(camera.forward));
+            assert!(away > 0.0);
+            for axis in [camera.right, camera.up] {
+                most = most.max((to.dot(to_file(axis)) / away / (fov / 2.0).tan()).abs());
+            }
+        }
+        // All of it, and not from far away.
+        assert!(most < 1.0 && most > 0.5, "{scale:?}: {most}");
+        // Seen from the front, which is +z of the file.
+        assert!(to_file(camera.forward).z < 0.0, "{:?}", camera.forward);
+    }
+}

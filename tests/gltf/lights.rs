@@ -1,0 +1,146 @@
+//! `KHR_lights_punctual`: where lights are, which way they shine, and how brightly.
+
+use glam::{DQuat, DVec3};
+use serde_json::{Value, json};
+use wgray::Scene;
+use wgray::scene::Light;
+
+use super::build::{Builder, Packing};
+use super::read::{assert_near, pixels, scene, scene_by, to_file};
+use crate::place::Place;
+
+/// A quad, and a light below two nodes, of which the upper one is scaled.
+fn lit(light: Value) -> Builder {
+    let mut builder = Builder::new();
+    builder.uses("KHR_lights_punctual");
+    let mesh = builder.quad(None);
+    builder.root_node(json!({ "mesh": mesh }));
+    builder.set("extensions", json!({ "KHR_lights_punctual": { "lights": [light] } }));
+    let turn = DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2).to_array();
+    let node = json!({ "rotation": turn, "extensions": { "KHR_lights_punctual": { "light": 0 } } });
+    let node = builder.add("nodes", node);
+    builder.root_node(json!({ "translation": [1, 2, 3], "scale": [2, 2, 2], "children": [node] }));
+    builder
+}
+
+#[test]
+fn candelas_are_intensity() {
+    let light = json!({ "type": "point", "intensity": 20, "color": [1, 0.5, 0.25] });
+    match &scene(&lit(light), "light-point").lights[..] {
+        [Light::Point { position, color }] => {
+            assert_near(to_file(*position).to_array(), [1.0, 2.0, 3.0]);
+            assert_near(color.to_array(), [20.0, 10.0, 5.0]);
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn lux_are_irradiance() {
+    let light = json!({ "type": "directional", "intensity": 3, "color": [1, 0.5, 0.25] });
+    match &scene(&lit(light), "light-directional").lights[..] {
+        // It shines along -z of its node, which is turned to look down.
+        [Light::Directional { direction, color }] => {
+            assert_near(to_file(*direction).to_array(), [0.0, -1.0, 0.0]);
+            assert_near(color.to_array(), [3.0, 1.5, 0.75]);
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn spots_have_two_angles() {
+    for (spot, inner, outer) in [
+        (json!({ "innerConeAngle": 0.2, "outerConeAngle": 0.5 }), 0.2, 0.5),
+        (json!({}), 0.0, std::f64::consts::FRAC_PI_4),
+    ] {
+        let light = json!({ "type": "spot", "spot": spot });
+        match &scene(&lit(light), &format!("light-spot-{inner}")).lights[..] {
+            [
+                Light::Spot {
+                    position,
+                    direction,
+                    color,
+                    cone,
+                    inner: within,
+                },
+            ] => {
+                assert_near(to_file(*position).to_array(), [1.0, 2.0, 3.0]);
+                assert_near(to_file(*direction).to_array(), [0.0, -1.0, 0.0]);
+                // Its defaults: white, 1 candela.
+                assert_near(color.to_array(), [1.0; 3]);
+                assert_near([*cone, *within], [outer, inner]);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn a_light_that_many_nodes_have_is_many_lights() {
+    let mut builder = lit(json!({ "type": "point" }));
+    for x in 0..3 {
+        builder.root_node(json!({ "translation": [x, 0, 5], "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    }
+    assert_eq!(scene(&builder, "lights-many").lights.len(), 4);
+    assert_eq!(scene_by(&builder, "lights-off", "lights = false").lights.len(), 0);
+}
+
+#[test]
+fn a_light_of_no_intensity_is_taken() {
+    let scene = scene(&lit(json!({ "type": "point", "intensity": 0 })), "light-dark");
+    assert!(scene.lights.len() <= 1);
+}
+
+#[test]
+fn a_rough_white_surface_under_lux_is_as_bright_as_the_formula_says() {
+    // A rough dielectric of ior 1 reflects nothing: what is left is Lambert's law, albedo / pi for each lux that comes straight.
+    let mut builder = Builder::new();
+    builder.uses("KHR_lights_punctual");
+    builder.uses("KHR_materials_ior");
+    let material = json!({
+        "pbrMetallicRoughness": { "baseColorFactor": [0.8, 0.4, 0.2, 1], "metallicFactor": 0 },
+        "extensions": { "KHR_materials_ior": { "ior": 1 } },
+    });
+    let material = builder.add("materials", material);
+    let mesh = builder.quad(Some(material));
+    builder.root_node(json!({ "mesh": mesh }));
+    let lights = json!([{ "type": "directional", "intensity": 5 }, { "type": "point", "intensity": 12 }]);
+    builder.set("extensions", json!({ "KHR_lights_punctual": { "lights": lights } }));
+    builder.root_node(json!({ "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    // Far enough away that it shines on all of the quad as on its middle, but for a part in ten thousand.
+    builder.root_node(json!({ "translation": [0, 0, 100], "extensions": { "KHR_lights_punctual": { "light": 1 } } }));
+    builder.get("extensions")["KHR_lights_punctual"]["lights"][1]["intensity"] = json!(20_000);
+    let place = Place::with_file("a", "");
+    let file = builder.write(place.folder(), "lux", Packing::Binary);
+    // No light but the file's: the surroundings are black.
+    let mut scene = super::read::scene_with(&file, "");
+    scene.environment = None;
+    scene.render.background = DVec3::ZERO;
+    scene.render.pixel_samples.count = 256;
+    let irradiance = 5.0 + 20_000.0 / 100.0_f64.powi(2);
+    for pixel in pixels(&scene) {
+        for (k, albedo) in [0.8, 0.4, 0.2].into_iter().enumerate() {
+            let known = albedo / std::f64::consts::PI * irradiance;
+            // One of two lights is chosen for each sample.
+            assert!(
+                (f64::from(pixel[k]) / known - 1.0).abs() < 0.15,
+                "{pixel:?}, not {known}"
+            );
+        }
+    }
+    let mean = pixels(&scene).iter().map(|pixel| f64::from(pixel[0])).sum::<f64>() / 36.0;
+    assert!(
+        (mean / (0.8 / std::f64::consts::PI * irradiance) - 1.0).abs() < 0.02,
+        "{mean}"
+    );
+}
+
+#[test]
+fn a_file_with_lights_is_lit_by_these() {
+    let place = Place::with_file("a", "");
+    let file = lit(json!({ "type": "point" })).write(place.folder(), "lights-alone", Packing::Binary);
+    let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(scene.lights.len(), 1);
+    assert!(scene.environment.is_none_or(|environment| environment.image.is_none()));
+}

@@ -1,0 +1,359 @@
+//! What materials say in numbers, and what they say of alpha and of sides.
+
+use serde_json::{Value, json};
+use wgray::scene::{AlphaMode, Scene};
+
+use super::build::{Builder, Packing};
+use super::read::{
+    assert_all, assert_near, material, plain, plain_color, principled, refusal, scene, scene_by, scene_with,
+};
+use crate::place::Place;
+
+/// A quad of a material.
+fn quad_of(material: Value) -> Builder {
+    let mut builder = Builder::new();
+    if let Some(extensions) = material["extensions"].as_object() {
+        extensions.keys().for_each(|extension| builder.uses(extension));
+    }
+    let material = builder.add("materials", material);
+    let mesh = builder.quad(Some(material));
+    builder.root_node(json!({ "mesh": mesh }));
+    builder
+}
+
+/// A material of one extension.
+fn extended(extension: &str, values: Value) -> Value {
+    json!({
+        "pbrMetallicRoughness": { "metallicFactor": 0 },
+        "extensions": { extension: values },
+    })
+}
+
+#[test]
+fn what_a_file_does_not_say_is_as_the_specification_has_it() {
+    let mut without = Builder::new();
+    let mesh = without.quad(None);
+    without.root_node(json!({ "mesh": mesh }));
+    for (name, builder) in [("default-none", without), ("default-empty", quad_of(json!({})))] {
+        let scene = scene(&builder, name);
+        let material = material(&scene);
+        let principled = principled(&scene);
+        // glTF 2.0, 3.9.2: white, a metal, rough.
+        assert_eq!(plain_color(principled.base_color), [1.0; 3]);
+        assert_eq!(plain(principled.metallic), 1.0);
+        assert_eq!(plain(principled.roughness), 1.0);
+        assert_eq!(plain_color(material.emission), [0.0; 3]);
+        assert_eq!(principled.alpha_mode, AlphaMode::Opaque);
+        assert_eq!(material.normal_map, None);
+        // And what extensions add is not there.
+        assert_eq!(principled.ior, 1.5);
+        assert_eq!(plain(principled.specular), 1.0);
+        assert_eq!(plain_color(principled.specular_color), [1.0; 3]);
+        assert_eq!(plain(principled.transmission), 0.0);
+        assert_eq!(plain(principled.clearcoat), 0.0);
+        assert_eq!(plain_color(principled.sheen_color), [0.0; 3]);
+        assert_eq!(plain(principled.anisotropy), 0.0);
+    }
+}
+
+#[test]
+fn core_parameters_are_taken() {
+    let scene = scene(
+        &quad_of(json!({
+            "pbrMetallicRoughness": { "baseColorFactor": [0.1, 0.2, 0.3, 0.4], "metallicFactor": 0.25, "roughnessFactor": 0.75 },
+            "emissiveFactor": [0.5, 0.6, 0.7],
+        })),
+        "core",
+    );
+    assert_near(plain_color(principled(&scene).base_color), [0.1, 0.2, 0.3]);
+    assert_near(
+        [plain(principled(&scene).metallic), plain(principled(&scene).roughness)],
+        [0.25, 0.75],
+    );
+    assert_near(plain_color(material(&scene).emission), [0.5, 0.6, 0.7]);
+}
+
+#[test]
+fn emission_may_be_stronger_than_one() {
+    let mut material = extended("KHR_materials_emissive_strength", json!({ "emissiveStrength": 8 }));
+    material["emissiveFactor"] = json!([0.5, 0.25, 1]);
+    let scene = scene(&quad_of(material), "emissive-strength");
+    assert_near(plain_color(super::read::material(&scene).emission), [4.0, 2.0, 8.0]);
+}
+
+#[test]
+fn indices_of_refraction_are_taken() {
+    let of = |ior: f64, name: &str| scene(&quad_of(extended("KHR_materials_ior", json!({ "ior": ior }))), name);
+    assert_near([principled(&of(1.33, "ior")).ior], [1.33]);
+    // 0 is as good as infinity, for materials that reflect like paint of their own colour at every angle.
+    assert!(principled(&of(0.0, "ior-zero")).ior >= 50.0);
+}
+
+#[test]
+fn transmission_is_that_of_a_sheet_without_a_volume() {
+    let sheet = extended("KHR_materials_transmission", json!({ "transmissionFactor": 0.75 }));
+    let sheet = scene(&quad_of(sheet), "transmission");
+    assert_near([plain(principled(&sheet).transmission)], [0.75]);
+    assert!(principled(&sheet).thin);
+    let volume = |thickness: f64, name: &str| {
+        let mut material = extended("KHR_materials_transmission", json!({ "transmissionFactor": 1 }));
+        material["extensions"]["KHR_materials_volume"] =
+            json!({ "thicknessFactor": thickness, "attenuationDistance": 2, "attenuationColor": [0.5, 0.25, 1] });
+        scene(&quad_of(material), name)
+    };
+    // A thickness of 0 is thin walled: KHR_materials_volume.
+    assert!(principled(&volume(0.0, "volume-thin")).thin);
+    let thick = volume(0.5, "volume");
+    assert!(!principled(&thick).thin);
+    // The colour is what is left after the distance.
+    let known = [0.5_f64, 0.25, 1.0].map(|left| -left.ln() / 2.0);
+    assert_near(principled(&thick).absorption.to_array(), known);
+}
+
+#[test]
+fn a_volume_swallows_nothing_without_a_distance_and_all_of_black() {
+    let of = |volume: Value, name: &str| {
+        let mut material = extended("KHR_materials_transmission", json!({ "transmissionFactor": 1 }));
+        material["extensions"]["KHR_materials_volume"] = volume;
+        scene(&quad_of(material), name)
+    };
+    let clear = of(
+        json!({ "thicknessFactor": 1, "attenuationColor": [0.5, 0.5, 0.5] }),
+        "volume-clear",
+    );
+    assert_eq!(principled(&clear).absorption.to_array(), [0.0; 3]);
+    let black = json!({ "thicknessFactor": 1, "attenuationColor": [0, 0, 0], "attenuationDistance": 1 });
+    let black = of(black, "volume-black");
+    assert!(principled(&black).absorption.min_element() > 10.0);
+}
+
+#[test]
+fn extensions_of_what_reflects_are_taken() {
+    let specular = json!({ "specularFactor": 0.25, "specularColorFactor": [0.5, 0.75, 1] });
+    let scene_of = |extension: &str, values: Value| scene(&quad_of(extended(extension, values)), extension);
+    let scene = scene_of("KHR_materials_specular", specular);
+    assert_near([plain(principled(&scene).specular)], [0.25]);
+    assert_near(plain_color(principled(&scene).specular_color), [0.5, 0.75, 1.0]);
+    let scene = scene_of(
+        "KHR_materials_clearcoat",
+        json!({ "clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25 }),
+    );
+    assert_near(
+        [
+            plain(principled(&scene).clearcoat),
+            plain(principled(&scene).clearcoat_roughness),
+        ],
+        [0.5, 0.25],
+    );
+    let sheen = json!({ "sheenColorFactor": [0.1, 0.2, 0.3], "sheenRoughnessFactor": 0.5 });
+    let scene = scene_of("KHR_materials_sheen", sheen);
+    assert_near(plain_color(principled(&scene).sheen_color), [0.1, 0.2, 0.3]);
+    assert_near([plain(principled(&scene).sheen_roughness)], [0.5]);
+    let anisotropy = json!({ "anisotropyStrength": 0.6, "anisotropyRotation": 1.25 });
+    let scene = scene_of("KHR_materials_anisotropy", anisotropy);
+    assert_near(
+        [
+            plain(principled(&scene).anisotropy),
+            principled(&scene).anisotropy_rotation,
+        ],
+        [0.6, 1.25],
+    );
+}
+
+#[test]
+fn specular_and_glossiness_of_older_files_become_a_dielectric() {
+    let values =
+        json!({ "diffuseFactor": [0.1, 0.2, 0.3, 0.5], "specularFactor": [0.04, 0.08, 1], "glossinessFactor": 0.75 });
+    let scene = scene(
+        &quad_of(extended("KHR_materials_pbrSpecularGlossiness", values)),
+        "specular-glossiness",
+    );
+    let principled = principled(&scene);
+    assert_near(plain_color(principled.base_color), [0.1, 0.2, 0.3]);
+    assert_near([plain(principled.metallic), plain(principled.roughness)], [0.0, 0.25]);
+    // What is reflected head-on is the specular colour: 0.04 of an index of 1.5, times the factor.
+    let head_on = ((principled.ior - 1.0) / (principled.ior + 1.0)).powi(2);
+    assert_near(
+        plain_color(principled.specular_color).map(|x| x * head_on),
+        [0.04, 0.08, 1.0],
+    );
+}
+
+#[test]
+fn a_coat_may_have_a_normal_map_of_its_own() {
+    let mut builder = Builder::new();
+    builder.uses("KHR_materials_clearcoat");
+    let maps = [[204, 128, 226, 255], [128, 204, 226, 255]].map(|texel| builder.plain_texture(texel));
+    let coat = json!({ "clearcoatFactor": 1, "clearcoatNormalTexture": { "index": maps[1], "scale": 0.5 } });
+    let material = builder.add(
+        "materials",
+        json!({ "normalTexture": { "index": maps[0] }, "extensions": { "KHR_materials_clearcoat": coat } }),
+    );
+    let mesh = builder.quad(Some(material));
+    builder.root_node(json!({ "mesh": mesh }));
+    let scene = scene(&builder, "coat-normal");
+    let below = super::read::material(&scene).normal_map.expect("a normal map");
+    let coat = principled(&scene)
+        .clearcoat_normal_map
+        .expect("a normal map of the coat");
+    assert_eq!((below.strength, coat.strength), (1.0, 0.5));
+    assert_ne!(below.texture, coat.texture);
+}
+
+#[test]
+fn what_is_unlit_has_its_base_color() {
+    for (name, factor) in [
+        ("unlit", [0.25, 0.5, 0.75]),
+        ("unlit-white", [1.0; 3]),
+        ("unlit-black", [0.0; 3]),
+    ] {
+        let [r, g, b] = factor;
+        let mut builder = Builder::new();
+        let material = builder.unlit(json!({ "baseColorFactor": [r, g, b, 0.5] }));
+        let mesh = builder.quad(Some(material));
+        builder.root_node(json!({ "mesh": mesh }));
+        assert_all(&scene(&builder, name), factor);
+    }
+}
+
+#[test]
+fn polished_metal_in_white_light_has_its_base_color() {
+    // Head-on Schlick's curve is the colour itself, and all that is mirrored is white.
+    let metal = json!({ "pbrMetallicRoughness": { "baseColorFactor": [0.25, 0.5, 0.75, 1], "roughnessFactor": 0 } });
+    assert_all(&scene(&quad_of(metal), "metal"), [0.25, 0.5, 0.75]);
+}
+
+/// An unlit quad of alpha 0.4.
+fn veil(mode: &str, cutoff: Option<f64>) -> Scene {
+    let mut builder = Builder::new();
+    let material = builder.unlit(json!({ "baseColorFactor": [0.25, 0.5, 0.75, 0.4] }));
+    builder.get("materials")[material]["alphaMode"] = json!(mode);
+    if let Some(cutoff) = cutoff {
+        builder.get("materials")[material]["alphaCutoff"] = json!(cutoff);
+    }
+    let mesh = builder.quad(Some(material));
+    builder.root_node(json!({ "mesh": mesh }));
+    scene(&builder, &format!("alpha-{mode}-{cutoff:?}"))
+}
+
+#[test]
+fn alpha_does_what_its_mode_says() {
+    let (there, behind) = ([0.25, 0.5, 0.75], [1.0; 3]);
+    assert_all(&veil("OPAQUE", None), there);
+    assert_all(&veil("MASK", None), behind);
+    assert_all(&veil("MASK", Some(0.375)), there);
+    assert_all(&veil("MASK", Some(0.0)), there);
+    assert_all(&veil("MASK", Some(2.0)), behind);
+    // Between the two by chance: the means over many samples.
+    let mut scene = veil("BLEND", None);
+    scene.render.pixel_samples.count = 64 * 64;
+    let pixels = super::read::pixels(&scene);
+    for k in 0..3 {
+        let mean = pixels.iter().map(|pixel| f64::from(pixel[k])).sum::<f64>() / pixels.len() as f64;
+        let known = 0.4 * there[k] + 0.6;
+        assert!((mean - known).abs() < 0.005, "{mean}, not {known}");
+    }
+}
+
+#[test]
+fn the_back_of_what_is_not_double_sided_is_not_seen() {
+    let seen = |double: bool, turned: bool, mirrored: bool| {
+        let mut builder = Builder::new();
+        let material = builder.unlit(json!({ "baseColorFactor": [0.25, 0.5, 0.75, 1] }));
+        builder.get("materials")[material]["doubleSided"] = json!(double);
+        let mesh = builder.quad(Some(material));
+        let mut node = json!({ "mesh": mesh });
+        if turned {
+            node["rotation"] = json!([0, 1, 0, 0]);
+        }
+        if mirrored {
+            node["scale"] = json!([-1, 1, 1]);
+        }
+        builder.root_node(node);
+        scene(&builder, &format!("sides-{double}-{turned}-{mirrored}"))
+    };
+    for mirrored in [false, true] {
+        assert_all(&seen(true, false, mirrored), [0.25, 0.5, 0.75]);
+        assert_all(&seen(true, true, mirrored), [0.25, 0.5, 0.75]);
+        assert_all(&seen(false, false, mirrored), [0.25, 0.5, 0.75]);
+        assert_all(&seen(false, true, mirrored), [1.0; 3]);
+    }
+}
+
+#[test]
+fn a_variant_puts_other_materials_on_primitives() {
+    let mut builder = Builder::new();
+    builder.uses("KHR_materials_variants");
+    let materials =
+        [0.25, 0.5, 0.75].map(|level| builder.unlit(json!({ "baseColorFactor": [level, level, level, 1] })));
+    let mesh = builder.quad(Some(materials[0]));
+    builder.get("meshes")[mesh]["primitives"][0]["extensions"] = json!({
+        "KHR_materials_variants": { "mappings": [
+            { "material": materials[1], "variants": [0, 2] },
+            { "material": materials[2], "variants": [1] },
+        ] },
+    });
+    let names = json!([{ "name": "day" }, { "name": "night" }, { "name": "dusk" }, { "name": "dawn" }]);
+    builder.set("extensions", json!({ "KHR_materials_variants": { "variants": names } }));
+    builder.root_node(json!({ "mesh": mesh }));
+    for (keys, level) in [
+        ("", 0.25),
+        ("variant = \"day\"", 0.5),
+        ("variant = \"night\"", 0.75),
+        ("variant = 1", 0.75),
+        ("variant = \"dusk\"", 0.5),
+        ("variant = \"dawn\"", 0.25),
+    ] {
+        assert_all(&scene_by(&builder, "variants", keys), [level; 3]);
+    }
+    let message = refusal(&builder, "variant = \"noon\"");
+    assert!(
+        ["day", "night", "dusk", "dawn"]
+            .iter()
+            .all(|name| message.contains(name)),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_scene_may_put_a_material_in_place_of_one_of_the_file() {
+    let mut builder = Builder::new();
+    let mut names = ["red", "blue"].into_iter();
+    for x in [-1, 1] {
+        let material = builder.unlit(json!({ "baseColorFactor": [0.5, 0.5, 0.5, 1] }));
+        builder.get("materials")[material]["name"] = json!(names.next());
+        let mesh = builder.quad(Some(material));
+        builder.root_node(json!({ "mesh": mesh, "translation": [x, 0, 0] }));
+    }
+    let place = Place::with_file("a", "");
+    let file = builder.write(place.folder(), "replaced", Packing::Binary);
+    let lamp = "[materials.lamp]\ntype = \"diffuse\"\ncolor = [0, 0, 0]\nemission = [0.125, 0.25, 0.5]";
+    let keys = format!("materials = {{ blue = \"lamp\" }}\n{lamp}");
+    let pixels = super::read::pixels(&scene_with(&file, &keys));
+    for row in pixels.chunks(6) {
+        assert!(row[..3].iter().all(|pixel| *pixel == [0.5; 3]), "{row:?}");
+        assert!(row[3..].iter().all(|pixel| *pixel == [0.125, 0.25, 0.5]), "{row:?}");
+    }
+    // A name that the file does not have.
+    let keys = format!("materials = {{ green = \"lamp\" }}\n{lamp}");
+    let message = super::read::try_scene(&file, &keys).expect_err("no such material");
+    assert!(message.contains("green") && message.contains("red"), "{message}");
+}
+
+#[test]
+fn what_is_required_but_unknown_is_refused_and_what_is_used_is_said() {
+    for extension in ["KHR_draco_mesh_compression", "KHR_texture_basisu", "EXT_of_nobody"] {
+        let mut builder = quad_of(json!({}));
+        builder.requires(extension);
+        let message = refusal(&builder, "");
+        assert!(message.contains(extension), "{message}");
+    }
+    let mut builder = quad_of(json!({}));
+    builder.uses("EXT_of_nobody");
+    let scene = scene(&builder, "used-unknown");
+    assert!(
+        scene.notes.iter().any(|note| note.contains("EXT_of_nobody")),
+        "{:?}",
+        scene.notes
+    );
+}

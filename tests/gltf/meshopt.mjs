@@ -1,0 +1,198 @@
+// Makes src/gltf/meshopt/streams.txt: streams by the encoder of npm's meshoptimizer, and what its decoder makes of them.
+//
+//     npm install meshoptimizer@1.3.0
+//     node tests/gltf/meshopt.mjs > src/gltf/meshopt/streams.txt
+//
+// With a number behind it, so many streams of random kinds are made, too many to be kept.
+//
+// A line is: name, mode, filter, stride, count, the stream in base64, and what it decodes to: in base64 where a filter may
+// round, else as its FNV-1a hash of 64 bits.
+
+import { createRequire } from "node:module";
+import path from "node:path";
+
+const { MeshoptDecoder, MeshoptEncoder } = createRequire(path.join(process.cwd(), "/"))("meshoptimizer");
+await Promise.all([MeshoptDecoder.ready, MeshoptEncoder.ready]);
+
+let state = 1;
+// Whole numbers below `count`, the same in every run (a linear congruential generator of 32 bits).
+function random(count) {
+	state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+	return Math.floor((state / 2 ** 32) * count);
+}
+const uniform = () => random(2 ** 30) / 2 ** 30;
+
+function hash(bytes) {
+	let value = 0xcbf29ce484222325n;
+	for (const byte of bytes) value = BigInt.asUintN(64, (value ^ BigInt(byte)) * 0x100000001b3n);
+	return value.toString(16).padStart(16, "0");
+}
+
+const base64 = (bytes) => Buffer.from(bytes).toString("base64");
+
+function line(name, mode, filter, stride, count, stream) {
+	const decoded = new Uint8Array(count * stride);
+	MeshoptDecoder.decodeGltfBuffer(decoded, count, stride, stream, mode, filter);
+	const wanted = filter === "NONE" ? hash(decoded) : base64(decoded);
+	console.log([name, mode, filter, stride, count, base64(stream), wanted].join(" "));
+}
+
+// Elements of a kind, as bytes.
+const KINDS = {
+	zeros: (count, stride) => new Uint8Array(count * stride),
+	random: (count, stride) => Uint8Array.from({ length: count * stride }, () => random(256)),
+	// Bytes that change little, some of them much at times.
+	smooth: (count, stride) => {
+		const now = Uint8Array.from({ length: stride }, () => random(256));
+		return Uint8Array.from({ length: count * stride }, (_, i) => {
+			const k = i % stride;
+			now[k] += random(20) === 0 ? random(256) : random(1 << (k % 5));
+			return now[k];
+		});
+	},
+	shorts: (count, stride) => {
+		const values = new Uint16Array((count * stride) / 2);
+		for (let i = 0; i < values.length; i++) {
+			const k = i % (stride / 2);
+			values[i] = (i < stride / 2 ? random(65536) : values[i - stride / 2]) + random(40 << (k % 4)) - 15;
+		}
+		return new Uint8Array(values.buffer);
+	},
+	floats: (count, stride) => {
+		const values = new Float32Array((count * stride) / 4);
+		for (let i = 0; i < values.length; i++) {
+			const k = i % (stride / 4);
+			values[i] = Math.fround(Math.sin((i - k) * 0.001 * (k + 1)) * 10 ** (k % 3));
+		}
+		return new Uint8Array(values.buffer);
+	},
+	// The lowest bits of every float are zero.
+	rounded: (count, stride) => {
+		const bytes = KINDS.floats(count, stride);
+		const words = new Uint32Array(bytes.buffer);
+		for (let i = 0; i < words.length; i++) words[i] &= 0xffff0000 | (i % 3 << 14);
+		return bytes;
+	},
+};
+
+function attributes(kind, stride, count, level, version) {
+	const bytes = KINDS[kind](count, stride);
+	const stream = MeshoptEncoder.encodeVertexBufferLevel(bytes, count, stride, level, version);
+	line(`${kind}-${stride}-${count}-${level}-v${version}`, "ATTRIBUTES", "NONE", stride, count, stream);
+}
+
+// Triangles of a grid, each row one way, and some that have nothing to do with it.
+function grid(side, strays) {
+	const indices = [];
+	for (let y = 0; y < side; y++) {
+		for (let x = 0; x < side; x++) {
+			const at = y * (side + 1) + x;
+			indices.push(at, at + 1, at + side + 1, at + side + 1, at + 1, at + side + 2);
+		}
+	}
+	const most = (side + 1) ** 2;
+	for (let i = 0; i < strays; i++) {
+		const at = random(indices.length / 3 + 1) * 3;
+		indices.splice(at, 0, random(most), random(most), random(most));
+	}
+	return Uint32Array.from(indices);
+}
+
+function indices(name, all, mode, stride) {
+	const typed = stride === 2 ? Uint16Array.from(all) : Uint32Array.from(all);
+	const bytes = new Uint8Array(typed.buffer);
+	const encode = mode === "TRIANGLES" ? MeshoptEncoder.encodeIndexBuffer : MeshoptEncoder.encodeIndexSequence;
+	line(name, mode, "NONE", stride, typed.length, encode(bytes, typed.length, stride));
+}
+
+// Random unit vectors of so many dimensions, one of the axes among them, and a fourth number.
+function units(count, dimensions) {
+	const values = [];
+	for (let i = 0; i < count; i++) {
+		let v = Array.from({ length: dimensions }, () => uniform() * 2 - 1);
+		if (i % 5 === 0) v = v.map((_, k) => (k === (i / 5) % dimensions ? (i % 2 ? -1 : 1) : 0));
+		const length = Math.hypot(...v);
+		values.push(...v.map((x) => x / length));
+		if (dimensions === 3) values.push(i % 2 ? -1 : 1);
+	}
+	return Float32Array.from(values);
+}
+
+function filtered(filter, stride, bits, version, count = 24) {
+	let elements;
+	if (filter === "OCTAHEDRAL") elements = MeshoptEncoder.encodeFilterOct(units(count, 3), count, stride, bits);
+	if (filter === "QUATERNION") elements = MeshoptEncoder.encodeFilterQuat(units(count, 4), count, stride, bits);
+	if (filter === "EXPONENTIAL") {
+		const values = Float32Array.from({ length: (count * stride) / 4 }, () => (uniform() - 0.5) * 10 ** (random(20) - 10));
+		elements = MeshoptEncoder.encodeFilterExp(values, count, stride, bits);
+	}
+	if (filter === "COLOR") {
+		const values = Float32Array.from({ length: count * 4 }, (_, i) => (i < 16 ? (i >> 1) & 1 : uniform()));
+		elements = MeshoptEncoder.encodeFilterColor(values, count, stride, bits);
+	}
+	const stream = MeshoptEncoder.encodeVertexBufferLevel(elements, count, stride, 2, version);
+	line(`${filter.toLowerCase()}-${stride}-${bits}-v${version}`, "ATTRIBUTES", filter, stride, count, stream);
+}
+
+const many = Number(process.argv[2] ?? 0);
+if (many === 0) {
+	for (const [kind, stride, count] of [
+		["zeros", 4, 1],
+		["zeros", 256, 600],
+		["random", 4, 33],
+		["random", 12, 15],
+		["smooth", 4, 16],
+		["smooth", 8, 17],
+		["smooth", 16, 257],
+		["smooth", 256, 33],
+		["shorts", 4, 300],
+		["shorts", 12, 100],
+		["floats", 12, 100],
+		["rounded", 16, 70],
+	]) {
+		attributes(kind, stride, count, 0, 0);
+		for (const level of [0, 3]) attributes(kind, stride, count, level, 1);
+	}
+	attributes("random", 16, 300, 0, 1);
+	for (const stride of [2, 4]) {
+		indices(`grid-${stride}`, grid(8, 0), "TRIANGLES", stride);
+		indices(`strays-${stride}`, grid(8, 60), "TRIANGLES", stride);
+		indices(`twice-${stride}`, [...grid(4, 0), ...grid(4, 3)], "TRIANGLES", stride);
+		indices(`rows-${stride}`, grid(6, 0), "INDICES", stride);
+		const strip = Array.from({ length: 60 }, (_, i) => (i % 2 ? i : 1000 + i * 3));
+		indices(`strip-${stride}`, [...strip, 65534, 0, 65000], "INDICES", stride);
+	}
+	indices("large", [4294967294, 0, 7, 3000000000, 2147483648, 4294967294], "TRIANGLES", 4);
+	for (const version of [0, 1]) {
+		for (const bits of [2, 5, 8]) filtered("OCTAHEDRAL", 4, bits, version);
+		for (const bits of [9, 12, 16]) filtered("OCTAHEDRAL", 8, bits, version);
+		for (const bits of [4, 11, 16]) filtered("QUATERNION", 8, bits, version);
+		for (const bits of [1, 12, 24]) filtered("EXPONENTIAL", 12, bits, version);
+		for (const bits of [2, 7, 8]) filtered("COLOR", 4, bits, version);
+		for (const bits of [9, 12, 16]) filtered("COLOR", 8, bits, version);
+	}
+}
+for (let i = 0; i < many; i++) {
+	const version = random(2);
+	const pick = (list) => list[random(list.length)];
+	switch (random(4)) {
+		case 0:
+		case 1: {
+			const stride = 4 * (1 + random(random(2) ? 64 : 8));
+			attributes(pick(Object.keys(KINDS)), stride, 1 + random(700), version * random(4), version);
+			break;
+		}
+		case 2: {
+			const [mode, stride] = [pick(["TRIANGLES", "INDICES"]), pick([2, 4])];
+			indices("indices", grid(1 + random(30), random(2) * random(200)), mode, stride);
+			break;
+		}
+		default: {
+			const filter = pick(["OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"]);
+			const stride = filter === "QUATERNION" ? 8 : filter === "EXPONENTIAL" ? 4 * (1 + random(8)) : pick([4, 8]);
+			const least = { OCTAHEDRAL: 2, QUATERNION: 4, EXPONENTIAL: 1, COLOR: 2 }[filter];
+			const most = filter === "EXPONENTIAL" ? 24 : filter === "QUATERNION" ? 16 : stride * 2;
+			filtered(filter, stride, least + random(most - least + 1), version, 1 + random(300));
+		}
+	}
+}

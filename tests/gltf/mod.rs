@@ -1,0 +1,14 @@
+//! What the program makes of glTF files, against what is known of them from elsewhere: each feature in a small file of its own,
+//! which `scripts/check-gltf` has looked at by the Khronos validator too.
+
+mod agreement;
+mod animations;
+mod build;
+mod cameras;
+mod geometry;
+mod lights;
+mod materials;
+mod nodes;
+mod page;
+mod read;
+mod textures;

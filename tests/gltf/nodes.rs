@@ -1,0 +1,275 @@
+//! Scenes and their nodes: where things are, how often, and which side is outside.
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
+use serde_json::json;
+use wgray::mesh::Mesh;
+use wgray::scene::{Geometry, Reflection, Scene, Shape};
+
+use super::build::{Builder, Component, QUAD};
+use super::read::{assert_corners, corners, plain_color, refusal, scene, scene_by, triangles};
+
+/// The corners of [`QUAD`] after a map.
+fn quad_by(map: impl Fn(DVec3) -> DVec3) -> [[[f64; 3]; 3]; 2] {
+    let p = QUAD.map(|corner| map(DVec3::from_array(corner)).to_array());
+    [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
+}
+
+#[test]
+fn maps_of_nodes_are_multiplied_from_the_root_on() {
+    let mut builder = Builder::new();
+    let mesh = builder.quad(None);
+    let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
+    let inner = DMat4::from_cols_array(&[
+        0.5, 0.1, 0.0, 0.0, 0.2, 1.5, 0.3, 0.0, 0.0, -0.4, 2.0, 0.0, 1.0, 2.0, 3.0, 1.0,
+    ]);
+    let leaf = builder.add("nodes", json!({ "mesh": mesh, "matrix": inner.to_cols_array() }));
+    let outer = json!({
+        "translation": [4, 5, 6], "rotation": turn.to_array(), "scale": [1, 2, 0.5], "children": [leaf],
+    });
+    builder.root_node(outer);
+    // What is scaled after it was turned is sheared.
+    let map = DAffine3::from_scale_rotation_translation(DVec3::new(1.0, 2.0, 0.5), turn, DVec3::new(4.0, 5.0, 6.0));
+    let known = quad_by(|p| map.transform_point3(inner.transform_point3(p)));
+    let scene = scene(&builder, "hierarchy");
+    assert_corners(&scene, &known);
+    // Normals are at right angles to the sides.
+    for triangle in triangles(&scene) {
+        for normal in triangle.normals {
+            assert!(normal.distance(triangle.side()) < 1e-5, "{triangle:?}");
+        }
+    }
+}
+
+#[test]
+fn mirrored_things_keep_their_outside() {
+    for (name, scale) in [
+        ("one", [-1.0, 1.0, 1.0]),
+        ("three", [-2.0, -2.0, -2.0]),
+        ("two", [-1.0, -1.0, 1.0]),
+    ] {
+        let mut builder = Builder::new();
+        let mesh = builder.quad(None);
+        builder.root_node(json!({ "mesh": mesh, "scale": scale }));
+        let scene = scene(&builder, &format!("mirrored-{name}"));
+        assert_corners(&scene, &quad_by(|p| p * DVec3::from_array(scale)));
+        // glTF 2.0, 3.7.4: where the determinant is negative clockwise triangles face the viewer.
+        let outside = DVec3::new(0.0, 0.0, if name == "three" { -1.0 } else { 1.0 });
+        for triangle in triangles(&scene) {
+            assert_eq!(triangle.side(), outside, "{name}");
+            assert!(
+                triangle.normals.iter().all(|normal| normal.distance(outside) < 1e-6),
+                "{name}"
+            );
+        }
+    }
+}
+
+#[test]
+fn nodes_that_are_flat_are_left_out() {
+    let mut builder = Builder::new();
+    let mesh = builder.quad(None);
+    builder.root_node(json!({ "mesh": mesh, "scale": [0, 0, 0] }));
+    builder.root_node(json!({ "mesh": mesh, "translation": [0, 1, 0] }));
+    assert_corners(&scene(&builder, "flat-node"), &quad_by(|p| p + DVec3::Y));
+}
+
+#[test]
+fn what_a_scale_flattens_is_there() {
+    let flattened = |scale: [f64; 3]| {
+        let mut builder = Builder::new();
+        let mesh = builder.quad(None);
+        builder.root_node(json!({ "mesh": mesh, "translation": [0, 0, 2], "scale": scale }));
+        scene(&builder, "flattened")
+    };
+    // Along its normal, and by less than an instance may be scaled.
+    for (scale, by) in [([1.0, 1.0, 0.0], 1.0), ([1e-7; 3], 1e-7), ([-1e-7; 3], -1e-7)] {
+        let scene = flattened(scale);
+        assert_corners(&scene, &quad_by(|p| p * by + 2.0 * DVec3::Z));
+        assert!(
+            scene.notes.iter().all(|note| !note.contains("left out")),
+            "{:?}",
+            scene.notes
+        );
+    }
+    // Nothing is left of a quad that loses an axis of its own, as while it vanishes in an animation.
+    for scale in [[1.0, 0.0, 1.0], [0.0; 3], [1e-12; 3]] {
+        let scene = flattened(scale);
+        assert!(scene.shapes.is_empty());
+        assert!(
+            scene
+                .notes
+                .iter()
+                .any(|note| note.contains("1 of 1 instances of meshes are left out"))
+        );
+    }
+}
+
+#[test]
+fn a_mesh_of_many_nodes_is_kept_once() {
+    let mut builder = Builder::new();
+    let mesh = builder.quad(None);
+    for x in 0..5 {
+        builder.root_node(json!({ "mesh": mesh, "translation": [3 * x, 0, 0] }));
+    }
+    let scene = scene(&builder, "instances");
+    let meshes = meshes(&scene);
+    assert_eq!(meshes.len(), 5);
+    assert!(meshes.iter().all(|mesh| Arc::ptr_eq(mesh, meshes[0])));
+    let known: Vec<_> = (0..5)
+        .flat_map(|x| quad_by(|p| p + DVec3::new(3.0 * f64::from(x), 0.0, 0.0)))
+        .collect();
+    assert_corners(&scene, &known);
+}
+
+fn meshes(scene: &Scene) -> Vec<&Arc<Mesh>> {
+    fn mesh(shape: &Shape) -> Option<&Arc<Mesh>> {
+        match &shape.geometry {
+            Geometry::Mesh { mesh, .. } => Some(mesh),
+            _ => None,
+        }
+    }
+    scene.shapes.iter().filter_map(mesh).collect()
+}
+
+#[test]
+fn instances_of_a_node_are_below_it() {
+    let mut builder = Builder::new();
+    builder.requires("EXT_mesh_gpu_instancing");
+    let mesh = builder.quad(None);
+    let quarter = std::f64::consts::FRAC_1_SQRT_2;
+    let translation = builder.samples(&[[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]]);
+    let rotation = builder.samples(&[[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, quarter, quarter]]);
+    let scale = builder.samples(&[[1.0, 1.0, 1.0], [2.0, 1.0, 1.0]]);
+    let attributes = json!({ "TRANSLATION": translation, "ROTATION": rotation, "SCALE": scale });
+    let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } });
+    builder.root_node(json!({ "mesh": mesh, "scale": [1, 1, 2], "translation": [0, 10, 0], "extensions": instancing }));
+    let first = quad_by(|p| p + DVec3::new(0.0, 10.0, 0.0));
+    // Scaled, turned by a right angle, moved; then the node.
+    let second = quad_by(|p| DVec3::new(-p.y + 3.0, 2.0 * p.x + 10.0, p.z));
+    assert_corners(&scene(&builder, "gpu-instancing"), &[first, second].concat());
+}
+
+#[test]
+fn instances_may_be_turned_by_whole_numbers() {
+    let mut builder = Builder::new();
+    builder.requires("EXT_mesh_gpu_instancing");
+    let mesh = builder.quad(None);
+    let flat: Vec<f64> = [[0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 0.0]]
+        .iter()
+        .flatten()
+        .map(|x| (x * 32767.0_f64).round())
+        .collect();
+    let rotation = builder.accessor("VEC4", Component::I16, &flat);
+    builder.get("accessors")[rotation]["normalized"] = json!(true);
+    let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "ROTATION": rotation } } });
+    builder.root_node(json!({ "mesh": mesh, "extensions": instancing }));
+    let first = quad_by(|p| DVec3::new(-p.x, -p.y, p.z));
+    let second = quad_by(|p| DVec3::new(-p.x, p.y, -p.z));
+    assert_corners(&scene(&builder, "gpu-instancing-i16"), &[first, second].concat());
+}
+
+/// Two scenes, each with a quad in another place, and a node that is in none.
+fn two_scenes() -> Builder {
+    let mut builder = Builder::new();
+    let mesh = builder.quad(None);
+    for x in [0, 10, 20] {
+        builder.add("nodes", json!({ "mesh": mesh, "translation": [x, 0, 0] }));
+    }
+    builder.add("scenes", json!({ "nodes": [0], "name": "first" }));
+    builder.add("scenes", json!({ "nodes": [1], "name": "second" }));
+    builder
+}
+
+#[test]
+fn one_of_several_scenes_is_shown() {
+    let at = |x: f64| quad_by(|p| p + DVec3::X * x);
+    let mut builder = two_scenes();
+    assert_corners(&scene(&builder, "scenes-first"), &at(0.0));
+    builder.set("scene", json!(1));
+    assert_corners(&scene(&builder, "scenes-second"), &at(10.0));
+    assert_corners(&scene_by(&builder, "scenes-named", "scene = \"first\""), &at(0.0));
+    assert_corners(&scene_by(&builder, "scenes-numbered", "scene = 0"), &at(0.0));
+    for keys in ["scene = \"third\"", "scene = 2"] {
+        let message = refusal(&builder, keys);
+        assert!(message.contains("first") && message.contains("second"), "{message}");
+    }
+}
+
+#[test]
+fn nodes_that_go_in_circles_are_refused() {
+    let mut builder = two_scenes();
+    builder.get("nodes")[0]["children"] = json!([1]);
+    builder.get("nodes")[1]["children"] = json!([0]);
+    let message = refusal(&builder, "");
+    assert!(message.contains("nodes"), "{message}");
+    // A node below itself, and one that is below two.
+    let mut builder = two_scenes();
+    builder.get("nodes")[0]["children"] = json!([0]);
+    assert!(refusal(&builder, "").contains("nodes"));
+}
+
+#[test]
+fn a_long_chain_of_nodes_is_followed() {
+    let mut builder = Builder::new();
+    let mesh = builder.quad(None);
+    let mut node = builder.add("nodes", json!({ "mesh": mesh, "translation": [0.001, 0, 0] }));
+    for _ in 0..999 {
+        node = builder.add("nodes", json!({ "children": [node], "translation": [0.001, 0, 0] }));
+    }
+    builder.add("scenes", json!({ "nodes": [node] }));
+    assert_corners(&scene(&builder, "chain"), &quad_by(|p| p + DVec3::X));
+}
+
+#[test]
+fn names_may_be_missing_or_equal() {
+    let mut builder = Builder::new();
+    for (i, name) in [Some("same"), Some("same"), None, None].into_iter().enumerate() {
+        let level = 0.25 * (i as f64 + 1.0);
+        let mut material = json!({ "pbrMetallicRoughness": { "baseColorFactor": [level, level, level, 1] } });
+        let mut node = json!({ "translation": [0, 0, i] });
+        if let Some(name) = name {
+            material["name"] = json!(name);
+            node["name"] = json!(name);
+        }
+        let material = builder.add("materials", material);
+        let mesh = builder.quad(Some(material));
+        if let Some(name) = name {
+            builder.get("meshes")[mesh]["name"] = json!(name);
+        }
+        node["mesh"] = json!(mesh);
+        builder.root_node(node);
+    }
+    let scene = scene(&builder, "names");
+    let levels: Vec<f64> = triangles(&scene)
+        .iter()
+        .step_by(2)
+        .map(|triangle| match &scene.materials[triangle.material].reflection {
+            Reflection::Principled(principled) => plain_color(principled.base_color)[0],
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert_eq!(levels, [0.25, 0.5, 0.75, 1.0]);
+}
+
+#[test]
+fn a_file_may_be_moved_turned_and_scaled() {
+    let mut builder = Builder::new();
+    let mesh = builder.quad(None);
+    builder.root_node(json!({ "mesh": mesh, "translation": [1, 0, 0] }));
+    // In the coordinates of the scene, whose z is the file's y.
+    let keys = "scale = 2\nrotate = { axis = [0, 0, 1], degrees = 90 }\ntranslate = [0, 0, 5]";
+    let turn = DMat3::from_axis_angle(DVec3::Y, std::f64::consts::FRAC_PI_2);
+    let known = quad_by(|p| turn * (2.0 * (p + DVec3::X)) + 5.0 * DVec3::Y);
+    assert_corners(&scene_by(&builder, "moved", keys), &known);
+    assert_eq!(
+        corners(&scene_by(
+            &builder,
+            "moved",
+            "matrix = [[1, 0, 0, 3], [0, 1, 0, 0], [0, 0, 1, 0]]"
+        ))[0][0]
+            .x,
+        3.0
+    );
+}

@@ -1,0 +1,62 @@
+//! The tables of `docs/gltf.md`: every row names a test that is there, and every extension that is known has a row.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+fn read(file: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+    fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// What stands between backquotes in a line.
+fn quoted(line: &str) -> Vec<&str> {
+    line.split('`').skip(1).step_by(2).collect()
+}
+
+#[test]
+fn every_row_names_a_test_that_is_there() {
+    let page = read("docs/gltf.md");
+    let rows = page
+        .lines()
+        .filter(|line| line.starts_with("| ") && line.contains(".rs`"));
+    let mut count = 0;
+    for row in rows {
+        let cell = row.trim_end_matches(" |").rsplit(" | ").next().unwrap();
+        let mut file = None;
+        for name in quoted(cell) {
+            if name.ends_with(".rs") {
+                file = Some(read(name));
+            } else {
+                let text = file.as_ref().unwrap_or_else(|| panic!("a file before {name}"));
+                assert!(text.contains(&format!("#[test]\nfn {name}()")), "{name}");
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 40, "{count}");
+}
+
+#[test]
+fn every_known_extension_has_a_row() {
+    let source = read("src/gltf/extension.rs");
+    let list = source
+        .split("KNOWN: &[&str] = &[")
+        .nth(1)
+        .unwrap()
+        .split("];")
+        .next()
+        .unwrap();
+    let known: BTreeSet<&str> = list.split('"').skip(1).step_by(2).collect();
+    let page = read("docs/gltf.md");
+    let table = page
+        .split("## Extensions")
+        .nth(1)
+        .unwrap()
+        .split("\n## ")
+        .next()
+        .unwrap();
+    let rows = table.lines().filter(|line| line.starts_with("| `"));
+    let told: BTreeSet<&str> = rows.flat_map(|row| quoted(row.split(" | ").next().unwrap())).collect();
+    assert_eq!(known, told);
+}

@@ -1,0 +1,198 @@
+//! What a scene has of a glTF file, in the coordinates of the file, and how it looks.
+
+use std::path::Path;
+
+use glam::{DVec2, DVec3};
+use wgray::scene::{Color, Geometry, Material, Principled, Reflection, Scene, Value};
+use wgray::{Device, Options};
+
+use super::build::{Builder, Packing};
+use crate::place::Place;
+
+/// A camera that sees the square of [`QUAD`](super::build::QUAD) from +z of the file, which is -y here, and fills the picture
+/// with it; white light from everywhere.
+const SCENE: &str = r#"
+image = { width = 6, height = 6 }
+camera = { type = "orthographic", position = [0, -10, 0], look_at = [0, 0, 0], height = 2 }
+[render]
+integrator = "path"
+pixel_samples = { pattern = "grid", count = 1 }
+[environment]
+color = [1, 1, 1]
+[[shapes]]
+type = "gltf"
+"#;
+
+/// A triangle of the scene: what its corners have, in the coordinates of the file.
+#[derive(Clone, Debug)]
+pub struct Triangle {
+    pub corners: [DVec3; 3],
+    /// Zero where the mesh has no normals.
+    pub normals: [DVec3; 3],
+    /// As the file has them: v downwards.
+    pub uvs: [DVec2; 3],
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+    /// Whether its instance is mirrored, so that its corners are clockwise from outside.
+    pub mirrored: bool,
+}
+
+impl Triangle {
+    /// Its outer side by its corners.
+    pub fn side(&self) -> DVec3 {
+        let [a, b, c] = self.corners;
+        let normal = (b - a).cross(c - a).normalize();
+        if self.mirrored { -normal } else { normal }
+    }
+}
+
+/// The scene's (x, y, z) as the file has it: there +y is up.
+pub fn to_file(p: DVec3) -> DVec3 {
+    DVec3::new(p.x, p.z, -p.y)
+}
+
+/// The scene that has a file alone, with further keys of its shape.
+pub fn scene_with(file: &Path, keys: &str) -> Scene {
+    try_scene(file, keys).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The same, or the error.
+pub fn try_scene(file: &Path, keys: &str) -> Result<Scene, String> {
+    let folder = file.parent().expect("a folder");
+    let name = file.file_name().expect("a name").to_string_lossy();
+    let text = format!("{SCENE}file = \"{name}\"\n{keys}\n");
+    let path = folder.join("scene.toml");
+    std::fs::write(&path, text).expect("a file");
+    Scene::load(&path).map_err(|error| error.to_string())
+}
+
+/// The scene of a file that is made here.
+pub fn scene(builder: &Builder, name: &str) -> Scene {
+    let place = Place::with_file("a", "");
+    scene_with(&builder.write(place.folder(), name, Packing::Binary), "")
+}
+
+/// The same with further keys of its shape.
+pub fn scene_by(builder: &Builder, name: &str, keys: &str) -> Scene {
+    let place = Place::with_file("a", "");
+    scene_with(&builder.write(place.folder(), name, Packing::Binary), keys)
+}
+
+/// What is told of a file that is refused, which is wrong itself or asks for what is not there.
+pub fn refusal(builder: &Builder, keys: &str) -> String {
+    let place = Place::with_file("a", "");
+    let file = builder.write_unsound(place.folder(), "bad", Packing::Binary);
+    match try_scene(&file, keys) {
+        Ok(_) => panic!("it was not refused"),
+        Err(message) => message,
+    }
+}
+
+/// All triangles of a scene, by their shapes and their order in the meshes.
+pub fn triangles(scene: &Scene) -> Vec<Triangle> {
+    let mut found = Vec::new();
+    for thing in &scene.shapes {
+        let Geometry::Mesh {
+            mesh,
+            to_world,
+            materials,
+        } = &thing.geometry
+        else {
+            continue;
+        };
+        let normals = to_world.matrix3.inverse().transpose();
+        for (i, triangle) in mesh.triangles.iter().enumerate() {
+            let vertices = triangle.map(|vertex| vertex as usize);
+            let group = mesh.group_of.get(i).map_or(0, |group| *group as usize);
+            found.push(Triangle {
+                corners: vertices
+                    .map(|v| to_file(to_world.transform_point3(mesh.center + mesh.positions[v].as_dvec3()))),
+                normals: vertices.map(|v| {
+                    let normal = mesh.normals.get(v).map_or(DVec3::ZERO, |normal| normal.as_dvec3());
+                    to_file((normals * normal).normalize_or_zero())
+                }),
+                uvs: vertices.map(|v| {
+                    let uv = mesh.uvs.get(v).map_or(DVec2::ZERO, |uv| uv.as_dvec2());
+                    DVec2::new(uv.x, 1.0 - uv.y)
+                }),
+                material: materials[group],
+                mirrored: to_world.matrix3.determinant() < 0.0,
+            });
+        }
+    }
+    found
+}
+
+/// The corners of a scene's triangles.
+pub fn corners(scene: &Scene) -> Vec<[DVec3; 3]> {
+    triangles(scene).iter().map(|triangle| triangle.corners).collect()
+}
+
+/// Holds the corners of triangles to those that are known, in this order.
+#[track_caller]
+pub fn assert_corners(scene: &Scene, known: &[[[f64; 3]; 3]]) {
+    let corners = corners(scene);
+    assert_eq!(corners.len(), known.len(), "triangles: {corners:?}");
+    for (found, known) in corners.iter().flatten().zip(known.as_flattened()) {
+        let known = DVec3::from_array(*known);
+        assert!(found.distance(known) < 1e-5, "{found} is not {known}, of {corners:?}");
+    }
+}
+
+/// The material of the scene's only mesh, or of its first triangle.
+pub fn material(scene: &Scene) -> &Material {
+    let triangles = triangles(scene);
+    &scene.materials[triangles.first().expect("a triangle").material]
+}
+
+/// What such a material reflects.
+pub fn principled(scene: &Scene) -> &Principled {
+    match &material(scene).reflection {
+        Reflection::Principled(principled) => principled,
+        other => panic!("{other:?} is not principled"),
+    }
+}
+
+/// A value that comes from no texture.
+#[track_caller]
+pub fn plain(value: Value) -> f64 {
+    match value {
+        Value::Plain(value) => value,
+        other => panic!("{other:?} is not plain"),
+    }
+}
+
+/// A colour that comes from no texture.
+#[track_caller]
+pub fn plain_color(color: Color) -> [f64; 3] {
+    match color {
+        Color::Plain(color) => color.to_array(),
+        other => panic!("{other:?} is not plain"),
+    }
+}
+
+/// Whether two numbers are the same but for the rounding of 32 bits.
+#[track_caller]
+pub fn assert_near<const N: usize>(found: [f64; N], known: [f64; N]) {
+    let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * b.abs().max(1.0);
+    assert!(found.iter().zip(&known).all(near), "{found:?} is not {known:?}");
+}
+
+/// The pixels of a scene, row by row from the top.
+pub fn pixels(scene: &Scene) -> Vec<[f32; 3]> {
+    let options = Options {
+        device: Device::Cpu,
+        ..Options::default()
+    };
+    wgray::render(scene, &options).expect("a picture").pixels().colors
+}
+
+/// Holds every pixel of a scene to one colour, to five digits.
+#[track_caller]
+pub fn assert_all(scene: &Scene, known: [f64; 3]) {
+    let pixels = pixels(scene);
+    for (i, pixel) in pixels.iter().enumerate() {
+        let near = (0..3).all(|k| (f64::from(pixel[k]) - known[k]).abs() < 1e-5 * known[k].max(1.0));
+        assert!(near, "pixel {i} is {pixel:?}, not {known:?}");
+    }
+}

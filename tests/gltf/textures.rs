@@ -1,0 +1,566 @@
+//! Images on surfaces: which texel is where, what each channel means, and normals.
+
+use serde_json::{Value, json};
+use wgray::{Aov, Channel, Device, Options, Scene};
+
+use super::build::{Builder, Component, Packing, QUAD, QUAD_INDICES, QUAD_UVS, png};
+use super::read::{assert_all, pixels, scene, scene_with};
+use crate::place::Place;
+
+const RED: [u8; 4] = [255, 0, 0, 255];
+const GREEN: [u8; 4] = [0, 255, 0, 255];
+const BLUE: [u8; 4] = [0, 0, 255, 255];
+const WHITE: [u8; 4] = [255; 4];
+
+/// An unlit quad with a texture.
+fn pictured(builder: &mut Builder, info: Value) {
+    let material = builder.unlit(json!({ "baseColorTexture": info }));
+    let mesh = builder.quad(Some(material));
+    builder.root_node(json!({ "mesh": mesh }));
+}
+
+/// Holds the quarters of the picture, from the top left, to colours.
+#[track_caller]
+fn assert_quarters(scene: &Scene, known: [[u8; 4]; 4]) {
+    let pixels = pixels(scene);
+    for (i, pixel) in pixels.iter().enumerate() {
+        let quarter = 2 * (i / 18) + i % 6 / 3;
+        let texel = known[quarter];
+        let color = [0, 1, 2].map(|k| f32::from(texel[k]) / 255.0);
+        assert_eq!(*pixel, color, "pixel {i} of {pixels:?}");
+    }
+}
+
+#[test]
+fn the_first_texel_is_at_the_upper_left() {
+    let mut builder = Builder::new();
+    let texture = builder.texture(2, &[RED, GREEN, BLUE, WHITE]);
+    pictured(&mut builder, json!({ "index": texture }));
+    assert_quarters(&scene(&builder, "texture"), [RED, GREEN, BLUE, WHITE]);
+}
+
+#[test]
+fn images_may_lie_in_the_buffer_beside_the_file_or_in_a_data_uri() {
+    let bytes = png(2, &[RED, GREEN, BLUE, WHITE]);
+    let place = Place::with_file("a", "");
+    for uri in ["my%20picture.png", "data"] {
+        let data = format!("data:image/png;base64,{}", super::build::base64(&bytes));
+        let uri = if uri == "data" { data.as_str() } else { uri };
+        let mut builder = Builder::new();
+        let image = builder.add("images", json!({ "uri": uri }));
+        let sampler = builder.add("samplers", json!({ "magFilter": 9728 }));
+        let texture = builder.add("textures", json!({ "source": image, "sampler": sampler }));
+        pictured(&mut builder, json!({ "index": texture }));
+        let name = if uri.len() < 20 { "image-beside" } else { "image-data" };
+        for folder in [
+            Some(place.folder().to_owned()),
+            std::env::var_os("WGRAY_TEST_GLTF").map(Into::into),
+        ] {
+            let write = |folder: std::path::PathBuf| std::fs::write(folder.join("my picture.png"), &bytes);
+            folder.map(write).transpose().expect("a file");
+        }
+        let file = builder.write(place.folder(), name, Packing::Embedded);
+        assert_quarters(&scene_with(&file, ""), [RED, GREEN, BLUE, WHITE]);
+    }
+}
+
+#[test]
+fn jpeg_and_webp_are_read() {
+    let rgb: Vec<u8> = [RED, GREEN, BLUE, WHITE]
+        .iter()
+        .flat_map(|texel| [texel[0], texel[1], texel[2]])
+        .collect();
+    let mut webp = Vec::new();
+    let encoder = image::codecs::webp::WebPEncoder::new_lossless(&mut webp);
+    encoder
+        .encode(&rgb, 2, 2, image::ExtendedColorType::Rgb8)
+        .expect("WebP");
+    let mut builder = Builder::new();
+    builder.requires("EXT_texture_webp");
+    let image = builder.image(&webp, "image/webp");
+    let sampler = builder.add("samplers", json!({ "magFilter": 9728 }));
+    let texture = json!({ "sampler": sampler, "extensions": { "EXT_texture_webp": { "source": image } } });
+    let texture = builder.add("textures", texture);
+    pictured(&mut builder, json!({ "index": texture }));
+    assert_quarters(&scene(&builder, "webp"), [RED, GREEN, BLUE, WHITE]);
+    // Each color on 8 x 8 texels, so that a JPEG has it as it is, nearly.
+    let large: Vec<u8> = (0..256).flat_map(|i| [[255, 0, 0], [255; 3]][(i / 8) % 2]).collect();
+    let mut jpeg = Vec::new();
+    let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 100);
+    encoder
+        .encode(&large, 16, 16, image::ExtendedColorType::Rgb8)
+        .expect("JPEG");
+    let mut builder = Builder::new();
+    let image = builder.image(&jpeg, "image/jpeg");
+    let texture = builder.add("textures", json!({ "source": image }));
+    pictured(&mut builder, json!({ "index": texture }));
+    let pixels = pixels(&scene(&builder, "jpeg"));
+    let near = |pixel: [f32; 3], known: [f32; 3]| (0..3).all(|k| (pixel[k] - known[k]).abs() < 0.02);
+    assert!(
+        near(pixels[1], [1.0, 0.0, 0.0]) && near(pixels[4], [1.0; 3]),
+        "{pixels:?}"
+    );
+}
+
+#[test]
+fn base_color_is_srgb_and_multiplied_by_its_factor() {
+    let mut builder = Builder::new();
+    let texture = builder.plain_texture([128, 255, 64, 255]);
+    let pbr = json!({ "baseColorTexture": { "index": texture }, "baseColorFactor": [0.5, 0.25, 1, 1] });
+    let material = builder.unlit(pbr);
+    let mesh = builder.quad(Some(material));
+    builder.root_node(json!({ "mesh": mesh }));
+    // IEC 61966-2-1.
+    let linear = |byte: f64| ((byte / 255.0 + 0.055) / 1.055).powf(2.4);
+    assert_all(&scene(&builder, "srgb"), [0.5 * linear(128.0), 0.25, linear(64.0)]);
+}
+
+#[test]
+fn textures_go_on_as_their_sampler_says() {
+    // From -1 to 2 in each direction, so that each third of the picture is one image: the columns' colours are red and green.
+    let (r, g) = (RED, GREEN);
+    for (mode, row) in [
+        (10497, [r, g, r, g, r, g]),
+        (33648, [g, r, r, g, g, r]),
+        (33071, [r, r, r, g, g, g]),
+    ] {
+        let mut builder = Builder::new();
+        let texture = builder.texture(2, &[RED, GREEN, RED, GREEN]);
+        builder.get("samplers")[0]["wrapS"] = json!(mode);
+        let uvs = QUAD_UVS.map(|[u, v]| [3.0 * u - 1.0, v]);
+        let position = builder.floats(&QUAD);
+        let uv = builder.floats(&uvs);
+        let material = builder.unlit(json!({ "baseColorTexture": { "index": texture } }));
+        let mesh = builder.quad_with(json!({ "POSITION": position, "TEXCOORD_0": uv }), Some(material));
+        builder.root_node(json!({ "mesh": mesh }));
+        let known = row.map(|texel: [u8; 4]| [0, 1, 2].map(|k| f32::from(texel[k]) / 255.0));
+        assert_eq!(pixels(&scene(&builder, &format!("wrap-{mode}")))[..6], known, "{mode}");
+    }
+}
+
+#[test]
+fn each_direction_may_go_on_in_its_own_way() {
+    let mut builder = Builder::new();
+    let texture = builder.texture(2, &[RED, GREEN, BLUE, WHITE]);
+    builder.get("samplers")[0]["wrapS"] = json!(10497);
+    builder.get("samplers")[0]["wrapT"] = json!(33071);
+    let position = builder.floats(&QUAD);
+    let uv = builder.floats(&QUAD_UVS.map(|[u, v]| [3.0 * u - 1.0, 3.0 * v - 1.0]));
+    let material = builder.unlit(json!({ "baseColorTexture": { "index": texture } }));
+    let mesh = builder.quad_with(json!({ "POSITION": position, "TEXCOORD_0": uv }), Some(material));
+    builder.root_node(json!({ "mesh": mesh }));
+    let pixels = pixels(&scene(&builder, "wrap-both"));
+    let top = [RED, GREEN, RED, GREEN, RED, GREEN].map(|texel| [0, 1, 2].map(|k| f32::from(texel[k]) / 255.0));
+    let bottom = [BLUE, WHITE, BLUE, WHITE, BLUE, WHITE].map(|texel| [0, 1, 2].map(|k| f32::from(texel[k]) / 255.0));
+    // Of three images the one in the middle is there, and its first and last rows go on.
+    for (i, row) in pixels.chunks(6).enumerate() {
+        assert_eq!(row, if i < 3 { top } else { bottom }, "row {i}");
+    }
+}
+
+#[test]
+fn a_texture_may_have_another_set_of_coordinates() {
+    for set in [1, 2] {
+        let mut builder = Builder::new();
+        let texture = builder.texture(2, &[RED, GREEN, BLUE, WHITE]);
+        let mut attributes = builder.quad_attributes();
+        attributes["TEXCOORD_1"] = json!(builder.floats(&QUAD_UVS.map(|[u, v]| [1.0 - u, v])));
+        attributes["TEXCOORD_2"] = json!(builder.floats(&QUAD_UVS.map(|[u, v]| [u, 1.0 - v])));
+        let material = builder.unlit(json!({ "baseColorTexture": { "index": texture, "texCoord": set } }));
+        let mesh = builder.quad_with(attributes, Some(material));
+        builder.root_node(json!({ "mesh": mesh }));
+        let known = if set == 1 {
+            [GREEN, RED, WHITE, BLUE]
+        } else {
+            [BLUE, WHITE, RED, GREEN]
+        };
+        assert_quarters(&scene(&builder, &format!("uv-set-{set}")), known);
+    }
+}
+
+/// The scene of a picture of four colors whose texture is transformed.
+fn transformed(name: &str, transform: Value) -> Scene {
+    let mut builder = Builder::new();
+    builder.uses("KHR_texture_transform");
+    let texture = builder.texture(2, &[RED, GREEN, BLUE, WHITE]);
+    let mut attributes = builder.quad_attributes();
+    attributes["TEXCOORD_1"] = json!(builder.floats(&QUAD_UVS.map(|[u, v]| [1.0 - u, v])));
+    let info = json!({ "index": texture, "extensions": { "KHR_texture_transform": transform } });
+    let material = builder.unlit(json!({ "baseColorTexture": info }));
+    let mesh = builder.quad_with(attributes, Some(material));
+    builder.root_node(json!({ "mesh": mesh }));
+    scene(&builder, name)
+}
+
+#[test]
+fn texture_transforms_are_those_of_the_extension() {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    assert_quarters(&transformed("transform-none", json!({})), [RED, GREEN, BLUE, WHITE]);
+    assert_quarters(
+        &transformed("transform-offset", json!({ "offset": [0.5, 0] })),
+        [GREEN, RED, WHITE, BLUE],
+    );
+    assert_quarters(
+        &transformed("transform-offset-v", json!({ "offset": [0, 0.5] })),
+        [BLUE, WHITE, RED, GREEN],
+    );
+    assert_quarters(
+        &transformed("transform-scale", json!({ "scale": [0.5, 0.5] })),
+        [RED; 4],
+    );
+    let lower = json!({ "offset": [0.5, 0.5], "scale": [0.5, 0.5] });
+    assert_quarters(&transformed("transform-lower", lower), [WHITE; 4]);
+    // The extension's own examples: the image turned clockwise, here all of it; and upside down.
+    let turned = json!({ "offset": [0, 1], "rotation": quarter });
+    assert_quarters(&transformed("transform-turn", turned), [BLUE, RED, WHITE, GREEN]);
+    let turned = json!({ "offset": [0, 1], "rotation": quarter, "scale": [0.5, 0.5] });
+    assert_quarters(&transformed("transform-turn-quarter", turned), [BLUE; 4]);
+    let flipped = json!({ "offset": [0, 1], "scale": [1, -1] });
+    assert_quarters(&transformed("transform-flip", flipped), [BLUE, WHITE, RED, GREEN]);
+    // Scaled before it is turned: an image of half the height, and of all of its width.
+    let both = json!({ "offset": [0, 1], "rotation": quarter, "scale": [0.5, 1] });
+    assert_quarters(&transformed("transform-order", both), [BLUE, BLUE, WHITE, WHITE]);
+    // Its set goes before that of the texture.
+    assert_quarters(
+        &transformed("transform-set", json!({ "texCoord": 1 })),
+        [GREEN, RED, WHITE, BLUE],
+    );
+}
+
+/// What each texture is multiplied by, and the plain values that are the same.
+struct Row {
+    name: &'static str,
+    texel: [u8; 4],
+    /// The material, where `TEXTURE` stands for a texture.
+    textured: Value,
+    plain: Value,
+}
+
+fn rows() -> Vec<Row> {
+    let pbr = |value: Value| json!({ "pbrMetallicRoughness": value });
+    let extension = |name: &str, value: Value| json!({ "pbrMetallicRoughness": { "metallicFactor": 0, "roughnessFactor": 0.5 }, "extensions": { name: value } });
+    let glossy = |name: &str, value: Value| json!({ "pbrMetallicRoughness": { "metallicFactor": 1, "roughnessFactor": 0.3 }, "extensions": { name: value } });
+    let row = |name, texel, textured, plain| Row {
+        name,
+        texel,
+        textured,
+        plain,
+    };
+    // The part of a direction that is a byte of 128.
+    let half: f64 = 128.0 / 255.0 * 2.0 - 1.0;
+    // What shines is a mirror here: else how its light is sampled would differ, as it does not for what is known to be plain.
+    vec![
+        row(
+            "base-color",
+            [255, 0, 255, 255],
+            pbr(json!({ "baseColorTexture": "TEXTURE", "baseColorFactor": [0.5, 0.5, 0.25, 1], "metallicFactor": 0 })),
+            pbr(json!({ "baseColorFactor": [0.5, 0, 0.25, 1], "metallicFactor": 0 })),
+        ),
+        row(
+            "metallic-roughness",
+            [0, 102, 51, 255],
+            pbr(json!({ "metallicRoughnessTexture": "TEXTURE", "metallicFactor": 0.5, "roughnessFactor": 0.75 })),
+            pbr(json!({ "metallicFactor": 0.1, "roughnessFactor": 0.3 })),
+        ),
+        row(
+            "emissive",
+            [255, 0, 255, 255],
+            json!({
+                "emissiveTexture": "TEXTURE", "emissiveFactor": [0.5, 1, 0.25],
+                "pbrMetallicRoughness": { "roughnessFactor": 0 },
+            }),
+            json!({ "emissiveFactor": [0.5, 0, 0.25], "pbrMetallicRoughness": { "roughnessFactor": 0 } }),
+        ),
+        row(
+            "emissive-strong",
+            [255, 0, 255, 255],
+            json!({
+                "emissiveTexture": "TEXTURE", "emissiveFactor": [0.5, 1, 0.25],
+                "pbrMetallicRoughness": { "roughnessFactor": 0 },
+                "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 4 } },
+            }),
+            json!({
+                "emissiveFactor": [0.5, 0, 0.25], "pbrMetallicRoughness": { "roughnessFactor": 0 },
+                "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 4 } },
+            }),
+        ),
+        row(
+            "specular",
+            [255, 255, 255, 51],
+            extension(
+                "KHR_materials_specular",
+                json!({ "specularTexture": "TEXTURE", "specularFactor": 0.5 }),
+            ),
+            extension("KHR_materials_specular", json!({ "specularFactor": 0.1 })),
+        ),
+        row(
+            "specular-color",
+            [255, 0, 255, 51],
+            extension(
+                "KHR_materials_specular",
+                json!({ "specularColorTexture": "TEXTURE", "specularColorFactor": [0.5, 0.5, 1] }),
+            ),
+            extension("KHR_materials_specular", json!({ "specularColorFactor": [0.5, 0, 1] })),
+        ),
+        row(
+            "transmission",
+            [51, 255, 255, 255],
+            extension(
+                "KHR_materials_transmission",
+                json!({ "transmissionTexture": "TEXTURE", "transmissionFactor": 0.5 }),
+            ),
+            extension("KHR_materials_transmission", json!({ "transmissionFactor": 0.1 })),
+        ),
+        row(
+            "clearcoat",
+            [51, 255, 255, 255],
+            extension(
+                "KHR_materials_clearcoat",
+                json!({ "clearcoatTexture": "TEXTURE", "clearcoatFactor": 0.5 }),
+            ),
+            extension("KHR_materials_clearcoat", json!({ "clearcoatFactor": 0.1 })),
+        ),
+        row(
+            "clearcoat-roughness",
+            [255, 102, 255, 255],
+            extension(
+                "KHR_materials_clearcoat",
+                json!({
+                    "clearcoatRoughnessTexture": "TEXTURE", "clearcoatRoughnessFactor": 0.75, "clearcoatFactor": 1,
+                }),
+            ),
+            extension(
+                "KHR_materials_clearcoat",
+                json!({ "clearcoatRoughnessFactor": 0.3, "clearcoatFactor": 1 }),
+            ),
+        ),
+        row(
+            "sheen-color",
+            [255, 0, 255, 255],
+            extension(
+                "KHR_materials_sheen",
+                json!({
+                    "sheenColorTexture": "TEXTURE", "sheenColorFactor": [0.5, 0.5, 1], "sheenRoughnessFactor": 0.5,
+                }),
+            ),
+            extension(
+                "KHR_materials_sheen",
+                json!({ "sheenColorFactor": [0.5, 0, 1], "sheenRoughnessFactor": 0.5 }),
+            ),
+        ),
+        row(
+            "sheen-roughness",
+            [255, 255, 255, 102],
+            extension(
+                "KHR_materials_sheen",
+                json!({
+                    "sheenRoughnessTexture": "TEXTURE", "sheenColorFactor": [1, 1, 1], "sheenRoughnessFactor": 0.75,
+                }),
+            ),
+            extension(
+                "KHR_materials_sheen",
+                json!({ "sheenColorFactor": [1, 1, 1], "sheenRoughnessFactor": 0.3 }),
+            ),
+        ),
+        row(
+            "anisotropy",
+            [255, 128, 153, 255],
+            glossy(
+                "KHR_materials_anisotropy",
+                json!({ "anisotropyTexture": "TEXTURE", "anisotropyStrength": 0.5 }),
+            ),
+            glossy(
+                "KHR_materials_anisotropy",
+                json!({ "anisotropyStrength": 0.3, "anisotropyRotation": half.atan2(1.0) }),
+            ),
+        ),
+        row(
+            "anisotropy-direction",
+            [128, 255, 255, 255],
+            glossy(
+                "KHR_materials_anisotropy",
+                json!({ "anisotropyTexture": "TEXTURE", "anisotropyStrength": 0.8, "anisotropyRotation": 0.25 }),
+            ),
+            glossy(
+                "KHR_materials_anisotropy",
+                json!({ "anisotropyStrength": 0.8, "anisotropyRotation": 0.25 + 1.0_f64.atan2(half) }),
+            ),
+        ),
+    ]
+}
+
+/// A quad that leans back, under a light from the right and above.
+fn leaning(name: &str, texel: [u8; 4], material: &Value) -> Scene {
+    let mut builder = Builder::new();
+    builder.uses("KHR_lights_punctual");
+    let texture = builder.plain_texture(texel);
+    let text = material
+        .to_string()
+        .replace("\"TEXTURE\"", &json!({ "index": texture }).to_string());
+    let material: Value = serde_json::from_str(&text).expect("JSON");
+    if let Some(extensions) = material["extensions"].as_object() {
+        extensions.keys().for_each(|extension| builder.uses(extension));
+    }
+    let material = builder.add("materials", material);
+    let mut attributes = builder.quad_attributes();
+    attributes["TANGENT"] = json!(builder.floats(&[[1.0, 0.0, 0.0, 1.0]; 4]));
+    let mesh = builder.quad_with(attributes, Some(material));
+    builder.root_node(json!({ "mesh": mesh, "rotation": [-0.3826834323650898, 0, 0, 0.9238795325112867] }));
+    let lights = json!({ "lights": [{ "type": "directional", "intensity": 3 }] });
+    builder.set("extensions", json!({ "KHR_lights_punctual": lights }));
+    let turn = glam::DQuat::from_euler(glam::EulerRot::YXZ, 0.4, -0.9, 0.0).to_array();
+    builder.root_node(json!({ "rotation": turn, "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    scene(&builder, name)
+}
+
+#[test]
+fn a_texture_of_one_color_is_as_its_product_with_the_factor() {
+    for row in rows() {
+        let name = format!("texture-{}", row.name);
+        let textured = pixels(&leaning(&name, row.texel, &row.textured));
+        let plain = pixels(&leaning(&format!("{name}-plain"), row.texel, &row.plain));
+        let white = pixels(&leaning(&format!("{name}-white"), WHITE, &row.textured));
+        let far = |a: &[[f32; 3]], b: &[[f32; 3]]| {
+            let pairs = a.as_flattened().iter().zip(b.as_flattened());
+            pairs
+                .map(|(a, b)| (a - b).abs() / b.abs().max(0.05))
+                .fold(0.0, f32::max)
+        };
+        // What facets lose is in a table that is coarser where anisotropy comes from a texture.
+        let bound = if row.name.starts_with("anisotropy") { 0.01 } else { 1e-5 };
+        assert!(far(&textured, &plain) < bound, "{}: {textured:?} {plain:?}", row.name);
+        // And the texture matters.
+        assert!(far(&white, &plain) > 0.1, "{}: {white:?} {plain:?}", row.name);
+    }
+}
+
+#[test]
+fn occlusion_is_ignored_and_said() {
+    let mut builder = Builder::new();
+    let texture = builder.plain_texture([0, 0, 0, 255]);
+    let material = json!({
+        "occlusionTexture": { "index": texture },
+        "pbrMetallicRoughness": { "baseColorFactor": [0.25, 0.5, 0.75, 1], "roughnessFactor": 0 },
+    });
+    let material = builder.add("materials", material);
+    let mesh = builder.quad(Some(material));
+    builder.root_node(json!({ "mesh": mesh }));
+    let scene = scene(&builder, "occlusion");
+    assert_all(&scene, [0.25, 0.5, 0.75]);
+    assert!(
+        scene.notes.iter().any(|note| note.contains("occlusion")),
+        "{:?}",
+        scene.notes
+    );
+}
+
+/// The shading normal of a quad with a normal map of one texel, in the coordinates of the file.
+fn bent(name: &str, map: Value, uvs: [[f64; 2]; 4], tangent: Option<[f64; 4]>) -> [f64; 3] {
+    let mut builder = Builder::new();
+    builder.uses("KHR_texture_transform");
+    // About (0.6, 0.2, 0.77): to the right, and a little up.
+    let texture = builder.plain_texture([204, 153, 226, 255]);
+    let mut info = map;
+    info["index"] = json!(texture);
+    let material = builder.add("materials", json!({ "normalTexture": info }));
+    let position = builder.floats(&QUAD);
+    let normal = builder.floats(&[[0.0, 0.0, 1.0]; 4]);
+    let uv = builder.floats(&uvs);
+    let mut attributes = json!({ "POSITION": position, "NORMAL": normal, "TEXCOORD_0": uv });
+    if let Some(tangent) = tangent {
+        attributes["TANGENT"] = json!(builder.floats(&[tangent; 4]));
+    }
+    let mesh = builder.quad_with(attributes, Some(material));
+    builder.root_node(json!({ "mesh": mesh }));
+    let scene = scene(&builder, name);
+    let options = Options {
+        device: Device::Cpu,
+        aovs: vec![Aov::ShadingNormal],
+        ..Options::default()
+    };
+    let picture = wgray::render(&scene, &options).expect("a picture");
+    let of = |axis: &str| match picture.channel(&format!("shading_normal.{axis}")) {
+        Some(Channel::Floats(values)) => f64::from(values[14]),
+        other => panic!("{other:?}"),
+    };
+    [of("X"), of("Z"), -of("Y")]
+}
+
+#[test]
+fn normal_maps_lean_as_their_texels_say() {
+    let known = |name: &str, found: [f64; 3], known: [f64; 3]| {
+        let length = known.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let near = (0..3).all(|k| (found[k] - known[k] / length).abs() < 0.002);
+        assert!(near, "{name}: {found:?}, not {:?}", known.map(|x| x / length));
+    };
+    let (x, y, z) = (0.6, 0.2, 226.0 / 255.0 * 2.0 - 1.0);
+    let upright = QUAD_UVS;
+    let check = |name: &str, map: Value, uvs, tangent, normal| known(name, bent(name, map, uvs, tangent), normal);
+    // Red is along u, green against v, which goes down: glTF 2.0, 3.9.3.
+    check("normal", json!({}), upright, None, [x, y, z]);
+    check(
+        "normal-scale",
+        json!({ "scale": 0.5 }),
+        upright,
+        None,
+        [0.5 * x, 0.5 * y, z],
+    );
+    // Mirrored and turned coordinates take the normal along.
+    check(
+        "normal-mirrored",
+        json!({}),
+        QUAD_UVS.map(|[u, v]| [1.0 - u, v]),
+        None,
+        [-x, y, z],
+    );
+    check(
+        "normal-turned",
+        json!({}),
+        QUAD_UVS.map(|[u, v]| [v, 1.0 - u]),
+        None,
+        [y, -x, z],
+    );
+    // The file's tangents go before those of its coordinates.
+    check(
+        "normal-tangent",
+        json!({}),
+        upright,
+        Some([0.0, 1.0, 0.0, 1.0]),
+        [-y, x, z],
+    );
+    check(
+        "normal-handed",
+        json!({}),
+        upright,
+        Some([1.0, 0.0, 0.0, -1.0]),
+        [x, -y, z],
+    );
+}
+
+#[test]
+fn a_transformed_normal_map_keeps_its_tangents() {
+    // KHR_texture_transform moves what is looked up; tangents are those of the mesh.
+    let turned = json!({ "extensions": { "KHR_texture_transform": { "rotation": std::f64::consts::FRAC_PI_2 } } });
+    let found = bent("normal-transformed", turned, QUAD_UVS, Some([1.0, 0.0, 0.0, 1.0]));
+    assert!(
+        (found[0] - 0.6).abs() < 0.01 && (found[1] - 0.2).abs() < 0.01,
+        "{found:?}"
+    );
+}
+
+#[test]
+fn samplers_without_filters_and_textures_without_sources_are_taken() {
+    let mut builder = Builder::new();
+    let image = builder.image(&png(1, &[[255; 4]]), "image/png");
+    let texture = builder.add("textures", json!({ "source": image }));
+    let empty = builder.add("textures", json!({}));
+    let material =
+        builder.unlit(json!({ "baseColorTexture": { "index": texture }, "baseColorFactor": [0.5, 0.5, 0.5, 1] }));
+    builder.get("materials")[material]["emissiveTexture"] = json!({ "index": empty });
+    let indices = builder.indices_of(Component::U16, &QUAD_INDICES);
+    let attributes = builder.quad_attributes();
+    let primitive = json!({ "attributes": attributes, "indices": indices, "material": material });
+    let mesh = builder.add("meshes", json!({ "primitives": [primitive] }));
+    builder.root_node(json!({ "mesh": mesh }));
+    assert_all(&scene(&builder, "sampler-none"), [0.5; 3]);
+}

@@ -1,0 +1,684 @@
+//! What vertices of meshes have beside positions, normals and texture coordinates: colours, further sets of coordinates, tangents; by closed
+//! forms, and the same bits on both paths. And textures' factors, and what the camera sees of backs.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{Vec2, Vec4};
+use wgray::mesh::Mesh;
+use wgray::pack::{Packed, pack};
+use wgray::scene::{Assets, Description, Geometry};
+
+use super::load;
+use crate::pictures::{Way, both, differing, exact_ways, first_hits, means, reference, render};
+use crate::textures::{write_exr, write_png};
+
+/// A square of side 2, one vertex twice, from (-1, -1) to (1, 1), with texture coordinates from 0 to 1.
+const QUAD: &str = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n\
+                    f 1/1/1 2/2/1 3/3/1 4/4/1\n";
+/// Straight down on that, to its edges.
+const DOWN: &str =
+    "camera = { type = 'orthographic', position = [0, 0, 9], look_at = [0, 0, 0], up = [0, 1, 0], height = 2 }\n";
+/// From one side.
+const ASIDE: &str = "camera = { position = [0.4, -2.2, 1.9], look_at = [0, 0, 0], fov = 60 }\n";
+const SHAPE: &str = "[[shapes]]\ntype = 'mesh'\nfile = 'quad.obj'\nmaterial = 'm'\n";
+/// The colours of the corners of the square, in the order of its vertices.
+const COLORS: [[f32; 4]; 4] = [
+    [1.0, 0.0, 0.25, 1.0],
+    [0.5, 0.5, 0.25, 0.0],
+    [0.0, 1.0, 0.25, 0.5],
+    [0.5, 0.5, 0.25, 1.0],
+];
+
+/// A scene of 20 x 20 pixels whose meshes are changed before they are packed.
+fn scene(folder: &Path, samples: u32, text: &str, edit: impl Fn(&mut Mesh)) -> Packed {
+    std::fs::write(folder.join("quad.obj"), QUAD).unwrap();
+    let text = format!(
+        "image = {{ width = 20, height = 20 }}\n{text}\n\
+         [render]\nintegrator = 'path'\nmax_depth = 4\npixel_samples = {{ count = {samples} }}\n"
+    );
+    let description = Description::parse(&text, "quad.toml").unwrap_or_else(|error| panic!("{error}"));
+    let scene = description.validate_with(&Assets::beside(folder));
+    let mut scene = scene.unwrap_or_else(|error| panic!("{error}"));
+    for shape in &mut scene.shapes {
+        if let Geometry::Mesh { mesh, .. } = &mut shape.geometry {
+            let mut own = (**mesh).clone();
+            edit(&mut own);
+            *mesh = Arc::new(own);
+        }
+    }
+    pack(&scene)
+}
+
+fn colored(mesh: &mut Mesh) {
+    mesh.colors = mesh
+        .positions
+        .iter()
+        .map(|p| {
+            let corner = match (p.x > 0.0, p.y > 0.0) {
+                (false, false) => 0,
+                (true, false) => 1,
+                (true, true) => 2,
+                (false, true) => 3,
+            };
+            Vec4::from_array(COLORS[corner])
+        })
+        .collect();
+}
+
+/// The colour at a point of the square: the triangles are (0, 1, 2) and (0, 2, 3).
+fn color_at(x: f64, y: f64) -> [f64; 4] {
+    let [s, t] = [x, y].map(|x| (x + 1.0) / 2.0);
+    let weights = match s > t {
+        true => [1.0 - s, s - t, t, 0.0],
+        false => [1.0 - t, 0.0, s, t - s],
+    };
+    std::array::from_fn(|k| (0..4).map(|i| weights[i] * f64::from(COLORS[i][k])).sum())
+}
+
+/// Where the middle of a pixel is, seen from above.
+fn place(i: usize) -> (f64, f64) {
+    ((i % 20) as f64 / 10.0 - 0.95, 0.95 - (i / 20) as f64 / 10.0)
+}
+
+#[test]
+fn colors_of_vertices_are_interpolated() {
+    let folder = tempfile::tempdir().unwrap();
+    // Emission is seen as it is. A quarter of what a point of the pixel's square sees is the middle's colour; the sum of all is exact in the mean,
+    // as it is linear but for the diagonal.
+    let emission = "materials.m = { type = 'principled', base_color = [0, 0, 0], specular = 0, emission = [2, 2, 2], vertex_colors = 'emission' }\n";
+    let base = "environment = { color = [1, 1, 1] }\n\
+                materials.m = { type = 'principled', metallic = 0, specular = 0, vertex_colors = 'base_color' }\n";
+    for (material, factor, error) in [(emission, 2.0, 0.02), (base, 1.0, 0.02)] {
+        let packed = scene(folder.path(), 64, &format!("{DOWN}{material}{SHAPE}"), colored);
+        let plain = scene(folder.path(), 64, &format!("{DOWN}{material}{SHAPE}"), |_| ());
+        for way in both() {
+            for (i, found) in means(&render(&packed, way)).iter().enumerate() {
+                let (x, y) = place(i);
+                let expected = color_at(x, y);
+                for k in 0..3 {
+                    let expected = factor * expected[k];
+                    assert!(
+                        (found[k] - expected).abs() < error,
+                        "{way:?} {x} {y}: {found:?} {expected}"
+                    );
+                }
+                assert!((found[2] - 0.25 * factor).abs() < 1e-5, "{way:?}: {found:?}");
+            }
+            // A mesh without colours is white.
+            for found in means(&render(&plain, way)) {
+                assert!(found.iter().all(|x| (x - factor).abs() < 1e-5), "{way:?}: {found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn colors_beyond_one_are_bounded_where_they_make_light() {
+    let folder = tempfile::tempdir().unwrap();
+    let bright = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(4.0, 0.5, 1e6, 1.0); mesh.positions.len()];
+    let material = |keys: &str| {
+        format!(
+            "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'principled', specular = 0, metallic = 0, {keys} }}\n{SHAPE}"
+        )
+    };
+    let base = scene(
+        folder.path(),
+        16,
+        &material("vertex_colors = 'base_color', base_color = [0.5, 0.5, 0.5]"),
+        bright,
+    );
+    let emission = scene(
+        folder.path(),
+        16,
+        &material("vertex_colors = 'emission', base_color = [0, 0, 0], emission = [1, 1, 1]"),
+        bright,
+    );
+    for way in both() {
+        for (packed, expected) in [(&base, [1.0, 0.25, 1.0]), (&emission, [4.0, 0.5, 1e6])] {
+            for found in means(&render(packed, way)) {
+                let near = (0..3).all(|k| (found[k] / expected[k] - 1.0).abs() < 1e-4);
+                assert!(near, "{way:?}: {found:?} {expected:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_alpha_of_vertices_is_a_factor_of_alpha() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = |colors: &str, mode: &str, alpha: f64| {
+        format!(
+            "{DOWN}environment = {{ color = [1, 1, 1] }}\nmaterials.m = {{ type = 'principled', base_color = [0, 0, 0], metallic = 0, \
+             specular = 0, alpha = {alpha}, alpha_mode = '{mode}', alpha_cutoff = 0.4, vertex_colors = '{colors}' }}\n{SHAPE}"
+        )
+    };
+    for colors in ["base_color", "emission"] {
+        let blended = scene(folder.path(), 256, &text(colors, "blend", 0.8), colored);
+        let masked = scene(folder.path(), 4, &text(colors, "mask", 0.8), colored);
+        let opaque = scene(folder.path(), 4, &text(colors, "opaque", 1.0), colored);
+        for way in both() {
+            let found = means(&render(&blended, way));
+            let seen = first_hits(&blended, way);
+            let cut = means(&render(&masked, way));
+            for i in 0..400 {
+                let (x, y) = place(i);
+                let alpha = 0.8 * color_at(x, y)[3];
+                assert!(
+                    (found[i][0] - (1.0 - alpha)).abs() < 0.16,
+                    "{way:?} {x} {y}: {:?} {alpha}",
+                    found[i]
+                );
+                if (alpha - 0.5).abs() > 0.01 {
+                    assert_eq!(seen[i].depth > 0.0, alpha > 0.5, "{way:?} {x} {y} {alpha}");
+                }
+                if (alpha - 0.4).abs() > 0.08 {
+                    assert_eq!(
+                        cut[i][0],
+                        if alpha > 0.4 { 0.0 } else { 1.0 },
+                        "{way:?} {x} {y} {alpha}"
+                    );
+                }
+            }
+            let mean = found.iter().map(|pixel| pixel[0]).sum::<f64>() / 400.0;
+            // The mean of the corners' alpha on two triangles: the ends of the diagonal are corners of both.
+            let alpha = 0.8 * (2.0 * (1.0 + 0.5) + 0.0 + 1.0) / 6.0;
+            assert!((mean - (1.0 - alpha)).abs() < 0.01, "{way:?}: {mean} {alpha}");
+            assert!(means(&render(&opaque, way)).iter().all(|pixel| pixel[0] == 0.0));
+        }
+    }
+}
+
+#[test]
+fn what_shines_by_its_vertices_lights_so() {
+    // Seen by a floor under it, of which the camera sees a part: lamps of the colour itself, and lamps by their vertices; the same samples.
+    let folder = tempfile::tempdir().unwrap();
+    let text = |keys: &str| {
+        format!(
+            "camera = {{ type = 'orthographic', position = [0, 0, 0.5], look_at = [0, 0, 0], up = [0, 1, 0], height = 1 }}\n\
+             materials.m = {{ type = 'principled', base_color = [0, 0, 0], specular = 0, {keys} }}\n\
+             materials.floor = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n\
+             {SHAPE}translate = [0, 0, 1]\n[[shapes]]\ntype = 'rectangle'\nmaterial = 'floor'\ncenter = [0, 0, 0]\nsize = [9, 9]\n\
+             normal = [0, 0, 1]\ntangent = [1, 0, 0]\n"
+        )
+    };
+    let half = |mesh: &mut Mesh| mesh.colors = vec![Vec4::new(0.5, 0.25, 1.0, 0.5); mesh.positions.len()];
+    for (alpha, own_alpha) in [
+        ("", ""),
+        (
+            "alpha_mode = 'blend', alpha = 1, ",
+            "alpha_mode = 'blend', alpha = 0.5, ",
+        ),
+    ] {
+        let of_vertices = scene(
+            folder.path(),
+            16,
+            &text(&format!("{alpha}emission = [4, 4, 4], vertex_colors = 'emission'")),
+            half,
+        );
+        let own = scene(
+            folder.path(),
+            16,
+            &text(&format!("{own_alpha}emission = [2, 1, 4]")),
+            |_| (),
+        );
+        let expected = reference(&own);
+        assert!(means(&expected).iter().all(|pixel| pixel[0] > 0.1));
+        for way in exact_ways() {
+            let found = means(&render(&of_vertices, way));
+            for (found, expected) in found.iter().zip(means(&expected)) {
+                let near = (0..3).all(|k| (found[k] / expected[k] - 1.0).abs() < 1e-5);
+                assert!(near, "{way:?}: {found:?} {expected:?}");
+            }
+        }
+    }
+}
+
+/// Sets of texture coordinates: the first of the file, and three others.
+fn with_sets(mesh: &mut Mesh) {
+    let set = |map: fn(Vec2) -> Vec2| mesh.uvs.iter().copied().map(map).collect::<Vec<_>>();
+    mesh.more_uvs = vec![
+        set(|uv| Vec2::new(3.0 * uv.y, 0.5 + uv.x)),
+        set(|uv| Vec2::new(0.7 - uv.x, 2.0 * uv.x + 5.0 * uv.y)),
+        set(|uv| uv * uv + Vec2::new(0.25, 0.125)),
+    ];
+}
+
+#[test]
+fn textures_lie_by_their_set_of_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    write_exr(&folder.path().join("t.exr"), 8, 8, |x, y| {
+        [
+            x as f32 / 8.0,
+            y as f32 / 8.0,
+            if (x + y) % 2 == 0 { 1.0 } else { 0.25 },
+        ]
+    });
+    let text = |set: u32, filter: &str, keys: &str| {
+        format!(
+            "{ASIDE}environment = {{ color = [0.5, 0.5, 0.5] }}\n\
+             [textures.t]\ntype = 'image'\nfile = 't.exr'\nfilter = '{filter}'\nuv_set = {set}\n\
+             [textures.first]\ntype = 'image'\nfile = 't.exr'\nfilter = '{filter}'\n\
+             [materials.m]\ntype = 'principled'\nroughness = {{ texture = 'first', channel = 'g' }}\n{keys}\n{SHAPE}"
+        )
+    };
+    let keys = [
+        "base_color = { texture = 't' }",
+        "emission = { texture = 't' }\nbase_color = [0, 0, 0]",
+        "base_color = [0, 0, 0]\nalpha = { texture = 't', channel = 'b' }\nalpha_mode = 'blend'",
+    ];
+    for (keys, filter) in [
+        (keys[0], "ewa"),
+        (keys[0], "nearest"),
+        (keys[1], "trilinear"),
+        (keys[2], "bilinear"),
+    ] {
+        let by_set: Vec<_> = (0..5)
+            .map(|set| scene(folder.path(), 4, &text(set, filter, keys), with_sets))
+            .collect();
+        for set in 0..4 {
+            // The same coordinates as the first set, of a mesh that has no others: only roughness has others then, so that it is left out.
+            let without = |text: String| text.replace("roughness = { texture = 'first', channel = 'g' }\n", "");
+            let first = |mesh: &mut Mesh| {
+                with_sets(mesh);
+                let sets = std::mem::take(&mut mesh.more_uvs);
+                if set > 0 {
+                    mesh.uvs = sets[set - 1].clone();
+                }
+            };
+            let expected = reference(&scene(folder.path(), 4, &without(text(0, filter, keys)), first));
+            let found = scene(folder.path(), 4, &without(text(set as u32, filter, keys)), with_sets);
+            // The frame of facets is that of the first set.
+            let found = reference(&found);
+            let near = means(&found)
+                .iter()
+                .zip(means(&expected))
+                .all(|(a, b)| (0..3).all(|k| (a[k] - b[k]).abs() < 1e-4));
+            assert!(near, "{keys} {filter} {set}");
+        }
+        // Kernels with trees take seconds to compile.
+        if filter != "nearest" && exact_ways().len() > 1 {
+            let packed = &by_set[3];
+            assert_eq!(
+                differing(&render(packed, Way::Baked), &reference(packed)),
+                0,
+                "{keys} {filter}"
+            );
+        }
+        let pictures: Vec<_> = by_set.iter().map(reference).collect();
+        for (i, a) in pictures.iter().enumerate() {
+            for b in &pictures[..i] {
+                assert!(differing(a, b) > 10, "{keys} {filter}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_set_that_a_mesh_has_not_is_one_point() {
+    let folder = tempfile::tempdir().unwrap();
+    write_exr(&folder.path().join("t.exr"), 4, 4, |x, y| [x as f32, y as f32, 1.0]);
+    let text = format!(
+        "{DOWN}[textures.t]\ntype = 'image'\nfile = 't.exr'\nfilter = 'nearest'\nuv_set = 7\n\
+         [materials.m]\ntype = 'principled'\nbase_color = [0, 0, 0]\nspecular = 0\nemission = {{ texture = 't' }}\n{SHAPE}"
+    );
+    for edit in [with_sets, |_: &mut Mesh| ()] {
+        let packed = scene(folder.path(), 1, &text, edit);
+        for way in both() {
+            assert!(
+                means(&render(&packed, way))
+                    .iter()
+                    .all(|pixel| *pixel == [0.0, 3.0, 1.0]),
+                "{way:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn factors_are_multiplied_onto_what_images_give() {
+    let folder = tempfile::tempdir().unwrap();
+    write_png(&folder.path().join("t.png"), 2, 2, |_, _| [255, 51, 102]);
+    image::RgbaImage::from_pixel(2, 2, image::Rgba([255, 255, 255, 51]))
+        .save(folder.path().join("a.png"))
+        .unwrap();
+    let text = |keys: &str| {
+        format!(
+            "{DOWN}environment = {{ color = [1, 1, 1] }}\n\
+             textures.t = {{ type = 'image', file = 't.png', encoding = 'linear', factor = [0.5, 1, 0.25, 1] }}\n\
+             textures.light = {{ type = 'image', file = 't.png', encoding = 'linear', factor = [20, 1000, 0, 0.5] }}\n\
+             textures.a = {{ type = 'image', file = 'a.png', factor = [0, 0, 0, 0.5] }}\n\
+             [materials.m]\ntype = 'principled'\nmetallic = 0\nspecular = 0\n{keys}\n{SHAPE}"
+        )
+    };
+    for (keys, expected, error) in [
+        ("base_color = { texture = 't' }", [0.5, 0.2, 0.1], 1e-4),
+        (
+            "base_color = [0, 0, 0]\nemission = { texture = 'light' }",
+            [20.0, 200.0, 0.0],
+            1e-3,
+        ),
+        // What is there is black: 0.2 of the image, half of that.
+        (
+            "base_color = [0, 0, 0]\nalpha_mode = 'blend'\nalpha = { texture = 'a', channel = 'a' }",
+            [0.9; 3],
+            0.02,
+        ),
+        (
+            "base_color = [0, 0, 0]\nalpha_mode = 'blend'\nalpha = { texture = 't', channel = 'b' }",
+            [0.9; 3],
+            0.02,
+        ),
+    ] {
+        let packed = scene(folder.path(), 64, &text(keys), |_| ());
+        for way in both() {
+            let found = means(&render(&packed, way));
+            let mean: [f64; 3] = std::array::from_fn(|k| found.iter().map(|pixel| pixel[k]).sum::<f64>() / 400.0);
+            assert!(
+                (0..3).all(|k| (mean[k] - expected[k]).abs() <= error),
+                "{keys} {way:?}: {mean:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn factors_and_sets_that_cannot_be_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    image::RgbaImage::from_pixel(2, 2, image::Rgba([255, 255, 255, 51]))
+        .save(folder.path().join("a.png"))
+        .unwrap();
+    std::fs::write(folder.path().join("quad.obj"), QUAD).unwrap();
+    let start = "image = { width = 1, height = 1 }\nrender = { integrator = 'path' }\ncamera = { position = [0, -5, 1], look_at = [0, 0, 0], fov = 40 }\n\
+                 textures.t = { type = 'image', file = 'a.png', encoding = 'linear', factor = [0.5, 1.5, 1, 3] }\n\
+                 textures.second = { type = 'image', file = 'a.png', uv_set = 1 }\n";
+    let sphere = "[[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
+    let message = |keys: &str, shape: &str| {
+        let text = format!("{start}materials.m = {{ type = 'principled', {keys} }}\n{shape}");
+        let description = Description::parse(&text, "s.toml").unwrap();
+        description
+            .validate_with(&Assets::beside(folder.path()))
+            .err()
+            .map(|error| error.to_string())
+    };
+    for (keys, shape, expected) in [
+        (
+            "base_color = { texture = 't' }",
+            SHAPE,
+            "materials.m.base_color: its texture's factor is 1.5, and must be from 0 to 1 here",
+        ),
+        (
+            "sheen_color = { texture = 't' }",
+            SHAPE,
+            "materials.m.sheen_color: its texture's factor is 1.5, and must be from 0 to 1 here",
+        ),
+        (
+            "roughness = { texture = 't', channel = 'g' }",
+            SHAPE,
+            "materials.m.roughness: its texture's factor is 1.5, and must be from 0 to 1 here",
+        ),
+        (
+            "alpha_mode = 'mask', alpha = { texture = 't', channel = 'a' }",
+            SHAPE,
+            "materials.m.alpha: its texture's factor is 3, and must be from 0 to 1 here",
+        ),
+        (
+            "normal_map = { texture = 't' }",
+            SHAPE,
+            "materials.m.normal_map.texture: \"t\" must have no factor to be a normal map; its strength is the map's own",
+        ),
+        (
+            "base_color = { texture = 'second' }",
+            sphere,
+            "shapes[0].material: \"m\" must have no texture with uv_set = 1 here, as this shape has the set 0 alone",
+        ),
+    ] {
+        let message = message(keys, shape);
+        assert!(
+            message.as_deref().is_some_and(|message| message.contains(expected)),
+            "{keys}: {message:?}"
+        );
+    }
+    for (keys, shape) in [
+        (
+            "emission = { texture = 't' }, specular_color = { texture = 't' }",
+            SHAPE,
+        ),
+        (
+            "roughness = { texture = 't' }, metallic = { texture = 't', channel = 'b' }",
+            SHAPE,
+        ),
+        ("base_color = { texture = 'second' }", SHAPE),
+    ] {
+        assert_eq!(message(keys, shape), None, "{keys}");
+    }
+}
+
+#[test]
+fn the_camera_goes_through_backs_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    // A wall before a floor that a lamp lights from behind the camera, whose light the wall holds off from either side.
+    let text = |height: f64, side: &str, transform: &str| {
+        format!(
+            "camera = {{ type = 'orthographic', position = [0, 0, {height}], look_at = [0, 0, 0], up = [0, 1, 0], height = 1.5 }}\n\
+             materials.m = {{ type = 'principled', base_color = [0.9, 0.2, 0.1], metallic = 0, {side} }}\n\
+             materials.floor = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n\
+             {SHAPE}translate = [0, 0, 1]\n{transform}\n[[shapes]]\ntype = 'rectangle'\nmaterial = 'floor'\ncenter = [0, 0, 0]\nsize = [9, 9]\n\
+             normal = [0, 0, 1]\ntangent = [1, 0, 0]\n[[lights]]\ntype = 'rectangle'\ncenter = [0.5, 0, 6]\nsize = [1, 1]\nnormal = [0, 0, -1]\n\
+             tangent = [1, 0, 0]\ncolor = [9, 9, 9]\n"
+        )
+    };
+    let turned = "rotate = [180, 0, 0]";
+    for (height, transform, seen) in [
+        (5.0, "", true),
+        (5.0, turned, false),
+        (5.0, "scale = [-1, 1, 1]", true),
+        (5.0, "scale = [1, 1, -1]", false),
+        (5.0, "rotate = [180, 0, 0]\nscale = [1, 1, -1]", true),
+        (0.5, "", true),
+    ] {
+        let find = |side: &str| scene(folder.path(), 8, &text(height, side, transform), |_| ());
+        let packed = find("double_sided = false");
+        let expected = find(if seen { "double_sided = true" } else { "visible = false" });
+        let other = find(if seen { "visible = false" } else { "double_sided = true" });
+        // Kernels with trees take seconds to compile.
+        let ways = match transform == turned {
+            true => exact_ways().into_iter().filter(|way| *way != Way::Buffers).collect(),
+            false => vec![Way::Cpu],
+        };
+        for way in ways {
+            let picture = render(&packed, way);
+            assert_eq!(
+                differing(&picture, &reference(&expected)),
+                0,
+                "{height} {transform} {way:?}"
+            );
+            // Under the wall both see the floor.
+            assert!(
+                height < 1.0 || differing(&picture, &reference(&other)) > 300,
+                "{height} {transform} {way:?}"
+            );
+            let hits: Vec<u32> = first_hits(&packed, way).iter().map(|hit| hit.shape).collect();
+            let shape = if seen && height > 1.0 { 0 } else { 1 };
+            assert_eq!(hits, vec![shape; 400], "{height} {transform} {way:?}");
+        }
+    }
+}
+
+#[test]
+fn a_mesh_keeps_its_own_tangents() {
+    // A normal map that leans along u, on a square whose tangents say that u goes where its coordinates do not.
+    let folder = tempfile::tempdir().unwrap();
+    write_exr(&folder.path().join("n.exr"), 2, 2, |_, _| [0.8, 0.6, 0.9]);
+    let text = format!(
+        "{DOWN}[textures.n]\ntype = 'image'\nfile = 'n.exr'\n\
+         [materials.m]\ntype = 'principled'\nmetallic = 0\nspecular = 0\nnormal_map = {{ texture = 'n' }}\n\
+         [[lights]]\ntype = 'directional'\ndirection = [-0.6, 0, -0.8]\ncolor = [3, 3, 3]\n{SHAPE}"
+    );
+    let with = |tangent: Vec4| move |mesh: &mut Mesh| mesh.tangents = vec![tangent; mesh.positions.len()];
+    let n = glam::DVec3::new(0.6, 0.2, 0.8).normalize();
+    for (tangent, x) in [
+        (Vec4::new(1.0, 0.0, 0.0, 1.0), n.x),
+        (Vec4::new(-1.0, 0.0, 0.0, 1.0), -n.x),
+        (Vec4::new(0.0, 1.0, 0.0, 1.0), -n.y), // n x t = -x
+        (Vec4::new(0.0, 1.0, 0.0, -1.0), n.y),
+        (Vec4::new(0.0, 0.5, 0.0, -1.0), n.y), // any length
+        (Vec4::ZERO, n.x),                     // as the coordinates have it
+        (Vec4::NAN, n.x),
+    ] {
+        let packed = scene(folder.path(), 1, &text, with(tangent));
+        // A diffuse surface of albedo 1 under a sun of irradiance 3.
+        let expected = 3.0 / std::f64::consts::PI * (0.6 * x + 0.8 * n.z).max(0.0);
+        for way in both() {
+            for pixel in means(&render(&packed, way)) {
+                assert!(
+                    (pixel[0] - expected).abs() < 1e-4,
+                    "{tangent} {way:?}: {pixel:?} {expected}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn colors_of_ply_files_are_read() {
+    let file = |types: [&str; 4], rows: [&str; 3]| {
+        let names = ["red", "green", "blue", "alpha"];
+        let colors: String = types
+            .iter()
+            .zip(names)
+            .filter(|(t, _)| !t.is_empty())
+            .map(|(t, name)| format!("property {t} {name}\n"))
+            .collect();
+        let points = ["0 0 0", "1 0 0", "0 1 0"];
+        let rows: String = points
+            .iter()
+            .zip(rows)
+            .map(|(point, row)| format!("{point} {row}\n"))
+            .collect();
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{colors}\
+             element face 1\nproperty list uchar int vertex_indices\nend_header\n{rows}3 0 1 2\n"
+        )
+    };
+    let read = |types, rows| load("a.ply", file(types, rows), None).unwrap().colors;
+    let near = |found: Vec<Vec4>, expected: [[f32; 4]; 3]| {
+        let expected: Vec<Vec4> = expected.into_iter().map(Vec4::from_array).collect();
+        assert_eq!(found.len(), 3);
+        assert!(
+            found.iter().zip(&expected).all(|(a, b)| a.abs_diff_eq(*b, 1e-5)),
+            "{found:?} {expected:?}"
+        );
+    };
+    // IEC 61966-2-1 by hand: 188 is 0.5029, 10 is 10 / 255 / 12.92.
+    near(
+        read(["uchar"; 4], ["255 188 10 51", "0 0 0 0", "300 -7 255 255"]),
+        [[1.0, 0.502_886_5, 0.003_035_27, 0.2], [0.0; 4], [1.0, 0.0, 1.0, 1.0]],
+    );
+    near(
+        read(["float", "float", "double", ""], ["0.5 2 0", "nan -1 1e9", "inf 1 1"]),
+        [[0.5, 2.0, 0.0, 1.0], [0.0, 0.0, 1e6, 1.0], [1e6, 1.0, 1.0, 1.0]],
+    );
+    near(
+        read(
+            ["ushort", "ushort", "ushort", "float"],
+            ["65535 0 0 0.25", "0 65535 0 7", "0 0 65535 nan"],
+        ),
+        [[1.0, 0.0, 0.0, 0.25], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0]],
+    );
+    // Not without all of the three.
+    assert_eq!(read(["uchar", "uchar", "", "uchar"], ["1 2 3"; 3]), vec![]);
+}
+
+#[test]
+fn directions_of_facets_are_those_of_an_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = |keys: &str| {
+        format!(
+            "{ASIDE}environment = {{ color = [0.1, 0.1, 0.1] }}\n\
+             textures.d = {{ type = 'image', file = 'd.exr', factor = [1, 1, 0.8, 1], rotate = 40, filter = 'nearest' }}\n\
+             [[lights]]\ntype = 'point'\nposition = [0.2, 1.5, 1]\ncolor = [1, 1, 1]\n\
+             [materials.m]\ntype = 'principled'\nroughness = 0.3\n{keys}\n{SHAPE}"
+        )
+    };
+    let plain = |degrees: f64| {
+        let keys = format!("anisotropy = {{ texture = 'd', channel = 'b' }}\nanisotropy_rotation = {degrees}");
+        means(&reference(&scene(folder.path(), 4, &text(&keys), |_| ())))
+    };
+    let near = |a: &[[f64; 3]], b: &[[f64; 3]]| a.iter().zip(b).all(|(a, b)| (a[0] - b[0]).abs() < 1e-3 * (1.0 + a[0]));
+    for (degrees, more, length) in [
+        (0.0, 0.0, 1.0),
+        (35.0, 0.0, 0.3),
+        (-100.0, 20.0, 1.0),
+        (170.0, -360.0, 1.0),
+    ] {
+        let direction = glam::DVec2::from_angle(f64::to_radians(degrees)) * length * 0.5 + 0.5;
+        write_exr(&folder.path().join("d.exr"), 2, 2, |_, _| {
+            [direction.x as f32, direction.y as f32, 1.0]
+        });
+        // The strength is the blue of the same image.
+        let keys = format!(
+            "anisotropy = {{ texture = 'd', channel = 'b' }}\nanisotropy_rotation = {more}\nanisotropy_direction = {{ texture = 'd' }}"
+        );
+        let packed = scene(folder.path(), 4, &text(&keys), |_| ());
+        assert_eq!(packed.lookups.len(), 1);
+        let found = means(&reference(&packed));
+        let expected = plain(if degrees + more < -360.0 {
+            degrees
+        } else {
+            degrees + more
+        });
+        assert!(near(&found, &expected), "{degrees} {more}");
+        assert!(!near(&found, &plain(degrees + 90.0)), "{degrees} {more}");
+        if more != 0.0 {
+            for way in exact_ways().into_iter().filter(|way| *way == Way::Baked) {
+                assert_eq!(
+                    differing(&render(&packed, way), &reference(&packed)),
+                    0,
+                    "{degrees} {way:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn images_that_give_no_directions_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    write_png(&folder.path().join("t.png"), 2, 2, |_, _| [255, 51, 102]);
+    let message = |texture: &str| {
+        let text = format!(
+            "image = {{ width = 1, height = 1 }}\nrender = {{ integrator = 'path' }}\ncamera = {{ position = [0, -5, 1], look_at = [0, 0, 0], fov = 40 }}\n\
+             textures.t = {{ {texture} }}\nmaterials.m = {{ type = 'principled', anisotropy = 1, anisotropy_direction = {{ texture = 't' }} }}\n"
+        );
+        let description = Description::parse(&text, "s.toml").unwrap();
+        description
+            .validate_with(&Assets::beside(folder.path()))
+            .err()
+            .map(|error| error.to_string())
+    };
+    let place = "materials.m.anisotropy_direction.texture: \"t\" must";
+    for (texture, rule) in [
+        ("type = 'constant', color = [1, 1, 1]", "be a texture of type \"image\""),
+        (
+            "type = 'image', file = 't.png'",
+            "have encoding = \"linear\" to give directions",
+        ),
+        (
+            "type = 'image', file = 't.png', encoding = 'linear', factor = [1, 0.5, 1, 1]",
+            "have no factor of red and green to give directions",
+        ),
+    ] {
+        let message = message(texture);
+        assert!(
+            message
+                .as_deref()
+                .is_some_and(|m| m.contains(&format!("{place} {rule}"))),
+            "{message:?}"
+        );
+    }
+    assert_eq!(
+        message("type = 'image', file = 't.png', encoding = 'linear', factor = [1, 1, 0.5, 1]"),
+        None
+    );
+}
