@@ -86,6 +86,9 @@ pub struct Meshes<'a> {
     parts: BTreeMap<usize, Vec<Part<'a>>>,
     points: usize,
     lines: usize,
+    /// The first primitive that lacks texture coordinates which its material needs, with their set; and how many there are.
+    bare: Option<(String, u32)>,
+    bare_count: usize,
     /// How many there are, of all meshes that are built by now.
     triangles: AtomicUsize,
 }
@@ -110,6 +113,8 @@ impl<'a> Meshes<'a> {
             parts: BTreeMap::new(),
             points: 0,
             lines: 0,
+            bare: None,
+            bare_count: 0,
             triangles: AtomicUsize::new(0),
         };
         for key in keys {
@@ -133,6 +138,11 @@ impl<'a> Meshes<'a> {
                     _ => {
                         let is_colored = attribute(primitive, Semantic::Colors(0)).is_some();
                         let material = materials.number(primitive, &place, is_colored)?;
+                        let lacks = |set: &&u32| attribute(primitive, Semantic::TexCoords(**set)).is_none();
+                        if let Some(set) = materials.get(material).sets.iter().find(lacks) {
+                            meshes.bare.get_or_insert_with(|| (place.clone(), *set));
+                            meshes.bare_count += 1;
+                        }
                         parts.push(Part {
                             primitive,
                             place,
@@ -156,7 +166,16 @@ impl<'a> Meshes<'a> {
                 "{count} primitives of {of} are left out: triangles alone are rendered"
             )),
         };
-        [told(self.points, "points"), told(self.lines, "lines")]
+        let bare = self.bare.as_ref().map(|(place, set)| {
+            let rule =
+                format!("{place} has no TEXCOORD_{set}, which its material needs: (0, 0) stands for it everywhere");
+            match self.bare_count {
+                1 => rule,
+                2 => format!("{rule} (and 1 more primitive)"),
+                count => format!("{rule} (and {} more primitives)", count - 1),
+            }
+        });
+        [told(self.points, "points"), told(self.lines, "lines"), bare]
             .into_iter()
             .flatten()
     }

@@ -178,6 +178,19 @@ fn a_texture_may_have_another_set_of_coordinates() {
     }
 }
 
+#[test]
+fn what_lacks_its_coordinates_is_told_of() {
+    let mut builder = Builder::new();
+    let texture = builder.texture(2, &[RED, GREEN, BLUE, WHITE]);
+    let material = builder.unlit(json!({ "baseColorTexture": { "index": texture, "texCoord": 1 } }));
+    let attributes = builder.quad_attributes();
+    let mesh = builder.quad_with(attributes, Some(material));
+    builder.root_node(json!({ "mesh": mesh }));
+    let notes = scene(&builder, "no-coordinates").notes;
+    let told = "meshes[0].primitives[0] has no TEXCOORD_1, which its material needs";
+    assert!(notes.iter().any(|note| note.contains(told)), "{notes:?}");
+}
+
 /// The scene of a picture of four colors whose texture is transformed.
 fn transformed(name: &str, transform: Value) -> Scene {
     let mut builder = Builder::new();
