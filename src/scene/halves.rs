@@ -1,6 +1,7 @@
 //! Images of half the size: for the levels of pyramids, and where images are too large to be kept.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::image_file::{linear_to_srgb, srgb_to_linear};
 use super::{Encoding, Image, Texels};
@@ -12,15 +13,20 @@ pub(crate) struct Level {
     pub texels: Vec<DVec3>,
 }
 
+/// The linear value of each byte.
+pub(crate) fn decoded(encoding: Encoding) -> Vec<f64> {
+    let decode = |value: u32| match encoding {
+        Encoding::Srgb => srgb_to_linear(f64::from(value) / 255.0),
+        Encoding::Linear => f64::from(value) / 255.0,
+    };
+    (0..256).map(decode).collect()
+}
+
 /// The texels of an image in linear light, in its own order.
-pub(crate) fn linear(image: &Image) -> impl Fn(usize) -> DVec3 {
-    let texel: Box<dyn Fn(usize) -> DVec3> = match &image.texels {
+pub(crate) fn linear(image: &Image) -> impl Fn(usize) -> DVec3 + Sync {
+    let texel: Box<dyn Fn(usize) -> DVec3 + Sync> = match &image.texels {
         Texels::Bytes(encoding, bytes) => {
-            let decode = |value: u32| match encoding {
-                Encoding::Srgb => srgb_to_linear(f64::from(value) / 255.0),
-                Encoding::Linear => f64::from(value) / 255.0,
-            };
-            let table: Vec<f64> = (0..256).map(decode).collect();
+            let table = decoded(*encoding);
             Box::new(move |i| DVec3::from_array(bytes[i].map(|byte| table[usize::from(byte)])))
         }
         Texels::Floats(floats) => Box::new(|i| DVec3::from_array(floats[i].map(f64::from))),
@@ -29,20 +35,19 @@ pub(crate) fn linear(image: &Image) -> impl Fn(usize) -> DVec3 {
 }
 
 /// The level after one: each texel the mean over the part of that level that it covers.
-pub(crate) fn half(width: usize, height: usize, texel: impl Fn(usize) -> DVec3) -> Level {
+pub(crate) fn half(width: usize, height: usize, texel: impl Fn(usize) -> DVec3 + Sync) -> Level {
     let (columns, rows) = (covers(width, (width / 2).max(1)), covers(height, (height / 2).max(1)));
-    let mut texels = Vec::with_capacity(columns.len() * rows.len());
-    for row in &rows {
-        for column in &columns {
-            let mut sum = DVec3::ZERO;
+    let mut texels = vec![DVec3::ZERO; columns.len() * rows.len()];
+    let lines = texels.par_chunks_mut(columns.len()).zip(&rows);
+    lines.with_min_len(16).for_each(|(line, row)| {
+        for (sum, column) in line.iter_mut().zip(&columns) {
             for (y, v) in row {
                 for (x, u) in column {
-                    sum += texel(y * width + x) * (u * v);
+                    *sum += texel(y * width + x) * (u * v);
                 }
             }
-            texels.push(sum);
         }
-    }
+    });
     Level {
         width: columns.len(),
         height: rows.len(),

@@ -207,7 +207,7 @@ fn what_is_not_there_is_told_with_what_is() {
         &place,
         &["render", "still.glb", "--time", "1"],
         2,
-        "--time: the file has none that a time could be of",
+        "--time: the file has no animation that a time could be of",
     );
     refused(
         &place,
