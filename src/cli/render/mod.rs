@@ -7,7 +7,6 @@ mod said;
 mod work;
 
 use std::collections::BTreeMap;
-use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -22,17 +21,18 @@ use self::frames::Frame;
 use self::plan::Plan;
 use self::said::Said;
 use self::work::Took;
+use super::log::{self, Level};
 use super::outputs::Outputs;
 use super::signal::Stop;
 use super::stats::Stats;
-use super::{Interrupted, Usage, plain, progress, signal};
+use super::{Interrupted, Usage, facts_of, plain, progress, signal};
 
 pub use args::Args;
 pub use args::parse_size;
 
 pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
     if args.verbose {
-        speak();
+        log::speak();
     }
     if let Some(threads) = args.threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
@@ -71,9 +71,10 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
     }
     if skipped > 0 {
         let count = frames.len();
-        said.once(&format!(
-            "note: {skipped} of {count} left out, as their files are there"
-        ));
+        said.once(
+            Level::Note,
+            &format!("{skipped} of {count} left out, as their files are there"),
+        );
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -91,7 +92,7 @@ fn read(args: &Args, said: &Said) -> anyhow::Result<Scene> {
     let moves = scene.camera_path.is_some() || args.fps(&scene)?.is_some();
     let still = (args.frames.is_some() && !moves).then_some(still);
     for note in scene.notes.iter().map(String::as_str).chain(still) {
-        said.once(&format!("warning: {}: {note}", path.display()));
+        said.once(Level::Warning, &format!("{}: {note}", path.display()));
     }
     Ok(scene)
 }
@@ -128,6 +129,7 @@ fn picture(plan: &Plan, outputs: Outputs, stop: &mut Option<Stop>, start: Instan
         Some(checkpoint) => checkpoint,
         None => &mut nowhere,
     };
+    let names: Vec<String> = outputs.files().map(|(_, name, _)| name.to_owned()).collect();
     let outputs = outputs.begin().map_err(RenderError::Output)?;
     let stop = match stop {
         Some(stop) => stop,
@@ -144,8 +146,10 @@ fn picture(plan: &Plan, outputs: Outputs, stop: &mut Option<Stop>, start: Instan
     if let (Err(error), Some(path)) = (&took, &plan.checkpoint) {
         let path = path.display();
         if error.is::<Interrupted>() {
-            plan.said
-                .again(&format!("note: {path} has what was rendered; --resume goes on from it"));
+            plan.said.again(
+                Level::Note,
+                &format!("{path} has what was rendered; --resume goes on from it"),
+            );
         }
     }
     let took = took?;
@@ -153,12 +157,18 @@ fn picture(plan: &Plan, outputs: Outputs, stop: &mut Option<Stop>, start: Instan
     info!(render = took.time.as_secs_f64(), seconds = total, "picture written");
     let (least, all) = (took.least_samples, plan.scene.pixel_samples);
     if least < all {
-        plan.said.again(&format!(
-            "note: the time was up: each pixel has {least} of {all} samples, or more"
-        ));
+        plan.said.again(
+            Level::Note,
+            &format!("the time was up: each pixel has {least} of {all} samples, or more"),
+        );
+    }
+    let stats = stats(plan, renderer.info(), &took, setup, total);
+    if log::is_json() && !plan.said.is_quiet() {
+        let stats = serde_json::to_value(&stats)?;
+        let facts = facts_of([("files", names.into()), ("stats", stats)]);
+        log::tell(Level::Info, "picture written", facts);
     }
     if let Some(file) = outputs.stats {
-        let stats = stats(plan, renderer.info(), &took, setup, total);
         stats.write(file).map_err(RenderError::Output)?;
     }
     Ok(())
@@ -194,19 +204,4 @@ fn stats(plan: &Plan, device: &DeviceInfo, took: &Took, setup: f64, total: f64) 
         shadow_rays: None,
         nominal_mrays_per_s: Stats::nominal(rays_now, scene.light_samples(), render),
     }
-}
-
-/// Events of this program on standard error, and warnings of others.
-fn speak() {
-    use tracing_subscriber::filter::{LevelFilter, Targets};
-    use tracing_subscriber::prelude::*;
-    let ours = Targets::new()
-        .with_target("wgray", LevelFilter::DEBUG)
-        .with_default(LevelFilter::WARN);
-    let lines = tracing_subscriber::fmt::layer()
-        .with_writer(std::io::stderr)
-        .with_target(false)
-        .without_time()
-        .with_ansi(std::io::stderr().is_terminal());
-    tracing_subscriber::registry().with(lines).with(ours).init();
 }
