@@ -43,6 +43,7 @@ mod robust;
 mod rounding;
 mod sampling;
 mod scenes;
+mod schema;
 mod sources;
 mod statistics;
 mod textures;

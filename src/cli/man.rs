@@ -83,13 +83,10 @@ fn name_of(command: &clap::Command) -> &str {
 fn page(command: &clap::Command) -> io::Result<Vec<u8>> {
     let name = name_of(command);
     let is_program = !name.contains('-');
-    let version = format!("wgray {}", env!("CARGO_PKG_VERSION"));
-    let man = Man::new(command.clone())
-        .title(name.to_uppercase())
-        .source(version)
-        .manual("User Commands");
-    let mut text = Vec::new();
-    man.render_title(&mut text)?;
+    let man = Man::new(command.clone());
+    // By hand: without a date, which a build has none of that stays, the next words would stand in its place.
+    let (title, version) = (name.to_uppercase(), env!("CARGO_PKG_VERSION"));
+    let mut text = format!(".TH {title} 1 \"\" \"wgray {version}\" \"User Commands\"\n").into_bytes();
     man.render_name_section(&mut text)?;
     man.render_synopsis_section(&mut text)?;
     man.render_description_section(&mut text)?;
@@ -122,8 +119,10 @@ fn page(command: &clap::Command) -> io::Result<Vec<u8>> {
     let mut examples = text::EXAMPLES.iter().filter(|example| example.of(name)).peekable();
     if examples.peek().is_some() {
         rest.control("SH", ["EXAMPLES"]);
-        for example in examples {
-            rest.control("PP", []);
+        for (i, example) in examples.enumerate() {
+            if i > 0 {
+                rest.control("PP", []);
+            }
             rest.text([roman(example.what)]);
             rest.control("PP", []);
             rest.control("RS", ["4"]);

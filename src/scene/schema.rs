@@ -3,11 +3,12 @@
 
 pub(super) mod kinds;
 
-use schemars::Schema;
 use schemars::generate::SchemaSettings;
+use schemars::{Schema, SchemaGenerator};
 use serde_json::{Map, Value, json};
 
-use super::Description;
+use super::description::tagged::Tagged as _;
+use super::{CameraDescription, Description};
 
 /// What is between the words of a kind of values and their range, as `kinds` has them.
 const SPLIT: &str = "|";
@@ -23,60 +24,77 @@ pub fn schema() -> String {
         .into_generator()
         .into_root_schema_for::<Description>()
         .to_value();
-    of_camera(&mut schema["properties"]["camera"]);
+    of_camera(&mut schema);
     finish(&mut schema);
     schema["title"] = json!("wgray scene");
     schema["description"] = json!("A scene of wgray, version ".to_owned() + env!("CARGO_PKG_VERSION") + ".");
     format!("{schema:#}\n")
 }
 
-/// A table that its key `type` tells apart. Each type has its tag, its description and its own schema.
-pub(super) fn tagged(types: Vec<(&str, &str, Schema)>) -> Schema {
+/// A table that its key `type` tells apart: `shape` is what it is of. Each type has its tag, its description and its own schema, which
+/// becomes one of the definitions.
+pub(super) fn tagged(generator: &mut SchemaGenerator, shape: &str, types: Vec<(&str, &str, Schema)>) -> Schema {
     let tags: Vec<&str> = types.iter().map(|(tag, ..)| *tag).collect();
     let told: Vec<&str> = types.iter().map(|(_, told, _)| told.trim()).collect();
     let key = json!({ "description": "Of what type it is.", "type": "string", "enum": tags, "enumDescriptions": told });
-    let variant = |(tag, told, schema): &(&str, &str, Schema)| {
-        let mut schema = schema.clone().to_value();
+    // A condition for each type, so that a mistake is told at its key. Some editors complete by no conditions: for them alone all types
+    // stand beside what everything is.
+    let mut all = vec![json!({})];
+    let mut conditions = Vec::new();
+    for (tag, told, schema) in types {
+        let mut schema = schema.to_value();
         let mut properties = Map::new();
         properties.insert("type".to_owned(), json!({ "description": told.trim(), "const": tag }));
         if let Some(Value::Object(own)) = schema.get_mut("properties") {
             properties.append(own);
         }
         schema["properties"] = Value::Object(properties);
-        let mut required = vec![json!("type")];
-        if let Some(Value::Array(own)) = schema.get_mut("required") {
-            required.append(own);
-        }
-        schema["required"] = Value::Array(required);
-        schema
-    };
-    let variants: Vec<Value> = types.iter().map(variant).collect();
-    let schema = json!({ "type": "object", "properties": { "type": key }, "required": ["type"], "oneOf": variants });
+        let name = definition(shape, tag);
+        let reference = json!({ "$ref": format!("#/$defs/{name}") });
+        conditions.push(json!({
+            "if": { "properties": { "type": { "const": tag } }, "required": ["type"] },
+            "then": reference.clone(),
+        }));
+        all.push(reference);
+        generator.definitions_mut().insert(name, schema);
+    }
+    let schema = json!({
+        "type": "object",
+        "properties": { "type": key },
+        "required": ["type"],
+        "allOf": conditions,
+        "anyOf": all,
+    });
     schema.try_into().unwrap_or_default()
 }
 
+/// The name of a type's definition: `camera-perspective`.
+fn definition(shape: &str, tag: &str) -> String {
+    format!("{}-{tag}", shape.trim_end_matches("Description").to_lowercase())
+}
+
 /// A camera is perspective if it does not say what it is, and what it does not say may be in the keys of its path.
-fn of_camera(camera: &mut Value) {
-    camera["properties"]["type"]["default"] = json!("perspective");
+fn of_camera(schema: &mut Value) {
+    let camera = &mut schema["properties"]["camera"];
+    camera["properties"]["type"]["default"] = json!(CameraDescription::DEFAULT);
+    let tags = CameraDescription::TYPES;
     if let Some(camera) = camera.as_object_mut() {
         camera.remove("required");
     }
-    for variant in camera["oneOf"].as_array_mut().into_iter().flatten() {
-        let tag = variant["properties"]["type"]["const"].clone();
-        let Some(variant) = variant.as_object_mut() else {
-            continue;
-        };
-        let Some(Value::Array(required)) = variant.remove("required") else {
-            continue;
-        };
-        let own: Vec<Value> = required.into_iter().filter(|key| *key != "type").collect();
-        if tag != "perspective" {
-            variant.insert("required".to_owned(), json!(["type"]));
+    for condition in camera["allOf"].as_array_mut().into_iter().flatten() {
+        let of = &mut condition["if"];
+        if of["properties"]["type"]["const"] == CameraDescription::DEFAULT {
+            *of = json!({ "properties": of["properties"] });
         }
-        variant.insert(
-            "anyOf".to_owned(),
-            json!([{ "required": own }, { "required": ["path"] }]),
-        );
+    }
+    for tag in tags {
+        let Some(of_type) = schema["$defs"][definition("camera", tag)].as_object_mut() else {
+            continue;
+        };
+        if let Some(required) = of_type.remove("required") {
+            let either = json!([{ "required": required }, { "required": ["path"] }]);
+            of_type.insert("anyOf".to_owned(), either);
+        }
     }
 }
 

@@ -166,7 +166,7 @@ fn picture(plan: &Plan, outputs: Outputs, stop: &mut Option<Stop>, start: Instan
     if log::is_json() && !plan.said.is_quiet() {
         let stats = serde_json::to_value(&stats)?;
         let facts = facts_of([("files", names.into()), ("stats", stats)]);
-        log::tell(Level::Info, "picture written", facts);
+        log::tell(Level::Info, "render done", facts);
     }
     if let Some(file) = outputs.stats {
         stats.write(file).map_err(RenderError::Output)?;

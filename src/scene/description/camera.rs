@@ -153,6 +153,9 @@ impl PanoramaDescription {
 }
 
 impl CameraDescription {
+    /// What a file means that does not say of what type its camera is.
+    pub(in crate::scene) const DEFAULT: &str = "perspective";
+
     /// How it moves from frame to frame, if it does.
     pub fn path(&self) -> Option<&CameraPathDescription> {
         match self {

@@ -54,9 +54,8 @@ macro_rules! tagged {
             }
 
             fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
-                crate::scene::schema::tagged(vec![
-                    $(($tag, concat!($($variant_doc),*), generator.subschema_for::<$body>()),)+
-                ])
+                let types = vec![$(($tag, concat!($($variant_doc),*), generator.subschema_for::<$body>()),)+];
+                crate::scene::schema::tagged(generator, stringify!($name), types)
             }
         }
     };

@@ -217,7 +217,7 @@ fn read_camera(mut camera: Table) -> Result<CameraDescription, Problem> {
             }
         }
     }
-    read_tagged(camera, Some("perspective"))
+    read_tagged(camera, Some(CameraDescription::DEFAULT))
 }
 
 /// What was read of the parts of one kind, or the first problem among them.

@@ -1,0 +1,759 @@
+//! The JSON Schema of scene files beside the program that reads them: what the one refuses the other refuses too.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::OnceLock;
+
+use jsonschema::Validator;
+use proptest::strategy::{Strategy, ValueTree};
+use proptest::test_runner::TestRunner;
+use rayon::prelude::*;
+use serde_json::Value as Json;
+use toml::{Table, Value};
+use wgray::scene::{Assets, Description};
+
+use crate::random_scenes::any_scene;
+use crate::sources::path as project;
+
+const PAGE: &str = include_str!("../docs/scene-format.md");
+
+fn schema() -> &'static Json {
+    static SCHEMA: OnceLock<Json> = OnceLock::new();
+    SCHEMA.get_or_init(|| serde_json::from_str(&wgray::scene::schema()).expect("JSON"))
+}
+
+fn validator() -> &'static Validator {
+    static VALIDATOR: OnceLock<Validator> = OnceLock::new();
+    VALIDATOR.get_or_init(|| jsonschema::draft202012::new(schema()).expect("a schema of the draft"))
+}
+
+fn fits(scene: &Table) -> bool {
+    validator().is_valid(&serde_json::to_value(scene).expect("JSON"))
+}
+
+/// What the program says of a scene in a folder.
+fn told(scene: &Table, folder: &Path) -> Result<(), String> {
+    let text = toml::to_string(scene).expect("TOML");
+    let description = Description::parse(&text, "s.toml").map_err(|error| error.to_string())?;
+    let checked = description.validate_with(&Assets::beside(folder));
+    checked.map(|_| ()).map_err(|problem| problem.to_string())
+}
+
+/// Scenes with every key there is.
+const EVERY: [&str; 4] = [
+    r#"
+[image]
+width = 8
+height = 6
+view_transform = "agx"
+exposure = 0.5
+[camera]
+type = "perspective"
+position = [0, -5, 1]
+look_at = [0, 0, 1]
+up = [0, 0, 1]
+fov = 40
+focal_length = 0.05
+aperture = 0.1
+focus_distance = 4
+blades = 6
+blade_rotation = 20
+path = { interpolation = "smooth", keys = [
+    { frame = 1, position = [0, -5, 1], look_at = [0, 0, 1], up = [0, 0, 1], fov = 40, aperture = 0.1, focus_distance = 4 },
+    { frame = 9, fov = 30 },
+] }
+[render]
+integrator = "path"
+ambient = [0, 0, 0]
+background = [0, 0, 0]
+shadow_epsilon = 0.001
+shadows = "opaque"
+max_depth = 4
+rr_depth = 2
+clamp = 3
+alpha = true
+ray_differentials = true
+seed = 7
+pixel_samples = { pattern = "sobol", count = 4 }
+light_samples = { pattern = "random", count = 4 }
+filter = { type = "gaussian", radius = 1.5 }
+adaptive = { error = 0.01, max_samples = 64 }
+[environment]
+color = [1, 1, 1]
+scale = 2
+rotate = { axis = [0, 0, 1], degrees = 30 }
+visible = true
+background = [0, 0, 1]
+[textures.one]
+type = "constant"
+color = [1, 0, 0]
+[textures.two]
+type = "checker"
+even = [1, 1, 1]
+odd = [0, 0, 0]
+scale = [4, -4]
+rotate = 20
+offset = [0.5, 0]
+[textures.three]
+type = "grid"
+cell = [1, 1, 1]
+line = [0, 0, 0]
+line_width = 0.1
+scale = [4, 4]
+rotate = 20
+offset = [0.5, 0]
+[textures.four]
+type = "image"
+file = "odd.exr"
+encoding = "linear"
+wrap = ["repeat", "clamp"]
+filter = "trilinear"
+max_anisotropy = 4
+scale = [4, 4]
+rotate = 20
+offset = [0.5, 0]
+factor = [1, 1, 1, 1]
+uv_set = 0
+[textures.five]
+type = "image"
+file = "dot.exr"
+wrap = "mirror"
+[materials.phong]
+type = "phong"
+color = [0.5, 0.5, 0.5]
+ambient = [0.5, 0.5, 0.5]
+diffuse = { texture = "two" }
+specular = [0.5, 0.5, 0.5]
+shininess = 8
+normal_map = { texture = "five", strength = 0.5 }
+emission = [0, 0, 0]
+visible = true
+[materials.mirror]
+type = "mirror"
+tint = { texture = "one" }
+normal_map = { texture = "five" }
+emission = [0, 0, 0]
+visible = true
+[materials.glass]
+type = "glass"
+ior = 1.5
+tint = [1, 1, 1]
+normal_map = { texture = "five" }
+emission = [0, 0, 0]
+visible = true
+[materials.diffuse]
+type = "diffuse"
+color = [0.5, 0.5, 0.5]
+roughness = { texture = "two", channel = "g" }
+normal_map = { texture = "five" }
+emission = { texture = "one" }
+visible = true
+[materials.metal]
+type = "conductor"
+color = [0.5, 0.5, 0.5]
+roughness = 0.2
+anisotropy = 0.5
+anisotropy_rotation = 20
+energy_compensation = true
+normal_map = { texture = "five" }
+emission = [0, 0, 0]
+visible = true
+[materials.gold]
+type = "conductor"
+metal = "gold"
+[materials.other]
+type = "conductor"
+eta = [1, 1, 1]
+k = [2, 2, 2]
+[materials.water]
+type = "dielectric"
+ior = 1.3
+color = [1, 1, 1]
+absorption = [0.1, 0.1, 0.1]
+thin = false
+roughness = 0.2
+anisotropy = 0.5
+anisotropy_rotation = 20
+energy_compensation = true
+normal_map = { texture = "five" }
+emission = [0, 0, 0]
+visible = true
+[materials.all]
+type = "principled"
+base_color = [0.5, 0.5, 0.5]
+metallic = 0.5
+roughness = 0.5
+anisotropy = 0.5
+anisotropy_rotation = 20
+anisotropy_direction = { texture = "five" }
+ior = 1.5
+specular = 0.5
+specular_color = [1, 1, 1]
+transmission = 0.5
+thickness = 1
+attenuation_color = [0.5, 0.5, 0.5]
+attenuation_distance = 2
+clearcoat = 0.5
+clearcoat_roughness = 0.5
+clearcoat_normal_map = { texture = "five" }
+sheen_color = [0.5, 0.5, 0.5]
+sheen_roughness = 0.5
+alpha = 0.5
+alpha_mode = "mask"
+alpha_cutoff = 0.5
+vertex_colors = "base_color"
+double_sided = true
+normal_map = { texture = "five" }
+emission = [0, 0, 0]
+visible = true
+[[lights]]
+type = "rectangle"
+center = [0, 0, 4]
+size = [1, 1]
+normal = [0, 0, -1]
+tangent = [1, 0, 0]
+color = [1, 1, 1]
+visible = true
+[[lights]]
+type = "point"
+position = [0, 0, 4]
+color = [1, 1, 1]
+[[lights]]
+type = "directional"
+direction = [0, 0, -1]
+color = [1, 1, 1]
+[[lights]]
+type = "spot"
+position = [0, 0, 4]
+direction = [0, 0, -1]
+color = [1, 1, 1]
+cone_angle = 30
+inner_angle = 10
+[[shapes]]
+type = "rectangle"
+material = "phong"
+center = [0, 0, 1]
+size = [1, 1]
+normal = [0, 0, 1]
+tangent = [1, 0, 0]
+[[shapes]]
+type = "disk"
+material = "mirror"
+center = [0, 0, 1]
+radius = 1
+normal = [0, 0, 1]
+tangent = [1, 0, 0]
+[[shapes]]
+type = "ellipsoid"
+material = "glass"
+center = [0, 0, 1]
+a = [1, 0, 0]
+b = [0, 1, 0]
+c = [0, 0, 2]
+[[shapes]]
+type = "sphere"
+material = "diffuse"
+center = [0, 0, 1]
+radius = 1
+[[shapes]]
+type = "triangle"
+material = "gold"
+vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+[[shapes]]
+type = "tetrahedron"
+material = "other"
+vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+[[shapes]]
+type = "plane"
+material = "water"
+point = [0, 0, 0]
+normal = [0, 0, 1]
+tangent = [1, 0, 0]
+[[shapes]]
+type = "mesh"
+file = "ball.obj"
+normals = "smooth"
+up = "y"
+material = "all"
+materials = { group = "gold" }
+translate = [0, 0, 1]
+rotate = [0, 20, 0]
+scale = 0.5
+[meshes.cube]
+file = "cube.obj"
+normals = "flat"
+up = "z"
+[[instances]]
+mesh = "cube"
+material = "gold"
+materials = { group = "gold" }
+translate = [0, 0, 1]
+rotate = { axis = [0, 0, 1], degrees = 20 }
+scale = [1, -1, 2]
+[[instances]]
+mesh = "cube"
+material = "gold"
+matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 2]]
+"#,
+    r#"
+image = { width = 8, height = 6 }
+camera = { type = "orthographic", position = [0, -5, 1], look_at = [0, 0, 1], up = [0, 0, 1], height = 3, path = { keys = [
+    { frame = 0, height = 2 },
+] } }
+[render]
+integrator = "path"
+[environment]
+name = "sky"
+rotate = 20
+sun_elevation = 30
+sun_azimuth = 20
+turbidity = 3
+[[lights]]
+type = "spot"
+position = [0, 0, 4]
+look_at = [0, 0, 0]
+color = [1, 1, 1]
+cone_angle = 30
+[materials.gray]
+type = "diffuse"
+color = [0.5, 0.5, 0.5]
+[[shapes]]
+type = "mesh"
+file = "rock.obj"
+material = "gray"
+matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 2], [0, 0, 0, 1]]
+"#,
+    // There is no such file.
+    r#"
+image = { width = 8, height = 6 }
+camera = { position = [0, -5, 1], look_at = [0, 0, 1], fov = 40, f_number = 2 }
+[[shapes]]
+type = "gltf"
+file = "cube.glb"
+scene = 0
+time = 2
+animation = "walk"
+variant = 1
+lights = true
+materials = { brick = "gray" }
+translate = [0, 0, 1]
+rotate = [0, 20, 0]
+scale = 0.5
+[[shapes]]
+type = "gltf"
+file = "cube.glb"
+matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 2]]
+"#,
+    r#"
+image = { width = 8, height = 6 }
+[camera]
+type = "panorama"
+position = [0, -5, 1]
+look_at = [0, 0, 1]
+up = [0, 0, 1]
+path = { keys = [{ frame = 0, up = [0, 0, 1] }] }
+[environment]
+file = "wide.exr"
+[render]
+integrator = "path"
+"#,
+];
+
+/// The program refuses these for what several values are together, or for what a name or a file is; the messages have one of these texts.
+const OF_SEVERAL: [&str; 26] = [
+    "is no texture",
+    "is no material",
+    "is no mesh",
+    "cannot be read",
+    "must be a file that can be read",
+    "must be a texture of type",
+    "integrator = \"path\"",
+    "square number",
+    "must not be parallel",
+    "must not lie",
+    "must not be the camera's position",
+    "must not be where the light is",
+    "must not be here",
+    "must not be there",
+    "must not emit light",
+    "must be greater than that of the key before",
+    "which has no further samples",
+    "and not below the count",
+    "to cone_angle",
+    "cannot stand beside",
+    "is missing beside",
+    "is missing, and",
+    "needs a thickness",
+    "needs name",
+    "must have one of \"color\"",
+    "must have position",
+];
+
+/// All ways to a value, the table itself among them.
+fn places(value: &Value, here: &mut Vec<Step>, all: &mut Vec<Vec<Step>>) {
+    all.push(here.clone());
+    match value {
+        Value::Table(table) => {
+            for (key, value) in table {
+                here.push(Step::Key(key.clone()));
+                places(value, here, all);
+                here.pop();
+            }
+        }
+        // Of points and colours one number is as good as another.
+        Value::Array(list) if list.first().is_some_and(|first| !first.is_table() && !first.is_array()) => {
+            if let Some(value) = list.last() {
+                here.push(Step::Index(list.len() - 1));
+                places(value, here, all);
+                here.pop();
+            }
+        }
+        Value::Array(list) => {
+            for (i, value) in list.iter().enumerate() {
+                here.push(Step::Index(i));
+                places(value, here, all);
+                here.pop();
+            }
+        }
+        _ => {}
+    }
+}
+
+#[derive(Clone, Debug)]
+enum Step {
+    Key(String),
+    Index(usize),
+}
+
+fn at<'a>(scene: &'a mut Value, place: &[Step]) -> &'a mut Value {
+    place.iter().fold(scene, |value, step| match step {
+        Step::Key(key) => &mut value[key.as_str()],
+        Step::Index(i) => &mut value[*i],
+    })
+}
+
+/// The scene with other values at one place.
+fn mutated(scene: &Table, place: &[Step]) -> Vec<Table> {
+    let floats = [-1e10, -400.0, -0.5, -1e-12, 0.0, 1e-12, 0.5, 1.5, 1e7, 1e10];
+    let wholes = [-1, 0, 2, 17, 101, 1025, 65_537, 5_000_000_000_i64];
+    let mut values: Vec<Value> = floats.map(Value::from).into();
+    values.extend(wholes.map(Value::from));
+    values.extend([Value::from("?"), Value::from(true), Value::Table(Table::new())]);
+    values.extend([Value::Array(Vec::new()), Value::from(vec![1]), Value::from(vec![1, 2])]);
+    values.extend([
+        Value::from(vec![0, 0, 0]),
+        Value::from(vec![1, 2, 3, 4]),
+        Value::from(vec!["a", "b"]),
+    ]);
+    let mut all = Vec::new();
+    let mut put = |change: &dyn Fn(&mut Value)| {
+        let mut scene = Value::Table(scene.clone());
+        change(at(&mut scene, place));
+        if let Value::Table(scene) = scene {
+            all.push(scene);
+        }
+    };
+    if !place.is_empty() {
+        for value in values {
+            put(&|old| *old = value.clone());
+        }
+    }
+    put(&|old| match old {
+        Value::Table(table) => drop(table.insert("unknown".to_owned(), Value::from(1))),
+        Value::Array(list) => list.extend(list.last().cloned()),
+        Value::String(text) => text.push('x'),
+        Value::Integer(number) => *old = Value::from(*number as f64 + 0.5),
+        _ => {}
+    });
+    if let Value::Table(table) = at(&mut Value::Table(scene.clone()), place) {
+        for key in table.keys().cloned().collect::<Vec<_>>() {
+            put(&|old| {
+                if let Value::Table(table) = old {
+                    table.remove(&key);
+                }
+            });
+        }
+    }
+    all
+}
+
+/// Whether the program and the schema agree on a scene: how, if not.
+fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
+    match (fits(scene), told(scene, folder)) {
+        (false, Ok(())) => Some(format!("the schema alone refuses {scene}")),
+        // To JSON 1.0 is a whole number.
+        (true, Err(message)) if message.contains(".0 must be") && message.contains("whole number") => None,
+        (true, Err(message)) if !OF_SEVERAL.iter().any(|part| message.contains(part)) => {
+            Some(format!("the schema takes what the program refuses: {message}"))
+        }
+        _ => None,
+    }
+}
+
+/// Says so of all changes of one value of a scene; returns how many there were.
+fn compare(scene: &Table, folder: &Path, step: usize) -> usize {
+    let mut all = Vec::new();
+    places(&Value::Table(scene.clone()), &mut Vec::new(), &mut all);
+    let scenes: Vec<Table> = all
+        .iter()
+        .flat_map(|place| mutated(scene, place))
+        .step_by(step)
+        .collect();
+    let wrong: BTreeSet<String> = scenes
+        .par_iter()
+        .filter_map(|scene| disagreement(scene, folder))
+        .collect();
+    assert!(wrong.is_empty(), "{} of {}: {wrong:#?}", wrong.len(), scenes.len());
+    scenes.len()
+}
+
+#[test]
+fn changed_values_are_refused_by_both() {
+    let folder = any_scene::folder();
+    let scenes = EVERY.map(|text| text.parse::<Table>().unwrap());
+    // So many that each value has several changes.
+    let count: usize = scenes.iter().map(|scene| compare(scene, folder, 3)).sum();
+    assert!(count > 3000, "{count}");
+    let whole = scenes.iter().filter(|scene| told(scene, folder).is_ok() && fits(scene));
+    assert_eq!(whole.count(), 3, "what is changed is good");
+}
+
+#[test]
+fn random_scenes_fit_and_their_changes_are_refused_by_both() {
+    let (folder, strategy) = (any_scene::folder(), any_scene::description());
+    let mut runner = TestRunner::deterministic();
+    for i in 0..60 {
+        let scene = strategy.new_tree(&mut runner).expect("a scene").current();
+        let scene = Table::try_from(&scene).unwrap();
+        assert!(fits(&scene), "{scene}");
+        if i < 12 {
+            assert!(compare(&scene, folder, 37) > 10);
+        }
+    }
+}
+
+#[test]
+fn the_projects_scenes_fit() {
+    let mut count = 0;
+    for entry in std::fs::read_dir(project("scenes")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|end| end == "toml") {
+            let scene: Table = std::fs::read_to_string(&path).unwrap().parse().unwrap();
+            assert!(fits(&scene), "{}", path.display());
+            count += 1;
+        }
+    }
+    assert!(count > 10);
+    for page in [include_str!("../README.md"), PAGE] {
+        let scenes = page
+            .split("```toml\n")
+            .skip(1)
+            .filter_map(|rest| rest.split("```").next());
+        let scenes: Vec<&str> = scenes.filter(|scene| scene.contains("[camera]")).collect();
+        assert!(!scenes.is_empty());
+        for scene in scenes {
+            assert!(fits(&scene.parse().unwrap()), "{scene}");
+        }
+    }
+}
+
+/// The parts of the schema, with the tables of the page that are of them.
+fn parts() -> Vec<(String, &'static Json)> {
+    let defs = schema()["$defs"].as_object().unwrap();
+    let of_types = defs.iter().map(|(name, part)| {
+        let (shape, tag) = name.split_once('-').unwrap();
+        let header = match shape {
+            "camera" => "[camera]",
+            "texture" => "[textures.NAME]",
+            "material" => "[materials.NAME]",
+            "light" => "[[lights]]",
+            _ => "[[shapes]]",
+        };
+        (format!("### `{header}` of type `\"{tag}\"`"), part)
+    });
+    let top = &schema()["properties"];
+    let plain = [
+        ("## `[image]`", &top["image"]),
+        ("## `[render]`", &top["render"]),
+        ("## `[environment]`", &top["environment"]),
+        ("## `[meshes.NAME]`", &top["meshes"]["additionalProperties"]),
+        ("## `[[instances]]`", &top["instances"]["items"]),
+    ];
+    of_types
+        .chain(plain.map(|(heading, part)| (heading.to_owned(), part)))
+        .collect()
+}
+
+/// The keys of the page's tables under a heading, with default and range.
+fn rows(heading: &str) -> BTreeMap<&'static str, (String, String)> {
+    let (_, rest) = PAGE
+        .split_once(&format!("\n{heading}\n"))
+        .unwrap_or_else(|| panic!("no {heading}"));
+    let lines = rest.split("\n#").next().unwrap().lines();
+    let cells = lines.filter_map(|line| {
+        let mut cells = line.strip_prefix("| `")?.split(" | ");
+        let key = cells.next()?.split('`').next()?;
+        Some((key, (cells.next()?.to_owned(), cells.next()?.to_owned())))
+    });
+    cells.filter(|(key, _)| !key.starts_with('"')).collect()
+}
+
+#[test]
+fn the_page_has_the_same_keys_defaults_and_ranges() {
+    let (mut defaults, mut ranges) = (0, 0);
+    for (heading, part) in parts() {
+        let rows = rows(&heading);
+        let keys = part["properties"].as_object().unwrap();
+        assert_eq!(
+            rows.keys().copied().collect::<Vec<_>>(),
+            keys.keys().map(String::as_str).collect::<Vec<_>>(),
+            "{heading}"
+        );
+        for (key, (default, range)) in rows {
+            let place = format!("{heading} {key}");
+            let said = &keys[key];
+            // A camera's are wanted where it has no path.
+            let required = [&part["required"], &part["anyOf"][0]["required"]].into_iter();
+            let is_required = required.flat_map(Json::as_array).flatten().any(|name| name == key);
+            // Whatever has types must say which it is of.
+            assert!(is_required == (default == "required") || key == "type", "{place}");
+            if let (Some(said), Ok(default)) = (
+                said.get("default"),
+                format!("x = {}", default.replace('`', "")).parse::<Table>(),
+            ) {
+                assert!(
+                    same(said, &serde_json::to_value(&default["x"]).unwrap()),
+                    "{place}: {said} {default}"
+                );
+                defaults += 1;
+            }
+            let mut of = said;
+            while let Some(items) = of.get("items") {
+                of = items;
+            }
+            let wanted = match range.as_str() {
+                "point" | "direction" => Some((-1e9, 1e9)),
+                "length" | "two lengths" => Some((1e-9, 1e9)),
+                "colour" if of.get("minimum").is_some() => Some((0.0, 1e6)),
+                range => range.split_once(" to ").and_then(|(low, high)| {
+                    let high = high.split([',', ' ', ';']).next()?;
+                    Some((low.parse::<f64>().ok()?, high.parse::<f64>().ok()?))
+                }),
+            };
+            if let (Some((low, high)), false) = (wanted, key == "max_depth") {
+                let ends = ["minimum", "maximum"].map(|end| of[end].as_f64());
+                assert_eq!(ends, [Some(low), Some(high)], "{place}");
+                ranges += 1;
+            }
+        }
+    }
+    assert!(defaults > 60 && ranges > 80, "{defaults} {ranges}");
+}
+
+/// Equality of values, in which 1 is 1.0.
+fn same(a: &Json, b: &Json) -> bool {
+    match (a, b) {
+        (Json::Number(a), Json::Number(b)) => a.as_f64() == b.as_f64(),
+        (Json::Array(a), Json::Array(b)) => a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(a, b)),
+        (Json::Object(a), Json::Object(b)) => {
+            a.len() == b.len() && a.iter().all(|(key, a)| b.get(key).is_some_and(|b| same(a, b)))
+        }
+        _ => a == b,
+    }
+}
+
+/// Calls for each key that a schema describes, with the way to it.
+fn each_key(schema: &Json, path: &str, check: &mut impl FnMut(&str, &Json)) {
+    match schema {
+        Json::Object(all) => {
+            for (key, property) in all.get("properties").and_then(Json::as_object).into_iter().flatten() {
+                // What a condition asks is described where it leads to.
+                if !path.ends_with("/if") {
+                    check(&format!("{path}.{key}"), property);
+                }
+            }
+            for (key, inner) in all {
+                each_key(inner, &format!("{path}/{key}"), check);
+            }
+        }
+        Json::Array(all) => {
+            for (i, inner) in all.iter().enumerate() {
+                each_key(inner, &format!("{path}/{i}"), check);
+            }
+        }
+        _ => {}
+    }
+}
+
+#[test]
+fn every_key_is_described_and_every_number_has_its_ends() {
+    let mut count = 0;
+    each_key(schema(), "", &mut |path, property| {
+        let told = property["description"].as_str().unwrap_or_default();
+        assert!(told.len() > 5 && told.ends_with('.'), "{path}: {told:?}");
+        for bad in ["[`", "Description", "  ", "..", "\n"] {
+            assert!(!told.contains(bad), "{path}: {told:?}");
+        }
+        let is_number = ["number", "integer"].iter().any(|name| property["type"] == **name);
+        let ends = ["minimum", "exclusiveMinimum", "anyOf"];
+        assert!(
+            !is_number || ends.iter().any(|end| property.get(end).is_some()),
+            "{path}: {property}"
+        );
+        assert!(
+            property.get("title").is_none() && property.get("format").is_none(),
+            "{path}"
+        );
+        count += 1;
+    });
+    assert!(count > 250, "{count}");
+}
+
+#[test]
+fn every_key_is_changed_by_the_test_above() {
+    let mut seen: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    let mut see = |name: String, table: &Value| {
+        seen.entry(name)
+            .or_default()
+            .extend(table.as_table().unwrap().keys().cloned());
+    };
+    let tag = |table: &Value| {
+        table
+            .get("type")
+            .and_then(Value::as_str)
+            .unwrap_or("perspective")
+            .to_owned()
+    };
+    for scene in EVERY {
+        let scene: Table = scene.parse().unwrap();
+        for (key, value) in &scene {
+            match (key.trim_end_matches('s'), value) {
+                ("camera", camera) => see(format!("camera-{}", tag(camera)), camera),
+                (kind @ ("texture" | "material"), Value::Table(all)) => {
+                    all.values().for_each(|one| see(format!("{kind}-{}", tag(one)), one));
+                }
+                (kind @ ("light" | "shape"), Value::Array(all)) => {
+                    all.iter().for_each(|one| see(format!("{kind}-{}", tag(one)), one));
+                }
+                ("meshe", Value::Table(all)) => all.values().for_each(|one| see("meshes".to_owned(), one)),
+                ("instance", Value::Array(all)) => all.iter().for_each(|one| see("instances".to_owned(), one)),
+                (_, section) => see(key.clone(), section),
+            }
+        }
+    }
+    let top = &schema()["properties"];
+    let plain = ["image", "render", "environment"].map(|name| (name.to_owned(), &top[name]));
+    let others = [
+        ("meshes".to_owned(), &top["meshes"]["additionalProperties"]),
+        ("instances".to_owned(), &top["instances"]["items"]),
+    ];
+    let defs = schema()["$defs"]
+        .as_object()
+        .unwrap()
+        .iter()
+        .map(|(name, part)| (name.clone(), part));
+    for (name, part) in defs.chain(plain).chain(others) {
+        let wanted: BTreeSet<String> = part["properties"].as_object().unwrap().keys().cloned().collect();
+        assert_eq!(seen.get(&name), Some(&wanted), "{name}");
+    }
+}
