@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use clap::ValueHint;
 #[cfg(feature = "gpu")]
 use wgray::gpu::{Forms, check_kernels, compose::Shaders};
 use wgray::pack::pack;
@@ -20,11 +21,11 @@ pub struct Args {
 
     /// Folder of the shaders to check, with the files of the project's own, in place of those in the program
     #[cfg(feature = "gpu")]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     shaders: Option<PathBuf>,
 
     /// Folder that files named by the scenes, their textures and meshes, must lie in, in place of the scenes' own
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 
     /// Puts a value in place of each scene's: -D render.seed=3

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::anyhow;
+use clap::ValueHint;
 use wgray::error::RenderError;
 use wgray::image::{Output, Pending};
 use wgray::scene::{Define, Overrides, Scene};
@@ -33,7 +34,7 @@ pub struct Args {
     pixel_samples: Option<u32>,
 
     /// Folder that files named by the scene must lie in, in place of the scene's own
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 
     /// Puts a value in place of the scene's: -D render.seed=3

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use std::time::{Duration, SystemTime};
 
 use anyhow::{Context as _, anyhow};
+use clap::ValueHint;
 use clap::builder::NonEmptyStringValueParser;
 use wgray::dev::{Diagnostic, Listener, Measured, Report, Session, Settings, Sources, StartError, measure};
 use wgray::error::RenderError;
@@ -32,7 +33,7 @@ pub struct Args {
 
     /// Folder of the shaders, with the files of the project's own. If absent: ./shaders if it is such a folder, else the
     /// shaders in the program, which cannot change
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     shaders: Option<PathBuf>,
 
     /// What renders. auto or gpu: a real GPU, else software Vulkan; NAME: the adapter with this as a part of its name,
@@ -45,7 +46,7 @@ pub struct Args {
     size: Option<(u32, u32)>,
 
     /// Folder that the files named by the scene, such as textures, must lie in, instead of the scene's own
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 
     /// Picture to write after each reload, once every pixel has a sample and again when all are there

@@ -1,11 +1,14 @@
 //! The command line: arguments, messages and exit codes. One file a subcommand.
 
 mod check;
+mod completions;
 mod convert;
 #[cfg(feature = "dev")]
 mod dev;
 mod devices;
 mod diff;
+mod exit_codes;
+mod man;
 mod merge;
 mod metadata;
 mod outputs;
@@ -59,6 +62,12 @@ enum Command {
     /// Lists the adapters that pictures can be rendered on, and which one "auto" chooses
     #[command(after_help = EXIT_CODES)]
     Devices,
+    /// Prints what a shell needs to complete the command line
+    #[command(after_help = EXIT_CODES)]
+    Completions(completions::Args),
+    /// Prints or writes the manual pages
+    #[command(after_help = EXIT_CODES)]
+    Man(man::Args),
     /// Shows a scene on a web page, and shows it anew whenever the scene file or a shader is saved
     #[cfg(feature = "dev")]
     Dev(dev::Args),
@@ -83,9 +92,7 @@ pub fn main() -> ExitCode {
     };
     let threads = match &cli.command {
         Command::Render(args) => args.threads,
-        Command::Check(_) | Command::Convert(_) | Command::Diff(_) | Command::Merge(_) | Command::Devices => None,
-        #[cfg(feature = "dev")]
-        Command::Dev(_) => None,
+        _ => None,
     };
     prepare_environment(threads);
     signal::file_size_limit_is_an_error();
@@ -97,6 +104,8 @@ pub fn main() -> ExitCode {
         Command::Merge(args) => merge::run(&args),
         Command::Diff(args) => diff::run(*args),
         Command::Devices => Ok(devices::run()),
+        Command::Completions(args) => Ok(completions::run(&args)),
+        Command::Man(args) => man::run(&args),
         #[cfg(feature = "dev")]
         Command::Dev(args) => dev::run(args),
     };

@@ -8,6 +8,7 @@ mod frames;
 mod gltf;
 mod golden;
 mod jobs;
+mod manual;
 mod messages;
 mod options;
 mod output;
