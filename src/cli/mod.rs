@@ -94,7 +94,7 @@ pub fn main() -> ExitCode {
         Command::Dev(_) => None,
     };
     let requeue = match &cli.command {
-        Command::Render(args) => args.requeue_exit,
+        Command::Render(args) => args.requeue_exit.map(|code| (code, args.quiet)),
         _ => None,
     };
     prepare_environment(threads);
@@ -116,7 +116,12 @@ pub fn main() -> ExitCode {
         Err(error) => {
             report(&error);
             match requeue {
-                Some(code) if helps_again(&error) => ExitCode::from(code),
+                Some((code, quiet)) if helps_again(&error) => {
+                    if !quiet {
+                        say(&format!("note: exit code {code} asks for another try"));
+                    }
+                    ExitCode::from(code)
+                }
                 _ => exit_code(&error),
             }
         }

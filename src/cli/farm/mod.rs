@@ -175,11 +175,19 @@ pub fn run(engine: &Engine, start: Instant) -> anyhow::Result<ExitCode> {
         write(file)?;
     }
     let mut lines = work.told.clone();
+    let (tasks, pictures) = (work.tasks(), work.pictures());
+    let of = |count: u64| {
+        if count == 1 {
+            "1 task".to_owned()
+        } else {
+            format!("{count} tasks")
+        }
+    };
     lines.push(format!(
-        "{} tasks render {}, {} join them",
-        work.tasks(),
+        "{}: {} to render, {} to join the parts.",
         work.what(),
-        work.pictures()
+        of(tasks),
+        of(pictures)
     ));
     lines.push(match engine {
         Engine::Openjd(_) => openjd::next(&work, &to),
@@ -304,8 +312,8 @@ impl Work {
 
     fn count_of_pictures(&self) -> String {
         match &self.frames {
-            None => "a picture".to_owned(),
-            Some(frames) if frames.count() == 1 => "1 frame".to_owned(),
+            None => "One picture".to_owned(),
+            Some(frames) if frames.count() == 1 => "One frame".to_owned(),
             Some(frames) => format!("{} frames", frames.count()),
         }
     }
@@ -314,7 +322,7 @@ impl Work {
     fn head(&self, what: &str) -> Vec<String> {
         let mut lines = vec![
             what.to_owned(),
-            format!("Written by wgray {} farm.", env!("CARGO_PKG_VERSION")),
+            concat!("Written by wgray farm, version ", env!("CARGO_PKG_VERSION"), ".").to_owned(),
         ];
         lines.extend(self.told.iter().cloned());
         lines

@@ -153,7 +153,7 @@ rm -rf -- "$place/checkpoints/{picture}-of-$tiles"   # the parts stay, so that a
 
 fn submit(work: &Work) -> String {
     let head = comments(&work.head(&format!(
-        "Submits {}. Options of sbatch may follow: ./submit --partition=gpu --gres=gpu:1",
+        "{}. This submits it; options of sbatch may follow: ./submit --partition=gpu --gres=gpu:1",
         work.what()
     )));
     format!(
@@ -178,16 +178,21 @@ arrays() {{
     shift 2
     for (( first = 0; first < count; first += most )); do
         job=$(sbatch --parsable --array=0-$(( (count - first < most ? count - first : most) - 1 )) \
-            --chdir="$PWD" --output=logs/%x-%A_%a.txt "$@" "$script" "$first")
+            --chdir="$PWD" --output=logs/%x-%A_%a.txt "$@" "$script" "$first") || return
         echo -n ":${{job%%;*}}"
     done
 }}
 
-tiles=$(arrays tile.sh {tasks} "$@")
-merges=$(arrays merge.sh {pictures} "$@" --dependency=afterok"$tiles" --kill-on-invalid-dep=yes) || {{
-    scancel ${{tiles//:/ }}   # parts that nobody would join
+# What was submitted before something failed is cancelled.
+merges=
+give_up() {{
+    if [ -n "$tiles$merges" ]; then
+        scancel ${{tiles//:/ }} ${{merges//:/ }}
+    fi
     exit 1
 }}
+tiles=$(arrays tile.sh {tasks} "$@") || give_up
+merges=$(arrays merge.sh {pictures} "$@" --dependency=afterok"$tiles" --kill-on-invalid-dep=yes) || give_up
 echo "tiles${{tiles//:/ }}, merge${{merges//:/ }}"
 "#,
         tasks = work.tasks(),
