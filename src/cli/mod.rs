@@ -8,6 +8,8 @@ mod dev;
 mod devices;
 mod diff;
 mod exit_codes;
+mod farm;
+mod frames;
 mod man;
 mod merge;
 mod metadata;
@@ -55,6 +57,9 @@ enum Command {
     Check(check::Args),
     /// Joins parts of a picture, which render --tile has written, to the picture
     Merge(Box<merge::Args>),
+    /// Writes what a render farm takes to render a scene in parts on many machines
+    #[command(subcommand)]
+    Farm(farm::Engine),
     /// Writes a scene, a glTF file for one, as a TOML file that renders the same picture
     Convert(Box<convert::Args>),
     /// Compares two pictures, and fails if they differ
@@ -92,6 +97,11 @@ pub fn main() -> ExitCode {
     };
     let threads = match &cli.command {
         Command::Render(args) => args.threads,
+        Command::Farm(engine) => engine.threads(),
+        _ => None,
+    };
+    let requeue = match &cli.command {
+        Command::Render(args) => args.requeue_exit.map(|code| (code, args.quiet)),
         _ => None,
     };
     prepare_environment(threads);
@@ -102,6 +112,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Merge(args) => merge::run(&args),
+        Command::Farm(engine) => farm::run(&engine, start),
         Command::Diff(args) => diff::run(*args),
         Command::Devices => Ok(devices::run()),
         Command::Completions(args) => Ok(completions::run(&args)),
@@ -113,7 +124,15 @@ pub fn main() -> ExitCode {
         Ok(code) => code,
         Err(error) => {
             report(&error);
-            exit_code(&error)
+            match requeue {
+                Some((code, quiet)) if helps_again(&error) => {
+                    if !quiet {
+                        say(&format!("note: exit code {code} asks for another try"));
+                    }
+                    ExitCode::from(code)
+                }
+                _ => exit_code(&error),
+            }
         }
     }
 }
@@ -218,6 +237,15 @@ fn shader_errors(error: &anyhow::Error) -> &[ShaderError] {
         (Some(RenderError::Shader(error)), _) => std::slice::from_ref(error),
         (_, Some(errors)) => &errors.0,
         _ => &[],
+    }
+}
+
+/// Whether the same command may succeed after this, on another machine or later: not if the scene, the command line or the want of memory
+/// would end it again.
+fn helps_again(error: &anyhow::Error) -> bool {
+    match error.downcast_ref() {
+        Some(Interrupted(signal)) => *signal == signal_hook::consts::SIGTERM,
+        None => matches!(error.downcast_ref(), Some(RenderError::Lost { .. })),
     }
 }
 

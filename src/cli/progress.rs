@@ -15,6 +15,8 @@ pub enum Mode {
     Auto,
     /// Lines of text, at every tenth of the work and every ten seconds
     Plain,
+    /// Lines that Open Job Description takes progress from, openjd_progress: PERCENT
+    Openjd,
     /// Nothing
     None,
 }
@@ -33,7 +35,7 @@ pub struct Progress {
     label: String,
     start: Instant,
     bar: Option<ProgressBar>,
-    /// The tenths that lines have told of, and when the last one did.
+    /// The tenths, or hundredths, that lines have told of, and when the last one did.
     told: (u32, Instant),
 }
 
@@ -75,6 +77,13 @@ impl Progress {
                         share * 100.0
                     ));
                     self.told = (tenths, Instant::now());
+                }
+            }
+            Mode::Openjd => {
+                let hundredths = (share * 100.0) as u32;
+                if hundredths > self.told.0 {
+                    super::say(&format!("openjd_progress: {hundredths}"));
+                    self.told.0 = hundredths;
                 }
             }
             Mode::Auto | Mode::None => {}
