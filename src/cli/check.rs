@@ -10,6 +10,7 @@ use wgray::gpu::{Forms, check_kernels, compose::Shaders};
 use wgray::pack::pack;
 use wgray::scene::{CameraPath, Define, Overrides, Projection, Scene, SceneError};
 
+use super::log::{self, Level};
 use super::scene_options::SceneOptions;
 
 #[derive(Debug, clap::Args)]
@@ -66,8 +67,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             }
             Ok(_) => {} // nobody reads any more
             Err(error) => {
-                super::report(&error);
-                code.get_or_insert(super::exit_code(&error));
+                super::report(&error, super::exit_code(&error));
+                code.get_or_insert(ExitCode::from(super::exit_code(&error)));
             }
         }
     }
@@ -80,7 +81,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &Shaders) -> anyhow::Result<String> {
     let scene = super::load(path, overrides)?;
     for note in &scene.notes {
-        super::say(&format!("warning: {}: {note}", path.display()));
+        log::say(Level::Warning, &format!("{}: {note}", path.display()));
     }
     let frames = check_path(&scene)?;
     let packed = pack(&scene);

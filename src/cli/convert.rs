@@ -10,6 +10,7 @@ use wgray::error::RenderError;
 use wgray::image::{Output, Pending};
 use wgray::scene::{Define, Overrides, Scene};
 
+use super::log::{self, Level};
 use super::outputs::keep_inputs;
 use super::render::parse_size;
 use super::scene_options::SceneOptions;
@@ -63,7 +64,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let loaded = Scene::load_described(&args.scene, &overrides);
     let (scene, description) = loaded.map_err(|error| plain(error.into()))?;
     for note in &scene.notes {
-        super::say(&format!("warning: {}: {note}", args.scene.display()));
+        log::say(Level::Warning, &format!("{}: {note}", args.scene.display()));
     }
     let inputs = [std::slice::from_ref(&args.scene), &scene.files].concat();
     keep_inputs("--output", &output, &inputs, "choose another name")?;
@@ -90,9 +91,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     written.and_then(|()| file.finish()).map_err(RenderError::Output)?;
     if is_outside {
         let (name, folder) = (args.output.display(), folder.display());
-        super::say(&format!(
-            "note: {name} names files outside of {folder}: it is rendered with --asset-root, a folder that they lie in"
-        ));
+        log::say(
+            Level::Note,
+            &format!(
+                "{name} names files outside of {folder}: it is rendered with --asset-root, a folder that they lie in"
+            ),
+        );
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -15,6 +15,7 @@ use wgray::image::Output;
 use wgray::scene::{Description, Overrides, Scene, SceneError};
 
 use super::Usage;
+use super::log::{self, Facts, Level};
 use super::outputs::keep_inputs;
 use super::render::parse_size;
 use super::scene_options::SceneOptions;
@@ -126,10 +127,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let address = listener.address()?;
     Terminal::new().line("", &format!("http://{address}/: the page; Ctrl+C ends"));
     if !address.ip().is_loopback() {
-        super::say(&format!(
-            "warning: {address} is no loopback address: everybody who can reach it can look, and can save the camera \
+        let told = format!(
+            "{address} is no loopback address: everybody who can reach it can look, and can save the camera \
              into the scene file"
-        ));
+        );
+        log::say(Level::Warning, &told);
     }
     listener.serve(&session)?;
     Ok(ExitCode::SUCCESS)
@@ -230,6 +232,17 @@ impl Terminal {
             .as_ref()
             .map(|place| format!("{place}: "))
             .unwrap_or_default();
+        if log::is_json() {
+            let mut facts = Facts::new();
+            facts.extend(
+                problem
+                    .excerpt
+                    .as_ref()
+                    .map(|excerpt| ("excerpt".to_owned(), excerpt.as_str().into())),
+            );
+            log::tell(Level::Error, &format!("{place}{}", problem.message), facts);
+            return;
+        }
         let head = format!(
             "{} {}",
             self.painted(RED, "error:"),
@@ -255,6 +268,10 @@ impl Terminal {
     }
 
     fn line(self, color: &str, text: &str) {
+        if log::is_json() {
+            let level = if color == RED { Level::Error } else { Level::Info };
+            return log::say(level, text);
+        }
         say(&format!("{} {}\n", clock(), self.painted(color, text)));
     }
 
