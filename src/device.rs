@@ -310,14 +310,107 @@ impl<'a> Renderer<'a> {
     }
 }
 
-fn cpu(scene: &Packed) -> Ready<'_> {
+/// What a render would begin on, and why.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Foreseen {
+    /// The device.
+    pub info: DeviceInfo,
+    /// Why that one.
+    pub why: String,
+    /// The adapter, if it is one, and what it would do.
+    #[cfg(feature = "gpu")]
+    pub adapter: Option<(gpu::Info, gpu::Foreseen)>,
+}
+
+/// Says what a render would begin on. No device is opened. One that then cannot be opened, or has no room for the scene, gives way to
+/// the next, or to the CPU.
+///
+/// # Errors
+///
+/// [`RenderError::NoDevice`] if no device fits.
+pub fn foresee(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError> {
+    let on_cpu = |why: String| Foreseen {
+        info: cpu_info(),
+        why,
+        #[cfg(feature = "gpu")]
+        adapter: None,
+    };
+    match device {
+        Device::Cpu => return Ok(on_cpu("it was asked for".to_owned())),
+        Device::Auto if !cfg!(feature = "gpu") => {
+            return Ok(on_cpu("the program was built without its feature \"gpu\"".to_owned()));
+        }
+        Device::Auto => {
+            if let Some(why) = faster_on_cpu(scene) {
+                let why = why.strip_prefix(ON_CPU).unwrap_or(&why).to_owned();
+                return Ok(on_cpu(why));
+            }
+        }
+        _ => {}
+    }
+    match preferred(scene, device) {
+        Err(RenderError::NoDevice(why)) if *device == Device::Auto => Ok(on_cpu(why)),
+        other => other,
+    }
+}
+
+#[cfg(feature = "gpu")]
+fn preferred(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError> {
+    let info = gpu::preferred(&choice_of(device))?;
+    let why = match (device, info.kind) {
+        (Device::Named(_), _) => "it was asked for",
+        (_, "software") => {
+            "there is no real GPU, and software Vulkan is faster than the CPU for a scene without trees of boxes"
+        }
+        _ => "it is the first real GPU",
+    };
+    let why = match device {
+        Device::Gpu if info.kind == "software" => "there is no real GPU",
+        _ => why,
+    };
+    let foreseen = gpu::foresee(scene, &info);
+    Ok(Foreseen {
+        info: DeviceInfo {
+            name: info.name.clone(),
+            driver: info.driver.clone(),
+            interface: info.backend.clone(),
+        },
+        why: why.to_owned(),
+        adapter: Some((info, foreseen)),
+    })
+}
+
+#[cfg(not(feature = "gpu"))]
+fn preferred(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError> {
+    match adapter(scene, device, false, &|_, _| true) {
+        Err(Error::Render(error)) => Err(error),
+        _ => Err(RenderError::NoDevice("there is the CPU alone".to_owned())),
+    }
+}
+
+#[cfg(feature = "gpu")]
+fn choice_of(device: &Device) -> gpu::Choice {
+    match device {
+        Device::Named(name) => gpu::Choice::Named(name.clone()),
+        Device::Auto => gpu::Choice::Auto,
+        Device::Gpu | Device::Cpu => gpu::Choice::Gpu,
+    }
+}
+
+fn cpu_info() -> DeviceInfo {
     let threads = rayon::current_num_threads();
-    let info = DeviceInfo {
+    DeviceInfo {
         name: "cpu".to_string(),
         driver: format!("wgray {}, {threads} threads", env!("CARGO_PKG_VERSION")),
         interface: "cpu".to_string(),
-    };
-    (Box::new(Cpu::new(scene)), info)
+    }
+}
+
+/// How a message begins that says why the CPU was chosen.
+const ON_CPU: &str = "rendering on the CPU: ";
+
+fn cpu(scene: &Packed) -> Ready<'_> {
+    (Box::new(Cpu::new(scene)), cpu_info())
 }
 
 /// Whether the CPU is faster for a scene than what else there is, and why: measured in `docs/performance.md`.
@@ -329,7 +422,9 @@ fn faster_on_cpu(scene: &Packed) -> Option<String> {
     let adapter = gpu::adapters().into_iter().next()?;
     (adapter.kind == "software").then(|| {
         let name = adapter.name;
-        format!("rendering on the CPU: there is no GPU, and the CPU walks trees of boxes faster than {name}, which --device gpu asks for")
+        format!(
+            "{ON_CPU}there is no GPU, and the CPU walks trees of boxes faster than {name}, which --device gpu asks for"
+        )
     })
 }
 
@@ -346,11 +441,7 @@ fn adapter<'a>(
     exact_rounding: bool,
     wanted: &dyn Fn(&str, &str) -> bool,
 ) -> Result<Ready<'a>, Error> {
-    let choice = match device {
-        Device::Named(name) => gpu::Choice::Named(name.clone()),
-        Device::Auto => gpu::Choice::Auto,
-        Device::Gpu | Device::Cpu => gpu::Choice::Gpu,
-    };
+    let choice = choice_of(device);
     let wanted = |info: &gpu::Info| wanted(&info.name, info.kind);
     let opened = gpu::choose_among(&choice, &wanted).map_err(|error| match device {
         Device::Auto => RenderError::NoDevice(error.to_string()),

@@ -4,11 +4,13 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use clap::ValueHint;
 #[cfg(feature = "gpu")]
 use wgray::gpu::{Forms, check_kernels, compose::Shaders};
 use wgray::pack::pack;
 use wgray::scene::{CameraPath, Define, Overrides, Projection, Scene, SceneError};
 
+use super::log::{self, Level};
 use super::scene_options::SceneOptions;
 
 #[derive(Debug, clap::Args)]
@@ -20,11 +22,11 @@ pub struct Args {
 
     /// Folder of the shaders to check, with the files of the project's own, in place of those in the program
     #[cfg(feature = "gpu")]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     shaders: Option<PathBuf>,
 
     /// Folder that files named by the scenes, their textures and meshes, must lie in, in place of the scenes' own
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 
     /// Puts a value in place of each scene's: -D render.seed=3
@@ -65,8 +67,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             }
             Ok(_) => {} // nobody reads any more
             Err(error) => {
-                super::report(&error);
-                code.get_or_insert(super::exit_code(&error));
+                super::report(&error, super::exit_code(&error));
+                code.get_or_insert(ExitCode::from(super::exit_code(&error)));
             }
         }
     }
@@ -79,7 +81,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &Shaders) -> anyhow::Result<String> {
     let scene = super::load(path, overrides)?;
     for note in &scene.notes {
-        super::say(&format!("warning: {}: {note}", path.display()));
+        log::say(Level::Warning, &format!("{}: {note}", path.display()));
     }
     let frames = check_path(&scene)?;
     let packed = pack(&scene);

@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::anyhow;
+use clap::ValueHint;
 use wgray::error::RenderError;
 use wgray::image::{Output, Pending};
 use wgray::scene::{Define, Overrides, Scene};
 
+use super::log::{self, Level};
 use super::outputs::keep_inputs;
 use super::render::parse_size;
 use super::scene_options::SceneOptions;
@@ -33,7 +35,7 @@ pub struct Args {
     pixel_samples: Option<u32>,
 
     /// Folder that files named by the scene must lie in, in place of the scene's own
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 
     /// Puts a value in place of the scene's: -D render.seed=3
@@ -62,7 +64,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let loaded = Scene::load_described(&args.scene, &overrides);
     let (scene, description) = loaded.map_err(|error| plain(error.into()))?;
     for note in &scene.notes {
-        super::say(&format!("warning: {}: {note}", args.scene.display()));
+        log::say(Level::Warning, &format!("{}: {note}", args.scene.display()));
     }
     let inputs = [std::slice::from_ref(&args.scene), &scene.files].concat();
     keep_inputs("--output", &output, &inputs, "choose another name")?;
@@ -89,9 +91,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     written.and_then(|()| file.finish()).map_err(RenderError::Output)?;
     if is_outside {
         let (name, folder) = (args.output.display(), folder.display());
-        super::say(&format!(
-            "note: {name} names files outside of {folder}: it is rendered with --asset-root, a folder that they lie in"
-        ));
+        log::say(
+            Level::Note,
+            &format!(
+                "{name} names files outside of {folder}: it is rendered with --asset-root, a folder that they lie in"
+            ),
+        );
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use std::time::{Duration, SystemTime};
 
 use anyhow::{Context as _, anyhow};
+use clap::ValueHint;
 use clap::builder::NonEmptyStringValueParser;
 use wgray::dev::{Diagnostic, Listener, Measured, Report, Session, Settings, Sources, StartError, measure};
 use wgray::error::RenderError;
@@ -14,6 +15,7 @@ use wgray::image::Output;
 use wgray::scene::{Description, Overrides, Scene, SceneError};
 
 use super::Usage;
+use super::log::{self, Facts, Level};
 use super::outputs::keep_inputs;
 use super::render::parse_size;
 use super::scene_options::SceneOptions;
@@ -32,7 +34,7 @@ pub struct Args {
 
     /// Folder of the shaders, with the files of the project's own. If absent: ./shaders if it is such a folder, else the
     /// shaders in the program, which cannot change
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     shaders: Option<PathBuf>,
 
     /// What renders. auto or gpu: a real GPU, else software Vulkan; NAME: the adapter with this as a part of its name,
@@ -45,7 +47,7 @@ pub struct Args {
     size: Option<(u32, u32)>,
 
     /// Folder that the files named by the scene, such as textures, must lie in, instead of the scene's own
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 
     /// Picture to write after each reload, once every pixel has a sample and again when all are there
@@ -125,10 +127,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let address = listener.address()?;
     Terminal::new().line("", &format!("http://{address}/: the page; Ctrl+C ends"));
     if !address.ip().is_loopback() {
-        super::say(&format!(
-            "warning: {address} is no loopback address: everybody who can reach it can look, and can save the camera \
+        let told = format!(
+            "{address} is no loopback address: everybody who can reach it can look, and can save the camera \
              into the scene file"
-        ));
+        );
+        log::say(Level::Warning, &told);
     }
     listener.serve(&session)?;
     Ok(ExitCode::SUCCESS)
@@ -229,6 +232,17 @@ impl Terminal {
             .as_ref()
             .map(|place| format!("{place}: "))
             .unwrap_or_default();
+        if log::is_json() {
+            let mut facts = Facts::new();
+            facts.extend(
+                problem
+                    .excerpt
+                    .as_ref()
+                    .map(|excerpt| ("excerpt".to_owned(), excerpt.as_str().into())),
+            );
+            log::tell(Level::Error, &format!("{place}{}", problem.message), facts);
+            return;
+        }
         let head = format!(
             "{} {}",
             self.painted(RED, "error:"),
@@ -254,6 +268,10 @@ impl Terminal {
     }
 
     fn line(self, color: &str, text: &str) {
+        if log::is_json() {
+            let level = if color == RED { Level::Error } else { Level::Info };
+            return log::say(level, text);
+        }
         say(&format!("{} {}\n", clock(), self.painted(color, text)));
     }
 

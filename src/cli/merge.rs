@@ -10,6 +10,7 @@ use wgray::image;
 use wgray::job::Parts;
 
 use super::frames::{self, Frame};
+use super::log::{self, Level};
 use super::outputs::{Layered, Outputs, Places};
 use super::picture_options::PictureOptions;
 use super::{Interrupted, Usage, signal};
@@ -72,7 +73,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         (Err(error), _) => Err(error.into()),
         (Ok(saved), _) => {
             if !args.quiet {
-                args.pictures.warn(&saved, &mut |line| super::say(line));
+                args.pictures.warn(&saved, &mut |line| log::say(Level::Warning, line));
             }
             Ok(ExitCode::SUCCESS)
         }

@@ -1,13 +1,18 @@
 //! The command line: arguments, messages and exit codes. One file a subcommand.
 
 mod check;
+mod completions;
 mod convert;
 #[cfg(feature = "dev")]
 mod dev;
 mod devices;
 mod diff;
+mod exit_codes;
 mod farm;
 mod frames;
+mod info;
+mod log;
+mod man;
 mod merge;
 mod metadata;
 mod outputs;
@@ -15,6 +20,7 @@ mod picture_options;
 mod progress;
 mod render;
 mod scene_options;
+mod schema;
 mod signal;
 mod stats;
 
@@ -24,15 +30,22 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::{Parser, Subcommand};
+use serde_json::Value;
 use wgray::compare::Unreadable;
 use wgray::error::{Error, RenderError, ShaderError, ShaderErrors};
 use wgray::scene::{Overrides, Problem, Scene, SceneError};
+
+use self::log::{Facts, Level};
 
 #[derive(Debug, Parser)]
 #[command(name = "wgray", version, about, max_term_width = 100, after_help = EXIT_CODES)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
+
+    /// How messages are written on standard error
+    #[arg(long, global = true, value_enum, value_name = "FORMAT", default_value_t)]
+    log_format: log::Format,
 }
 
 const EXIT_CODES: &str = "\
@@ -52,6 +65,8 @@ enum Command {
     )]
     #[cfg_attr(not(feature = "gpu"), doc = "Validates scene files")]
     Check(check::Args),
+    /// Tells what is in a scene, what it takes, and what would render it
+    Info(Box<info::Args>),
     /// Joins parts of a picture, which render --tile has written, to the picture
     Merge(Box<merge::Args>),
     /// Writes what a render farm takes to render a scene in parts on many machines
@@ -64,6 +79,15 @@ enum Command {
     /// Lists the adapters that pictures can be rendered on, and which one "auto" chooses
     #[command(after_help = EXIT_CODES)]
     Devices,
+    /// Prints the JSON Schema of scene files, by which editors complete and check them
+    #[command(after_help = EXIT_CODES)]
+    Schema,
+    /// Prints what a shell needs to complete the command line
+    #[command(after_help = EXIT_CODES)]
+    Completions(completions::Args),
+    /// Prints or writes the manual pages
+    #[command(after_help = EXIT_CODES)]
+    Man(man::Args),
     /// Shows a scene on a web page, and shows it anew whenever the scene file or a shader is saved
     #[cfg(feature = "dev")]
     Dev(dev::Args),
@@ -86,12 +110,12 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(told) => return explain(&told),
     };
+    log::choose(cli.log_format);
+    log::catch_panics();
     let threads = match &cli.command {
         Command::Render(args) => args.threads,
         Command::Farm(engine) => engine.threads(),
-        Command::Check(_) | Command::Convert(_) | Command::Diff(_) | Command::Merge(_) | Command::Devices => None,
-        #[cfg(feature = "dev")]
-        Command::Dev(_) => None,
+        _ => None,
     };
     let requeue = match &cli.command {
         Command::Render(args) => args.requeue_exit.map(|code| (code, args.quiet)),
@@ -103,37 +127,48 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Render(args) => render::run(*args, start),
         Command::Check(args) => check::run(&args),
+        Command::Info(args) => info::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Farm(engine) => farm::run(&engine, start),
         Command::Diff(args) => diff::run(*args),
         Command::Devices => Ok(devices::run()),
+        Command::Schema => Ok(schema::run()),
+        Command::Completions(args) => Ok(completions::run(&args)),
+        Command::Man(args) => man::run(&args),
         #[cfg(feature = "dev")]
         Command::Dev(args) => dev::run(args),
     };
     match result {
         Ok(code) => code,
         Err(error) => {
-            report(&error);
-            match requeue {
-                Some((code, quiet)) if helps_again(&error) => {
-                    if !quiet {
-                        say(&format!("note: exit code {code} asks for another try"));
-                    }
-                    ExitCode::from(code)
-                }
-                _ => exit_code(&error),
+            let again = requeue.filter(|_| helps_again(&error));
+            let code = again.map_or_else(|| exit_code(&error), |(code, _)| code);
+            report(&error, code);
+            if again.is_some_and(|(_, quiet)| !quiet) {
+                log::say(Level::Note, &format!("exit code {code} asks for another try"));
             }
+            ExitCode::from(code)
         }
     }
 }
 
 /// Prints the help or the version, or what is wrong with the command line.
 fn explain(told: &clap::Error) -> ExitCode {
-    match (told.print(), told.use_stderr()) {
-        (_, true) => ExitCode::from(2),
-        (printed, false) => ended(printed, ExitCode::SUCCESS),
+    log::choose(log::asked(std::env::args_os()));
+    if !told.use_stderr() {
+        return ended(told.print(), ExitCode::SUCCESS);
     }
+    if !log::is_json() {
+        let _ = told.print(); // where this cannot be written there is nobody to tell
+        return ExitCode::from(2);
+    }
+    let text = told.render().to_string();
+    let (message, help) = text.split_once("\n\n").unwrap_or((&text, ""));
+    let message = message.strip_prefix("error: ").unwrap_or(message);
+    let facts = [("exit_code", Value::from(2)), ("help", Value::from(help.trim()))];
+    log::tell(Level::Error, message.trim(), facts_of(facts));
+    ExitCode::from(2)
 }
 
 /// What drivers learn from the environment. Nothing else runs yet.
@@ -189,26 +224,55 @@ fn option(problem: &Problem) -> Usage {
 }
 
 /// Says on standard error what went wrong.
-fn report(error: &anyhow::Error) {
+fn report(error: &anyhow::Error, code: u8) {
+    let code = Value::from(code);
     let shader = shader_errors(error);
     if shader.is_empty() {
         let hint = match error.downcast_ref() {
             Some(RenderError::OutOfMemory { .. }) => " (--crop, --size, --device cpu)",
             _ => "",
         };
-        say(&format!("error: {error:#}{hint}"));
+        let mut facts = facts_of([("exit_code", code.clone())]);
+        if let Some(error) = error.downcast_ref::<SceneError>() {
+            let place = error.place();
+            let numbers = [("line", place.line), ("column", place.column)];
+            let texts = [("file", place.file), ("key", place.key)];
+            let texts = texts.map(|(name, text)| (name, text.map(Value::from)));
+            let all = numbers.map(|(name, number)| (name, number.map(Value::from)));
+            let known = all.into_iter().chain(texts);
+            facts.extend(known.filter_map(|(name, value)| Some((name.to_owned(), value?))));
+        }
+        log::tell(Level::Error, &format!("{error:#}{hint}"), facts);
     }
     for error in shader {
-        say(&format!("error: {error}"));
+        let mut facts = facts_of([("exit_code", code.clone())]);
+        let mut place = error.place.rsplitn(3, ':');
+        if let (Some(Ok(column)), Some(Ok(line)), Some(file)) =
+            (place.next().map(str::parse), place.next().map(str::parse), place.next())
+        {
+            let (line, column): (u64, u64) = (line, column);
+            facts.extend(facts_of([
+                ("file", file.into()),
+                ("line", line.into()),
+                ("column", column.into()),
+            ]));
+        }
         if let Some(excerpt) = &error.excerpt {
-            say(excerpt);
+            facts.insert("excerpt".to_owned(), excerpt.as_str().into());
+        }
+        log::tell(Level::Error, &error.to_string(), facts);
+        if let Some(excerpt) = &error.excerpt {
+            log::explain(excerpt);
         }
     }
 }
 
-/// A line on standard error. Where it cannot be written there is nobody to tell, and whatever is under way goes on.
-fn say(line: &str) {
-    let _ = io::stderr().lock().write_all(format!("{line}\n").as_bytes());
+/// Facts by their names.
+fn facts_of<const N: usize>(facts: [(&str, Value); N]) -> Facts {
+    facts
+        .map(|(name, value)| (name.to_owned(), value))
+        .into_iter()
+        .collect()
 }
 
 /// The exit code of a command that has printed something: a reader who has gone wanted no more, but a full disk is a
@@ -216,7 +280,12 @@ fn say(line: &str) {
 fn ended(printed: io::Result<()>, code: ExitCode) -> ExitCode {
     match printed.and_then(|()| io::stdout().flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            say(&format!("error: standard output: cannot be written: {error}"));
+            let facts = facts_of([("exit_code", NOT_WRITTEN.into())]);
+            log::tell(
+                Level::Error,
+                &format!("standard output: cannot be written: {error}"),
+                facts,
+            );
             ExitCode::from(NOT_WRITTEN)
         }
         _ => code,
@@ -240,8 +309,8 @@ fn helps_again(error: &anyhow::Error) -> bool {
     }
 }
 
-fn exit_code(error: &anyhow::Error) -> ExitCode {
-    let code = if error.is::<Usage>() {
+fn exit_code(error: &anyhow::Error) -> u8 {
+    if error.is::<Usage>() {
         2
     } else if let Some(Interrupted(signal)) = error.downcast_ref() {
         signal::exit_code(*signal)
@@ -257,6 +326,5 @@ fn exit_code(error: &anyhow::Error) -> ExitCode {
             Some(RenderError::Output(_)) => NOT_WRITTEN,
             _ => 1,
         }
-    };
-    ExitCode::from(code)
+    }
 }

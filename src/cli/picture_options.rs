@@ -76,7 +76,7 @@ impl PictureOptions {
     pub fn warn(&self, saved: &Saved, say: &mut dyn FnMut(&str)) {
         for (name, count) in &saved.too_large {
             say(&format!(
-                "warning: {name}: {count} values are too large for 16 bits, which hold 65504 at most, and are infinite there"
+                "{name}: {count} values are too large for 16 bits, which hold 65504 at most, and are infinite there"
             ));
         }
     }

@@ -8,12 +8,15 @@ use std::time::{Duration, Instant};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::facts_of;
+use super::log::{self, Level};
+
 /// How progress is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Mode {
-    /// A bar, if standard error is a terminal and the render takes more than a second
+    /// A bar, if standard error is a terminal and the render takes more than a second; lines where messages are JSON
     Auto,
-    /// Lines of text, at every tenth of the work and every ten seconds
+    /// Lines, at every tenth of the work and every ten seconds
     Plain,
     /// Lines that Open Job Description takes progress from, openjd_progress: PERCENT
     Openjd,
@@ -33,6 +36,8 @@ pub struct Progress {
     mode: Mode,
     /// What it is of, in front of each line, and a colon; nothing where there is one picture.
     label: String,
+    /// The number of the frame that it is of.
+    frame: Option<u32>,
     start: Instant,
     bar: Option<ProgressBar>,
     /// The tenths, or hundredths, that lines have told of, and when the last one did.
@@ -41,16 +46,17 @@ pub struct Progress {
 
 impl Progress {
     /// The progress of what `label` says, if there are several.
-    pub fn new(mode: Mode, label: Option<String>) -> Progress {
-        let mode = if mode == Mode::Auto && !std::io::stderr().is_terminal() {
-            Mode::None
-        } else {
-            mode
+    pub fn new(mode: Mode, label: Option<String>, frame: Option<u32>) -> Progress {
+        let mode = match mode {
+            Mode::Auto if log::is_json() => Mode::Plain,
+            Mode::Auto if !std::io::stderr().is_terminal() => Mode::None,
+            mode => mode,
         };
         let start = Instant::now();
         Progress {
             mode,
             label: label.map(|label| format!("{label}: ")).unwrap_or_default(),
+            frame,
             start,
             bar: None,
             told: (0, start),
@@ -70,24 +76,30 @@ impl Progress {
             Mode::Plain => {
                 let tenths = (share * 10.0) as u32;
                 if tenths > self.told.0 || self.told.1.elapsed() > SILENCE {
-                    let seconds = self.start.elapsed().as_secs_f64();
-                    super::say(&format!(
-                        "{}{:3.0} % done after {seconds:.1} s",
-                        self.label,
-                        share * 100.0
-                    ));
+                    self.tell(share);
                     self.told = (tenths, Instant::now());
                 }
             }
             Mode::Openjd => {
                 let hundredths = (share * 100.0) as u32;
                 if hundredths > self.told.0 {
-                    super::say(&format!("openjd_progress: {hundredths}"));
+                    log::say(Level::Progress, &format!("openjd_progress: {hundredths}"));
                     self.told.0 = hundredths;
                 }
             }
             Mode::Auto | Mode::None => {}
         }
+    }
+}
+
+impl Progress {
+    /// A line.
+    fn tell(&self, share: f64) {
+        let seconds = self.start.elapsed().as_secs_f64();
+        let line = format!("{}{:3.0} % done after {seconds:.1} s", self.label, share * 100.0);
+        let mut facts = facts_of([("share", share.into()), ("seconds", seconds.into())]);
+        facts.extend(self.frame.map(|frame| ("frame".to_owned(), frame.into())));
+        log::tell(Level::Progress, &line, facts);
     }
 }
 
@@ -101,7 +113,7 @@ impl Drop for Progress {
 
 /// Does work that has no shares to tell of. On a terminal it is named, with its time, while it takes longer than a second.
 pub fn named<T>(mode: Mode, name: &'static str, work: impl FnOnce() -> T) -> T {
-    if mode != Mode::Auto || !std::io::stderr().is_terminal() {
+    if mode != Mode::Auto || log::is_json() || !std::io::stderr().is_terminal() {
         return work();
     }
     let (done, ended) = mpsc::channel::<()>();

@@ -1,5 +1,6 @@
 //! The options that say what scene is meant beside its file: the same wherever scenes are read.
 
+use clap::ValueHint;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use wgray::scene::{Background, EnvironmentDescription, GltfChoice, Overrides, Scene, Selection, View};
 
@@ -9,7 +10,7 @@ use wgray::scene::{Background, EnvironmentDescription, GltfChoice, Overrides, Sc
 pub struct SceneOptions {
     /// What surrounds the scene and lights it, in place of its own: an equirectangular image, FILE.hdr, .exr, .png or .jpg; studio; sky; or a
     /// colour from everywhere, #rrggbb as displays have it or r,g,b as linear light. For --integrator path
-    #[arg(long, value_name = "FILE|studio|sky|COLOR")]
+    #[arg(long, value_name = "FILE|studio|sky|COLOR", value_hint = ValueHint::FilePath)]
     pub environment: Option<EnvironmentDescription>,
 
     /// What the camera sees where nothing is, while the surroundings light the scene as before: a colour, #rrggbb or r,g,b, or none, for a

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::scene::ErrorPlace;
+
 /// Why there is no model. Every message begins with the place: `a.gltf: accessors[3]: 9 elements of 12 bytes, 12 apart, from byte
 /// 0 on; bufferViews[1] has 96 bytes`.
 #[derive(Debug, thiserror::Error)]
@@ -57,6 +59,26 @@ pub enum GltfError {
         /// The value and the rule.
         message: String,
     },
+}
+
+impl GltfError {
+    /// Where it is.
+    pub(crate) fn place(&self) -> ErrorPlace {
+        let mut place = ErrorPlace::default();
+        let path = match self {
+            GltfError::Syntax { path, line, column, .. } => {
+                (place.line, place.column) = (Some(*line), Some(*column));
+                path
+            }
+            GltfError::Key { path, key, .. } => {
+                place.key = Some(key.clone());
+                path
+            }
+            GltfError::Read { path, .. } | GltfError::Byte { path, .. } | GltfError::File { path, .. } => path,
+        };
+        place.file = Some(path.display().to_string());
+        place
+    }
 }
 
 /// An error before it knows its file.

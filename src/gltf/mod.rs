@@ -42,6 +42,7 @@ use self::material::Materials;
 use self::mesh::{Key, Meshes};
 use self::node::{Nodes, Pose};
 use crate::mesh::Mesh;
+use crate::scene::limits::TIMES;
 use crate::scene::{
     CameraDescription, GltfDescription, LightDescription, MaterialDescription, Problem, Selection, TextureDescription,
 };
@@ -73,7 +74,7 @@ impl Choice {
     /// What a shape says.
     pub fn of(shape: &GltfDescription) -> Result<Choice, Problem> {
         if let Some(time) = shape.time
-            && !(0.0..=1e9).contains(&time)
+            && !(TIMES.0..=TIMES.1).contains(&time)
         {
             return Err(Problem::of("time", format!("{time} must be from 0 to 1e9 seconds")));
         }

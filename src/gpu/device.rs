@@ -95,6 +95,18 @@ pub fn choose_among(choice: &Choice, wanted: &dyn Fn(&Info) -> bool) -> Result<D
     Err(failure.unwrap_or_else(|| RenderError::NoDevice(NONE_FOUND.to_owned() + HOW_TO_GET_VULKAN)))
 }
 
+/// The adapter that [`choose`] would open, unopened.
+///
+/// # Errors
+///
+/// As those of [`choose`].
+pub fn preferred(choice: &Choice) -> Result<Info, RenderError> {
+    let infos = adapters();
+    let fitting = fitting(&infos, choice).map_err(RenderError::NoDevice)?;
+    let first = fitting.first().and_then(|i| infos.get(*i)).cloned();
+    first.ok_or_else(|| RenderError::NoDevice(NONE_FOUND.to_owned() + HOW_TO_GET_VULKAN))
+}
+
 const NONE_FOUND: &str = "no Vulkan, Metal or DX12 adapter found; ";
 
 /// Which adapters a choice means, the best first. The error is what to tell the user.

@@ -1,16 +1,29 @@
 //! A scene's buffers on a device.
 
 use bytemuck::bytes_of;
-use glam::Vec4;
+use glam::{UVec4, Vec4};
 use wgpu::BufferUsages;
 
-use super::bake::{mesh_rows, node_rows, rows};
+use super::bake::{mesh_rows, mesh_rows_count, node_rows, node_rows_count, rows};
 use super::device::Device;
 use super::memory::Held;
 use super::pipeline::bind_group;
 use super::texels::TexelParts;
 use crate::error::RenderError;
 use crate::pack::{BINS, Camera, Packed};
+
+/// What a scene takes on a device, in bytes.
+pub fn bytes_of_scene(packed: &Packed) -> u64 {
+    let of_rows = rows(packed).len() + node_rows_count(packed) + mesh_rows_count(packed);
+    let sizes = [
+        size_of_val(packed.texels.as_slice()),
+        of_rows * size_of::<UVec4>(),
+        size_of_val(packed.primitives.as_slice()),
+        size_of_val(packed.bounds.as_slice()),
+        BINS as usize * size_of::<Vec4>(),
+    ];
+    sizes.iter().map(|size| *size as u64).sum()
+}
 
 /// What kernels read of a scene.
 pub struct SceneBuffers {
@@ -33,16 +46,7 @@ impl SceneBuffers {
         let (rows, nodes, meshes) = (rows(packed), node_rows(packed), mesh_rows(packed));
         let mut filter_table = packed.filter_table.clone();
         filter_table.resize(BINS as usize, Vec4::ZERO);
-        let sizes = [
-            size_of_val(packed.texels.as_slice()),
-            size_of_val(rows.as_slice()),
-            size_of_val(nodes.as_slice()),
-            size_of_val(meshes.as_slice()),
-            size_of_val(packed.primitives.as_slice()),
-            size_of_val(packed.bounds.as_slice()),
-            size_of_val(filter_table.as_slice()),
-        ];
-        let bytes = sizes.iter().map(|size| *size as u64).sum();
+        let bytes = bytes_of_scene(packed);
         let uploaded = || {
             let texels = texels.split(&packed.texels);
             let texels = texels.map(|part| device.checked(|| device.upload(storage, part)));

@@ -130,6 +130,41 @@ impl Packed {
         self
     }
 
+    /// The memory that trees of boxes take, in bytes.
+    pub fn tree_bytes(&self) -> u64 {
+        let of_meshes = self.meshes.iter().map(|mesh| size_of_val(mesh.nodes.as_slice()));
+        let own = size_of_val(self.nodes.as_slice()) + size_of_val(self.items.as_slice());
+        (own + of_meshes.sum::<usize>()) as u64
+    }
+
+    /// The memory that texels take, with tables of those around the scene, in bytes.
+    pub fn texel_bytes(&self) -> u64 {
+        size_of_val(self.texels.as_slice()) as u64
+    }
+
+    /// The memory that all of it takes, in bytes.
+    pub fn bytes(&self) -> u64 {
+        let lists = [
+            size_of_val(self.primitives.as_slice()),
+            size_of_val(self.bounds.as_slice()),
+            size_of_val(self.nodes.as_slice()),
+            size_of_val(self.items.as_slice()),
+            size_of_val(self.instances.as_slice()),
+            size_of_val(self.group_words.as_slice()),
+            size_of_val(self.materials.as_slice()),
+            size_of_val(self.lights.as_slice()),
+            size_of_val(self.emitters.as_slice()),
+            size_of_val(self.light_nodes.as_slice()),
+            size_of_val(self.light_leaves.as_slice()),
+            size_of_val(self.lookups.as_slice()),
+            size_of_val(self.textures.as_slice()),
+            size_of_val(self.texels.as_slice()),
+            size_of_val(self.filter_table.as_slice()),
+        ];
+        let of_meshes = self.meshes.iter().map(|mesh| mesh.bytes());
+        of_meshes.sum::<u64>() + lists.iter().map(|bytes| *bytes as u64).sum::<u64>()
+    }
+
     /// Whether the picture has alpha: its background is transparent.
     pub fn has_alpha(&self) -> bool {
         self.specialization.alpha != 0

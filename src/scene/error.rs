@@ -50,6 +50,47 @@ pub enum SceneError {
     Override(Problem),
 }
 
+/// Where an error is, as far as that is known.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ErrorPlace {
+    /// Name of the file.
+    pub file: Option<String>,
+    /// Counted from 1.
+    pub line: Option<usize>,
+    /// Counted from 1.
+    pub column: Option<usize>,
+    /// The way to the value: `shapes[2].size`.
+    pub key: Option<String>,
+}
+
+impl SceneError {
+    /// Where it is.
+    pub fn place(&self) -> ErrorPlace {
+        let of_file = |file: String| ErrorPlace {
+            file: Some(file),
+            ..ErrorPlace::default()
+        };
+        match self {
+            SceneError::Read { path, .. } => of_file(path.display().to_string()),
+            SceneError::Syntax {
+                origin, line, column, ..
+            } => ErrorPlace {
+                line: Some(*line),
+                column: Some(*column),
+                ..of_file(origin.clone())
+            },
+            SceneError::Invalid { origin, line, problem } => ErrorPlace {
+                line: Some(*line),
+                key: Some(problem.key.to_string()).filter(|key| !key.is_empty()),
+                ..of_file(origin.clone())
+            },
+            SceneError::Gltf(error) => error.place(),
+            SceneError::Override(_) => ErrorPlace::default(),
+        }
+    }
+}
+
 /// A value that breaks a rule: `shapes[2].size: -1 must be finite and greater than 0`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]

@@ -15,10 +15,12 @@ mod gltf;
 mod gray_exr;
 pub(crate) mod halves;
 pub(crate) mod image_file;
+pub(crate) mod limits;
 mod load;
 mod mesh_file;
 mod metals;
 mod parse;
+mod schema;
 mod sky;
 mod spline;
 mod studio;
@@ -32,6 +34,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::gltf::Imported;
@@ -43,12 +46,13 @@ pub use camera_path::CameraPath;
 pub(crate) use course::is_course;
 pub use define::Define;
 pub use description::*;
-pub use error::{KeyPath, Problem, SceneError};
+pub use error::{ErrorPlace, KeyPath, Problem, SceneError};
 pub use framing::{Framing, View, framed};
 pub use gltf::{GltfChoice, is_gltf};
 pub use image_file::Assets;
 pub use load::Overrides;
 pub use metals::MetalIndex;
+pub use schema::schema;
 pub use texture::{
     Channel, Color, Encoding, Image, NormalMap, Texels, Texture, TextureFilter, TextureKind, Value, Wrap,
 };
@@ -186,7 +190,7 @@ pub struct Render {
 }
 
 /// What light is simulated. In a file the names are in snake case: `"path"`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Integrator {
@@ -210,7 +214,7 @@ impl Integrator {
 }
 
 /// Whether glass casts shadows. In a file the names are in snake case: `"opaque"`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Shadows {
     /// Like everything else.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A colour of a material.
@@ -30,7 +31,7 @@ pub enum Value {
 }
 
 /// One of the values of a texture. In a file the names are in lower case: `"g"`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Channel {
     /// Red.
@@ -101,7 +102,7 @@ pub enum TextureKind {
 }
 
 /// An image beyond its edges. In a file the names are in snake case: `"repeat"`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Wrap {
     /// Again and again.
@@ -114,7 +115,7 @@ pub enum Wrap {
 }
 
 /// How an image's colours are found. In a file the names are in snake case: `"ewa"`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TextureFilter {
     /// The texel that the point lies in.
@@ -136,7 +137,7 @@ impl TextureFilter {
 }
 
 /// What an image's 8-bit and 16-bit values mean. In a file the names are in snake case: `"srgb"`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
     /// Colours by the curve of IEC 61966-2-1.

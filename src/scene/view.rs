@@ -1,9 +1,10 @@
 //! How linear light is shown on a display; what the transforms compute is in `image::view`.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// From linear light to what a display is sent. In a file the names are those of [`ViewTransform::name`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[non_exhaustive]
 pub enum ViewTransform {
     /// Clamped to 0 ... 1, to the power 1/2.2.

@@ -9,6 +9,7 @@ mod frames;
 mod gltf;
 mod golden;
 mod jobs;
+mod manual;
 mod messages;
 mod options;
 mod output;

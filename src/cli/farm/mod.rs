@@ -21,6 +21,7 @@ use wgray::job::Tile;
 use self::given::{Given, Rendering};
 use self::text::{plain, word};
 use super::frames::Frames;
+use super::log::{self, Level};
 use super::outputs::keep_inputs;
 use super::render::{Job, Trial, parse_duration};
 use super::{Usage, ended, option};
@@ -284,11 +285,12 @@ fn size(work: &mut Work, own: &Own, job: &mut Job, start: Instant) -> anyhow::Re
         seconds(fixed + trial.rendering)
     ));
     if all < 2.0 * fixed {
-        super::say(&format!(
-            "warning: --task-time: of {} each task needs {} to begin; tasks are longer, so that it is half of them at most",
+        let told = format!(
+            "--task-time: of {} each task needs {} to begin; tasks are longer, so that it is half of them at most",
             seconds(all),
             seconds(fixed)
-        ));
+        );
+        log::say(Level::Warning, &told);
     }
     Ok(())
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use clap::ValueHint;
 use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser as _};
 use wgray::device::Device;
 use wgray::film::Region;
@@ -84,7 +85,7 @@ pub struct Args {
     pub max_depth: Option<u32>,
 
     /// Folder that pictures and meshes named by the scene must lie in, if not the scene's own
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub asset_root: Option<PathBuf>,
 
     /// Renders the pixels of columns x0 to x1 - 1 and rows y0 to y1 - 1 only, the same as in the whole picture

@@ -7,7 +7,6 @@ mod trial;
 mod work;
 
 use std::collections::BTreeMap;
-use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -23,10 +22,11 @@ use self::plan::Plan;
 use self::said::Said;
 use self::work::Took;
 use super::frames::Frame;
+use super::log::{self, Level};
 use super::outputs::Outputs;
 use super::signal::Stop;
 use super::stats::Stats;
-use super::{Interrupted, Usage, plain, progress, signal};
+use super::{Interrupted, Usage, facts_of, plain, progress, signal};
 
 pub use args::{Args, parse_duration, parse_size};
 pub use trial::Trial;
@@ -51,17 +51,15 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
                 continue;
             }
             let name = part.display();
-            job.said.again(&format!(
-                "note: {name} is of another scene or other options, and is rendered anew"
-            ));
+            let told = format!("{name} is of another scene or other options, and is rendered anew");
+            job.said.again(Level::Note, &told);
         }
         picture(&plan, outputs, &mut stop, start)?;
         start = Instant::now();
     }
     if skipped > 0 {
-        job.said.once(&format!(
-            "note: {skipped} of {count} left out, as their files are there"
-        ));
+        let told = format!("{skipped} of {count} left out, as their files are there");
+        job.said.once(Level::Note, &told);
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -81,7 +79,7 @@ impl<'a> Job<'a> {
     /// Reads the scene, and looks at all frames.
     pub fn new(args: &'a Args) -> anyhow::Result<Job<'a>> {
         if args.verbose {
-            speak();
+            log::speak();
         }
         if let Some(threads) = args.threads {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
@@ -141,7 +139,7 @@ fn read(args: &Args, said: &Said) -> anyhow::Result<Scene> {
     let moves = scene.camera_path.is_some() || args.fps(&scene)?.is_some();
     let still = (args.frames.is_some() && !moves).then_some(still);
     for note in scene.notes.iter().map(String::as_str).chain(still) {
-        said.once(&format!("warning: {}: {note}", path.display()));
+        said.once(Level::Warning, &format!("{}: {note}", path.display()));
     }
     Ok(scene)
 }
@@ -178,6 +176,7 @@ fn picture(plan: &Plan, outputs: Outputs, stop: &mut Option<Stop>, start: Instan
         Some(checkpoint) => checkpoint,
         None => &mut nowhere,
     };
+    let names: Vec<String> = outputs.files().map(|(_, name, _)| name.to_owned()).collect();
     let outputs = outputs.begin().map_err(RenderError::Output)?;
     let stop = match stop {
         Some(stop) => stop,
@@ -194,8 +193,10 @@ fn picture(plan: &Plan, outputs: Outputs, stop: &mut Option<Stop>, start: Instan
     if let (Err(error), Some(path)) = (&took, &plan.checkpoint) {
         let path = path.display();
         if error.is::<Interrupted>() {
-            plan.said
-                .again(&format!("note: {path} has what was rendered; --resume goes on from it"));
+            plan.said.again(
+                Level::Note,
+                &format!("{path} has what was rendered; --resume goes on from it"),
+            );
         }
     }
     let took = took?;
@@ -203,12 +204,18 @@ fn picture(plan: &Plan, outputs: Outputs, stop: &mut Option<Stop>, start: Instan
     info!(render = took.time.as_secs_f64(), seconds = total, "picture written");
     let (least, all) = (took.least_samples, plan.scene.pixel_samples);
     if least < all {
-        plan.said.again(&format!(
-            "note: the time was up: each pixel has {least} of {all} samples, or more"
-        ));
+        plan.said.again(
+            Level::Note,
+            &format!("the time was up: each pixel has {least} of {all} samples, or more"),
+        );
+    }
+    let stats = stats(plan, renderer.info(), &took, setup, total);
+    if log::is_json() && !plan.said.is_quiet() {
+        let stats = serde_json::to_value(&stats)?;
+        let facts = facts_of([("files", names.into()), ("stats", stats)]);
+        log::tell(Level::Info, "picture written", facts);
     }
     if let Some(file) = outputs.stats {
-        let stats = stats(plan, renderer.info(), &took, setup, total);
         stats.write(file).map_err(RenderError::Output)?;
     }
     Ok(())
@@ -244,19 +251,4 @@ fn stats(plan: &Plan, device: &DeviceInfo, took: &Took, setup: f64, total: f64) 
         shadow_rays: None,
         nominal_mrays_per_s: Stats::nominal(rays_now, scene.light_samples(), render),
     }
-}
-
-/// Events of this program on standard error, and warnings of others.
-fn speak() {
-    use tracing_subscriber::filter::{LevelFilter, Targets};
-    use tracing_subscriber::prelude::*;
-    let ours = Targets::new()
-        .with_target("wgray", LevelFilter::DEBUG)
-        .with_default(LevelFilter::WARN);
-    let lines = tracing_subscriber::fmt::layer()
-        .with_writer(std::io::stderr)
-        .with_target(false)
-        .without_time()
-        .with_ansi(std::io::stderr().is_terminal());
-    tracing_subscriber::registry().with(lines).with(ours).init();
 }

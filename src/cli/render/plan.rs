@@ -17,6 +17,7 @@ use wgray::scene::{Scene, ViewSettings};
 use super::args::Args;
 use super::said::Said;
 use crate::cli::frames::Frame;
+use crate::cli::log::Level;
 use crate::cli::metadata::Told;
 use crate::cli::picture_options::PictureOptions;
 use crate::cli::progress::{self, Mode};
@@ -121,7 +122,7 @@ impl<'a> Plan<'a> {
             resume: self.resume,
             interval: self.checkpoint_interval,
             wait: Box::new(move || asked().is_none() && self.deadline.is_none_or(|end| Instant::now() < end)),
-            tell: Box::new(|what| self.said.again(&format!("warning: {what}"))),
+            tell: Box::new(|what| self.said.again(Level::Warning, &format!("{what}"))),
         };
         let identity = Identity::of(&self.scene, self.region(), self.options.exact_rounding);
         match Checkpoint::open(opening, identity, self.scene.form()) {
@@ -142,14 +143,14 @@ impl<'a> Plan<'a> {
     pub fn renderer<'b>(&'b self, stop: &'b Stop) -> anyhow::Result<Renderer<'b>> {
         let on_fault = OnFault {
             tell: Box::new(|why, remedy| match remedy {
-                Remedy::Anew => self.said.again(&format!("warning: {why}; it is opened anew")),
-                Remedy::Cpu => self.said.once(&format!("warning: rendering on the CPU: {why}")),
+                Remedy::Anew => self.said.again(Level::Warning, &format!("{why}; it is opened anew")),
+                Remedy::Cpu => self.said.once(Level::Warning, &format!("rendering on the CPU: {why}")),
             }),
             stopped: Box::new(|| stop.signal().is_some()),
         };
         let renderer = Renderer::new(&self.scene, &self.options, on_fault).map_err(plain)?;
         if let Some(why) = renderer.why() {
-            self.said.once(&format!("note: {why}"));
+            self.said.once(Level::Note, &format!("{why}"));
         }
         Ok(renderer)
     }

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
-use crate::cli::say;
+use crate::cli::log::{Level, say};
 
 /// The lines so far.
 pub struct Said {
@@ -20,17 +20,22 @@ impl Said {
         }
     }
 
+    /// Whether nothing is said but errors.
+    pub fn is_quiet(&self) -> bool {
+        self.quiet
+    }
+
     /// Says a line if it was not said before.
-    pub fn once(&self, line: &str) {
+    pub fn once(&self, level: Level, line: &str) {
         if !self.quiet && self.lines.borrow_mut().insert(line.to_owned()) {
-            say(line);
+            say(level, line);
         }
     }
 
     /// Says a line.
-    pub fn again(&self, line: &str) {
+    pub fn again(&self, level: Level, line: &str) {
         if !self.quiet {
-            say(line);
+            say(level, line);
         }
     }
 }

@@ -11,6 +11,7 @@ use wgray::job::{self, Bands, Cut, Flow, Keeper, Order, PartHeader};
 use wgray::render::{middle_depth, needs_first_hits};
 
 use super::plan::Plan;
+use crate::cli::log::Level;
 use crate::cli::outputs::Places;
 use crate::cli::progress::Progress;
 use crate::cli::signal::Stop;
@@ -47,14 +48,17 @@ pub fn write(
         Places::Pictures(targets) => {
             let options = plan.pictures.save_options(metadata);
             let saved = image::save(targets, &layout, &options, &mut fill)?;
-            plan.pictures.warn(&saved, &mut |line| plan.said.again(line));
+            plan.pictures
+                .warn(&saved, &mut |line| plan.said.again(Level::Warning, line));
         }
         Places::Part(file) => write_part(plan, &layout, file, &mut fill)?,
     }
     if took.strange > 0 {
         let count = took.strange;
-        plan.said
-            .again(&format!("warning: {name}: {count} pixels are not finite numbers"));
+        plan.said.again(
+            Level::Warning,
+            &format!("{name}: {count} pixels are not finite numbers"),
+        );
     }
     Ok(took)
 }
@@ -81,7 +85,7 @@ fn render(
     took: &mut Took,
     sink: &mut Sink,
 ) -> Result<(), RenderError> {
-    let mut progress = Progress::new(plan.progress, plan.frame.label());
+    let mut progress = Progress::new(plan.progress, plan.frame.label(), plan.frame.number);
     let (scene, samples) = (&plan.scene, plan.scene.pixel_samples);
     let (cut, most) = (Cut::of(scene.form()), renderer.largest_film());
     let order = match plan.deadline {

@@ -1,10 +1,12 @@
 //! `[camera.path]`: how the camera moves from frame to frame.
 
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::scene::schema::kinds::{Aperture, Fov, FrameNumber, Length, Point, Vector};
 /// The way of a camera through its keys. Before the first and after the last one it stands.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraPathDescription {
     /// How it goes from key to key.
@@ -25,7 +27,7 @@ impl CameraPathDescription {
 }
 
 /// How values go from key to key.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Interpolation {
@@ -38,31 +40,39 @@ pub enum Interpolation {
 
 /// What the camera is like at one frame. Each value goes its own way through the keys that have it; what no key has is the
 /// camera's own.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraKeyDescription {
     /// Which frame; it may be a fraction.
+    #[schemars(with = "FrameNumber")]
     pub frame: f64,
     /// The camera's position.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Point>")]
     pub position: Option<DVec3>,
     /// The point in the middle of the picture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Point>")]
     pub look_at: Option<DVec3>,
     /// Which way is up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Vector>")]
     pub up: Option<DVec3>,
     /// Vertical field of view in degrees, of perspective cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Fov>")]
     pub fov: Option<f64>,
     /// Height of the seen rectangle in scene units, of orthographic cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Length>")]
     pub height: Option<f64>,
     /// Diameter of the lens in scene units, of perspective cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Aperture>")]
     pub aperture: Option<f64>,
     /// Distance of the plane that is sharp, of perspective cameras.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Length>")]
     pub focus_distance: Option<f64>,
 }
 

@@ -1,16 +1,19 @@
 //! What a scene file says of what surrounds the scene.
 
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Rotation, one};
+use crate::scene::schema::kinds::{Degrees, Elevation, EnvironmentScale, Rgb, Turbidity};
 
 /// What surrounds the scene, for `integrator = "path"`: one of `color`, `file` and `name`.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EnvironmentDescription {
     /// Radiance from everywhere; linear RGB.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Rgb>")]
     pub color: Option<DVec3>,
     /// An equirectangular image, relative to the scene file's folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -20,6 +23,7 @@ pub struct EnvironmentDescription {
     pub name: Option<EnvironmentName>,
     /// Factor of the radiance.
     #[serde(default = "one")]
+    #[schemars(with = "EnvironmentScale")]
     pub scale: f64,
     /// How it is turned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -29,15 +33,19 @@ pub struct EnvironmentDescription {
     pub visible: bool,
     /// The radiance that the camera sees in its place; linear RGB.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Rgb>")]
     pub background: Option<DVec3>,
     /// How high the sun of `"sky"` stands, in degrees.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Elevation>")]
     pub sun_elevation: Option<f64>,
     /// Where the sun of `"sky"` stands: degrees from +x towards +y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Degrees>")]
     pub sun_azimuth: Option<f64>,
     /// How hazy `"sky"` is: light that air and haze take from a ray, relative to clean air.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Turbidity>")]
     pub turbidity: Option<f64>,
 }
 
@@ -83,7 +91,7 @@ impl EnvironmentDescription {
 }
 
 /// Surroundings that the program makes by a formula. In a file the names are in snake case: `"studio"`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EnvironmentName {
     /// A grey room with lamps, as of a photographer.
@@ -106,14 +114,14 @@ impl EnvironmentName {
 }
 
 /// How surroundings are turned, counter-clockwise as seen against an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(
     untagged,
     expecting = "must be a number of degrees, a list of 3 angles in degrees or a table such as { axis = [0, 0, 1], degrees = 90 }"
 )]
 pub enum EnvironmentRotation {
     /// About the z axis, in degrees.
-    Degrees(f64),
+    Degrees(#[schemars(with = "Degrees")] f64),
     /// In any way that a mesh may be turned.
     Any(Rotation),
 }

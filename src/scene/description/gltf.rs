@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Rotation, Scale};
+use crate::scene::schema::kinds::{Matrix, Place, Point, Seconds};
 
 /// A glTF file: its meshes with their materials and textures, and its lights.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GltfDescription {
     /// The file, relative to the scene file's folder.
@@ -19,6 +21,7 @@ pub struct GltfDescription {
     pub scene: Option<Selection>,
     /// At which second of an animation it is; absent, as it is without animations.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Seconds>")]
     pub time: Option<f64>,
     /// Which of its animations; absent, the first, where a time is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -34,6 +37,7 @@ pub struct GltfDescription {
     pub materials: BTreeMap<String, String>,
     /// Added to its coordinates, after all else.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Point>")]
     pub translate: Option<DVec3>,
     /// How it is turned, after it was scaled.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -43,6 +47,7 @@ pub struct GltfDescription {
     pub scale: Option<Scale>,
     /// The rows of an affine map, in place of the three.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,
 }
 
@@ -66,11 +71,11 @@ impl GltfDescription {
 }
 
 /// One of several things, by its number, from 0, or its name.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged, expecting = "must be a name or a number, from 0")]
 pub enum Selection {
     /// Its place in the list.
-    Number(u32),
+    Number(#[schemars(with = "Place")] u32),
     /// Its name.
     Name(String),
 }

@@ -1,10 +1,12 @@
 //! What a scene file says of lights.
 
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::tagged::{ReadError, Tagged, tagged};
+use crate::scene::schema::kinds::{ConeAngle, InnerAngle, Point, Rgb, Size, Vector};
 
 tagged! {
     /// `[[lights]]`
@@ -21,18 +23,23 @@ tagged! {
 }
 
 /// A rectangle that shines to both sides.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RectangleLightDescription {
     /// The middle.
+    #[schemars(with = "Point")]
     pub center: DVec3,
     /// Lengths along the tangent and along the bitangent.
+    #[schemars(with = "Size")]
     pub size: [f64; 2],
     /// Perpendicular to the rectangle; any length.
+    #[schemars(with = "Vector")]
     pub normal: DVec3,
     /// Along the first edge; any length.
+    #[schemars(with = "Vector")]
     pub tangent: DVec3,
     /// Linear RGB.
+    #[schemars(with = "Rgb")]
     pub color: DVec3,
     /// Whether the camera sees it.
     #[serde(default = "yes")]
@@ -64,12 +71,14 @@ impl RectangleLightDescription {
 }
 
 /// Light from one point, without falloff.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointLightDescription {
     /// Where it is.
+    #[schemars(with = "Point")]
     pub position: DVec3,
     /// Linear RGB.
+    #[schemars(with = "Rgb")]
     pub color: DVec3,
 }
 
@@ -84,12 +93,14 @@ impl PointLightDescription {
 }
 
 /// Light from infinitely far away.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DirectionalLightDescription {
     /// In which the light travels; any length.
+    #[schemars(with = "Vector")]
     pub direction: DVec3,
     /// Linear RGB.
+    #[schemars(with = "Rgb")]
     pub color: DVec3,
 }
 
@@ -104,23 +115,29 @@ impl DirectionalLightDescription {
 }
 
 /// A cone of light from one point, without falloff with the distance. It has a direction or looks at a point.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SpotLightDescription {
     /// Where it is.
+    #[schemars(with = "Point")]
     pub position: DVec3,
     /// In which the middle of its light travels; any length.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Vector>")]
     pub direction: Option<DVec3>,
     /// The point that the middle of its light goes to.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Point>")]
     pub look_at: Option<DVec3>,
     /// Linear RGB in the middle.
+    #[schemars(with = "Rgb")]
     pub color: DVec3,
     /// From the middle to where its light ends, in degrees.
+    #[schemars(with = "ConeAngle")]
     pub cone_angle: f64,
     /// From the middle to where its light begins to fall off, in degrees.
     #[serde(default)]
+    #[schemars(with = "InnerAngle")]
     pub inner_angle: f64,
 }
 

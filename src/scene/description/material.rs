@@ -1,11 +1,13 @@
 //! What a scene file says of materials.
 
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::tagged::{ReadError, Tagged, tagged};
 use super::{ColorDescription, NormalMapDescription, PrincipledDescription, ValueDescription};
+use crate::scene::schema::kinds::{Absorption, Degrees, Etas, Ior, Ks, Metal, Share, ShareColor, Shininess};
 
 tagged! {
     /// `[materials.NAME]`
@@ -51,7 +53,7 @@ impl MaterialDescription {
 }
 
 /// Phong's reflection model. A factor that is absent is `color`.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PhongDescription {
     /// Short for the three factors.
@@ -64,6 +66,7 @@ pub struct PhongDescription {
     pub specular: Option<ColorDescription>,
     /// Exponent of the specular term.
     #[serde(default = "sixteen")]
+    #[schemars(with = "Shininess")]
     pub shininess: f64,
     /// What bends its normals.
     pub normal_map: Option<NormalMapDescription>,
@@ -90,11 +93,12 @@ impl PhongDescription {
 }
 
 /// A mirror.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MirrorDescription {
     /// Factor of the reflected light.
     #[serde(default)]
+    #[schemars(with = "ShareColor")]
     pub tint: ColorDescription,
     /// What bends its normals.
     pub normal_map: Option<NormalMapDescription>,
@@ -105,13 +109,15 @@ pub struct MirrorDescription {
 }
 
 /// Clear glass.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GlassDescription {
     /// Index of refraction.
+    #[schemars(with = "Ior")]
     pub ior: f64,
     /// Factor of the light that passes the surface.
     #[serde(default)]
+    #[schemars(with = "ShareColor")]
     pub tint: ColorDescription,
     /// What bends its normals.
     pub normal_map: Option<NormalMapDescription>,
@@ -135,10 +141,11 @@ impl GlassDescription {
 }
 
 /// A matt surface.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DiffuseDescription {
     /// The share of the light that it reflects.
+    #[schemars(with = "ShareColor")]
     pub color: ColorDescription,
     /// How rough it is, 0 to 1.
     #[serde(default)]
@@ -168,7 +175,7 @@ impl DiffuseDescription {
 macro_rules! faceted {
     ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $ty:ty,)* }) => {
         $(#[$doc])*
-        #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+        #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub struct $name {
             $($(#[$field_doc])* pub $field: $ty,)*
@@ -177,9 +184,11 @@ macro_rules! faceted {
             pub roughness: ValueDescription,
             /// How much rougher it is along its first axis, 0 to 1.
             #[serde(default)]
+            #[schemars(with = "Share")]
             pub anisotropy: f64,
             /// How far that axis is turned from the direction of the texture's u towards that of its v, in degrees.
             #[serde(default)]
+            #[schemars(with = "Degrees")]
             pub anisotropy_rotation: f64,
             /// Whether light that bounces between facets is given back.
             #[serde(default = "yes")]
@@ -198,12 +207,16 @@ faceted! {
     /// Metal, polished or rough. One of `color`, `metal`, and `eta` with `k` says what it reflects.
     ConductorDescription {
         /// The share of the light that it reflects; all if nothing else is said.
+        #[schemars(with = "Option<ShareColor>")]
         color: Option<ColorDescription>,
         /// The name of a metal.
+        #[schemars(with = "Option<Metal>")]
         metal: Option<String>,
         /// The real part of its index of refraction.
+        #[schemars(with = "Option<Etas>")]
         eta: Option<DVec3>,
         /// The imaginary part.
+        #[schemars(with = "Option<Ks>")]
         k: Option<DVec3>,
     }
 }
@@ -241,12 +254,15 @@ faceted! {
     /// Clear glass or liquid, or a sheet of it, polished or rough.
     DielectricDescription {
         /// Index of refraction.
+        #[schemars(with = "Ior")]
         ior: f64,
         /// Factor of the light that passes the surface.
         #[serde(default)]
+        #[schemars(with = "ShareColor")]
         color: ColorDescription,
         /// How much light it swallows, for each unit of length.
         #[serde(default)]
+        #[schemars(with = "Absorption")]
         absorption: DVec3,
         /// Whether it is a thin sheet, behind which all is as before it.
         #[serde(default)]

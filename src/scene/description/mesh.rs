@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::Normals;
+use crate::scene::schema::kinds::{Angles, Degrees, Factor, Factor3, Matrix, Point, Vector};
 
 /// A mesh file, and how it is read.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshFileDescription {
     /// The file, relative to the scene file's folder.
@@ -33,7 +35,7 @@ impl MeshFileDescription {
 }
 
 /// A mesh.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshDescription {
     /// The file, relative to the scene file's folder.
@@ -52,6 +54,7 @@ pub struct MeshDescription {
     pub materials: BTreeMap<String, String>,
     /// Added to its coordinates, after all else.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Point>")]
     pub translate: Option<DVec3>,
     /// How it is turned, after it was scaled.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -61,6 +64,7 @@ pub struct MeshDescription {
     pub scale: Option<Scale>,
     /// The rows of an affine map, in place of the three.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,
 }
 
@@ -82,7 +86,7 @@ impl MeshDescription {
 }
 
 /// A mesh of `[meshes.NAME]`, at a place of its own.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstanceDescription {
     /// The mesh's name.
@@ -95,6 +99,7 @@ pub struct InstanceDescription {
     pub materials: BTreeMap<String, String>,
     /// Added to its coordinates, after all else.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Point>")]
     pub translate: Option<DVec3>,
     /// How it is turned, after it was scaled.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -104,6 +109,7 @@ pub struct InstanceDescription {
     pub scale: Option<Scale>,
     /// The rows of an affine map, in place of the three.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,
 }
 
@@ -123,7 +129,7 @@ impl InstanceDescription {
 }
 
 /// Which axis of a file becomes the scene's z axis; the others follow in their order.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Up {
     /// (x, y, z) becomes (y, z, x).
@@ -136,34 +142,36 @@ pub enum Up {
 }
 
 /// A rotation, counter-clockwise as seen against its axis, in degrees.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(
     untagged,
     expecting = "must be a list of 3 angles in degrees or a table such as { axis = [0, 0, 1], degrees = 90 }"
 )]
 pub enum Rotation {
     /// About the x axis, then about the y axis, then about the z axis.
-    Angles(DVec3),
+    Angles(#[schemars(with = "Angles")] DVec3),
     /// About one axis.
     About(RotationAbout),
 }
 
 /// A rotation about an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RotationAbout {
     /// The axis; any length.
+    #[schemars(with = "Vector")]
     pub axis: DVec3,
     /// The angle.
+    #[schemars(with = "Degrees")]
     pub degrees: f64,
 }
 
 /// Factors of coordinates, not 0.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged, expecting = "must be a number or a list of 3 numbers")]
 pub enum Scale {
     /// The same for all.
-    All(f64),
+    All(#[schemars(with = "Factor")] f64),
     /// One for each axis.
-    Each(DVec3),
+    Each(#[schemars(with = "Factor3")] DVec3),
 }

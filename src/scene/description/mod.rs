@@ -20,9 +20,11 @@ mod texture;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Assets, ViewTransform};
+use crate::scene::schema::kinds::{Pixels, Stops};
 
 pub use self::camera::*;
 pub use self::camera_path::*;
@@ -37,29 +39,37 @@ pub use self::shape::*;
 pub use self::texture::*;
 
 /// A whole scene file.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
 pub struct Description {
-    /// `[image]`
+    /// `[image]`: the picture, its size and how it is shown.
     pub image: ImageDescription,
-    /// `[camera]`
+    /// `[camera]`: where the picture is seen from.
     pub camera: CameraDescription,
-    /// `[render]`
+    /// `[render]`: how it is rendered.
+    #[schemars(default)]
     pub render: RenderDescription,
-    /// `[environment]`
+    /// `[environment]`: what surrounds the scene, for `integrator = "path"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub environment: Option<EnvironmentDescription>,
-    /// `[textures.NAME]`
+    /// `[textures.NAME]`: colours for each point of a surface, which materials name.
+    #[schemars(default)]
     pub textures: BTreeMap<String, TextureDescription>,
-    /// `[materials.NAME]`
+    /// `[materials.NAME]`: what surfaces look like.
+    #[schemars(default)]
     pub materials: BTreeMap<String, MaterialDescription>,
-    /// `[[lights]]`
+    /// `[[lights]]`: what shines, besides surfaces and surroundings.
+    #[schemars(default)]
     pub lights: Vec<LightDescription>,
-    /// `[[shapes]]`
+    /// `[[shapes]]`: what is seen.
+    #[schemars(default)]
     pub shapes: Vec<ShapeDescription>,
-    /// `[meshes.NAME]`
+    /// `[meshes.NAME]`: meshes that instances name.
+    #[schemars(default)]
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub meshes: BTreeMap<String, MeshFileDescription>,
-    /// `[[instances]]`
+    /// `[[instances]]`: meshes, at places of their own.
+    #[schemars(default)]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub instances: Vec<InstanceDescription>,
 }
@@ -157,18 +167,21 @@ impl Description {
 }
 
 /// The picture: its size, and how it is shown.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageDescription {
-    /// In pixels.
+    /// Its width in pixels.
+    #[schemars(with = "Pixels")]
     pub width: u32,
-    /// In pixels.
+    /// Its height in pixels.
+    #[schemars(with = "Pixels")]
     pub height: u32,
     /// From linear light to what a display is sent.
     #[serde(default)]
     pub view_transform: ViewTransform,
     /// In stops: light is multiplied by 2 to this power before it is shown.
     #[serde(default)]
+    #[schemars(with = "Stops")]
     pub exposure: f64,
 }
 

@@ -1,15 +1,20 @@
 //! What a scene file says of the material `principled`.
 
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{ColorDescription, NormalMapDescription, TextureReference, ValueDescription};
+use crate::scene::schema::kinds::{
+    AttenuationDistance, Degrees, PrincipledIor, Share, ShareColor, ShareRgb, Thickness,
+};
 
 /// glTF's metallic-roughness material with its extensions, for `integrator = "path"`; glTF's defaults.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PrincipledDescription {
     /// The share of light that a dielectric's ground spreads, or a metal reflects head-on.
+    #[schemars(with = "ShareColor")]
     pub base_color: ColorDescription,
     /// How much of it is metal, 0 to 1.
     pub metallic: ValueDescription,
@@ -18,10 +23,12 @@ pub struct PrincipledDescription {
     /// How much rougher it is along the tangent, 0 to 1.
     pub anisotropy: ValueDescription,
     /// The tangent's angle, counter-clockwise in degrees.
+    #[schemars(with = "Degrees")]
     pub anisotropy_rotation: f64,
     /// An image whose red and green, as numbers from -1 to 1, are the direction along u and v that is turned so.
     pub anisotropy_direction: Option<TextureReference>,
     /// Index of refraction of the dielectric.
+    #[schemars(with = "PrincipledIor")]
     pub ior: f64,
     /// Factor of what the dielectric reflects, 0 to 1.
     pub specular: ValueDescription,
@@ -30,10 +37,13 @@ pub struct PrincipledDescription {
     /// How much of the dielectric's light passes the surface, 0 to 1.
     pub transmission: ValueDescription,
     /// 0 where the surface is a thin sheet; else what is behind it is a volume.
+    #[schemars(with = "Thickness")]
     pub thickness: f64,
     /// What is left of light after `attenuation_distance` in the volume.
+    #[schemars(with = "ShareRgb")]
     pub attenuation_color: DVec3,
     /// That distance; infinite if absent.
+    #[schemars(with = "Option<AttenuationDistance>")]
     pub attenuation_distance: Option<f64>,
     /// How much there is of a clear coat, 0 to 1.
     pub clearcoat: ValueDescription,
@@ -42,6 +52,7 @@ pub struct PrincipledDescription {
     /// What bends the coat's normals.
     pub clearcoat_normal_map: Option<NormalMapDescription>,
     /// The colour of the sheen of cloth.
+    #[schemars(with = "ShareColor")]
     pub sheen_color: ColorDescription,
     /// How rough the sheen is, 0 to 1.
     pub sheen_roughness: ValueDescription,
@@ -49,7 +60,8 @@ pub struct PrincipledDescription {
     pub alpha: ValueDescription,
     /// What `alpha` does.
     pub alpha_mode: AlphaMode,
-    /// The least alpha of what is there, under [`AlphaMode::Mask`].
+    /// The least alpha of what is there, under `"mask"`.
+    #[schemars(with = "Share")]
     pub alpha_cutoff: f64,
     /// What the colours of a mesh's vertices are factors of.
     pub vertex_colors: VertexColors,
@@ -97,7 +109,7 @@ impl Default for PrincipledDescription {
 }
 
 /// What a material's alpha does. In a file the names are in snake case: `"mask"`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AlphaMode {
     /// Nothing: all of the surface is there.
@@ -110,7 +122,7 @@ pub enum AlphaMode {
 }
 
 /// What the colours of a mesh's vertices do. In a file the names are in snake case: `"base_color"`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum VertexColors {
     /// Nothing.

@@ -1,31 +1,39 @@
 //! What a scene file says of how it is rendered.
 
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::scene::schema::kinds::{Clamp, Count, Depth, FilterRadius, MostSamples, Rgb, Seed, ShadowEpsilon, Share};
 use crate::scene::{Integrator, Shadows};
 
 /// The settings of a render.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RenderDescription {
     /// What light is simulated.
     pub integrator: Integrator,
     /// The ambient light.
+    #[schemars(with = "Rgb")]
     pub ambient: DVec3,
     /// Radiance of rays that leave the scene.
+    #[schemars(with = "Rgb")]
     pub background: DVec3,
     /// How far above a surface rays start at least, relative to the largest coordinate there.
+    #[schemars(with = "ShadowEpsilon")]
     pub shadow_epsilon: f64,
     /// Whether glass casts shadows.
     pub shadows: Shadows,
     /// Most bounces of a path; under `"phong"` by mirrors and glass.
+    #[schemars(with = "Depth")]
     pub max_depth: u32,
     /// From which bounce on a path may end at random, for `integrator = "path"`; absent, 5.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Depth>")]
     pub rr_depth: Option<u32>,
     /// Most of what a sample of indirect light may add, for `integrator = "path"`; absent, all of it.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Clamp>")]
     pub clamp: Option<f64>,
     /// Whether the background is transparent, for `integrator = "path"`; absent, it is not.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -33,6 +41,7 @@ pub struct RenderDescription {
     /// Whether textures are filtered over the footprint of each ray.
     pub ray_differentials: bool,
     /// Seed of all random patterns.
+    #[schemars(with = "Seed")]
     pub seed: u32,
     /// Samples of every pixel.
     pub pixel_samples: SamplesDescription,
@@ -75,16 +84,17 @@ impl Default for RenderDescription {
 }
 
 /// A pattern of samples.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(
     deny_unknown_fields,
     expecting = "a table, such as { pattern = \"grid\", count = 16 }"
 )]
 pub struct SamplesDescription {
-    /// How they are laid out; absent, as [`SamplesDescription::pattern()`] says.
+    /// How they are laid out; absent, `"grid"`, or `"sobol"` under `integrator = "path"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pattern: Option<Pattern>,
     /// How many.
+    #[schemars(with = "Count")]
     pub count: u32,
 }
 
@@ -104,7 +114,7 @@ impl SamplesDescription {
 }
 
 /// How samples are laid out on the unit square. In a file the names are in snake case: `"grid"`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Pattern {
@@ -158,18 +168,20 @@ impl Pattern {
 }
 
 /// Adaptive sampling.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table, such as { error = 0.01 }")]
 pub struct AdaptiveDescription {
     /// The standard error of a pixel's displayed value that is aimed at.
+    #[schemars(with = "Share")]
     pub error: f64,
     /// The most samples of a pixel; absent, 16 times their count.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<MostSamples>")]
     pub max_samples: Option<u32>,
 }
 
 /// A reconstruction filter.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table, such as { type = \"gaussian\" }")]
 pub struct PixelFilterDescription {
     /// Its form.
@@ -177,12 +189,13 @@ pub struct PixelFilterDescription {
     pub kind: PixelFilterKind,
     /// How far it reaches, in pixels; absent, what is usual for its form.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<FilterRadius>")]
     pub radius: Option<f64>,
 }
 
 /// The form of a reconstruction filter, a product of the same function of x and of y. In a file the names are in snake
 /// case: `"blackman_harris"`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum PixelFilterKind {

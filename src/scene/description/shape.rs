@@ -1,12 +1,14 @@
 //! What a scene file says of shapes.
 
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::gltf::GltfDescription;
 use super::mesh::MeshDescription;
 use super::tagged::{ReadError, Tagged, tagged};
+use crate::scene::schema::kinds::{Length, Point, Points3, Points4, Size, Vector};
 
 tagged! {
     /// `[[shapes]]`
@@ -33,18 +35,22 @@ tagged! {
 }
 
 /// A rectangle.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RectangleDescription {
     /// Name of its material.
     pub material: String,
     /// The middle.
+    #[schemars(with = "Point")]
     pub center: DVec3,
     /// Lengths along the tangent and along the bitangent.
+    #[schemars(with = "Size")]
     pub size: [f64; 2],
     /// Perpendicular to the rectangle; any length.
+    #[schemars(with = "Vector")]
     pub normal: DVec3,
     /// Along the first edge; any length.
+    #[schemars(with = "Vector")]
     pub tangent: DVec3,
 }
 
@@ -68,19 +74,23 @@ impl RectangleDescription {
 }
 
 /// A disk.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DiskDescription {
     /// Name of its material.
     pub material: String,
     /// The middle.
+    #[schemars(with = "Point")]
     pub center: DVec3,
     /// Its radius.
+    #[schemars(with = "Length")]
     pub radius: f64,
     /// Perpendicular to the disk; any length.
+    #[schemars(with = "Vector")]
     pub normal: DVec3,
     /// Direction of the texture coordinate u; any length. If absent, x, or y where the normal is nearly along x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Vector>")]
     pub tangent: Option<DVec3>,
 }
 
@@ -98,18 +108,22 @@ impl DiskDescription {
 }
 
 /// An ellipsoid: the image of the unit sphere under the linear map with the columns a, b, c.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EllipsoidDescription {
     /// Name of its material.
     pub material: String,
     /// The middle.
+    #[schemars(with = "Point")]
     pub center: DVec3,
     /// First half axis.
+    #[schemars(with = "Vector")]
     pub a: DVec3,
     /// Second half axis.
+    #[schemars(with = "Vector")]
     pub b: DVec3,
     /// Third half axis, the pole of the texture coordinates.
+    #[schemars(with = "Vector")]
     pub c: DVec3,
 }
 
@@ -133,14 +147,16 @@ impl EllipsoidDescription {
 }
 
 /// A sphere.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SphereDescription {
     /// Name of its material.
     pub material: String,
     /// The middle.
+    #[schemars(with = "Point")]
     pub center: DVec3,
     /// Its radius.
+    #[schemars(with = "Length")]
     pub radius: f64,
 }
 
@@ -156,12 +172,13 @@ impl SphereDescription {
 }
 
 /// A triangle.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TriangleDescription {
     /// Name of its material.
     pub material: String,
     /// Counter-clockwise as seen from outside.
+    #[schemars(with = "Points3")]
     pub vertices: [DVec3; 3],
 }
 
@@ -176,12 +193,13 @@ impl TriangleDescription {
 }
 
 /// A tetrahedron.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TetrahedronDescription {
     /// Name of its material.
     pub material: String,
     /// Its corners.
+    #[schemars(with = "Points4")]
     pub vertices: [DVec3; 4],
 }
 
@@ -196,16 +214,19 @@ impl TetrahedronDescription {
 }
 
 /// An infinite plane.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlaneDescription {
     /// Name of its material.
     pub material: String,
     /// A point of it, the origin of its texture coordinates.
+    #[schemars(with = "Point")]
     pub point: DVec3,
     /// Perpendicular to the plane; any length.
+    #[schemars(with = "Vector")]
     pub normal: DVec3,
     /// Direction of the texture coordinate u; any length.
+    #[schemars(with = "Vector")]
     pub tangent: DVec3,
 }
 

@@ -18,7 +18,7 @@ pub(in crate::scene) type ReadError = serde_path_to_error::Error<toml::de::Error
 /// which key of the table an error is.
 macro_rules! tagged {
     ($(#[$doc:meta])* $name:ident {
-        $($(#[$variant_doc:meta])* $tag:literal => $variant:ident($body:ident),)+
+        $($(#[doc = $variant_doc:literal])* $tag:literal => $variant:ident($body:ident),)+
     }) => {
         $(#[$doc])*
         #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -26,7 +26,7 @@ macro_rules! tagged {
         #[non_exhaustive]
         #[allow(clippy::large_enum_variant, reason = "a scene has few of them")]
         pub enum $name {
-            $($(#[$variant_doc])* #[serde(rename = $tag)] $variant($body),)+
+            $($(#[doc = $variant_doc])* #[serde(rename = $tag)] $variant($body),)+
         }
 
         $(
@@ -45,6 +45,18 @@ macro_rules! tagged {
                     $($tag => Some(serde_path_to_error::deserialize(body).map(Self::$variant)),)+
                     _ => None,
                 }
+            }
+        }
+
+        impl schemars::JsonSchema for $name {
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                stringify!($name).into()
+            }
+
+            fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+                crate::scene::schema::tagged(vec![
+                    $(($tag, concat!($($variant_doc),*), generator.subschema_for::<$body>()),)+
+                ])
             }
         }
     };

@@ -3,20 +3,24 @@
 use std::fmt;
 
 use glam::DVec3;
+use schemars::JsonSchema;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer, StrDeserializer};
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::tagged::{ReadError, Tagged, tagged};
+use crate::scene::schema::kinds::{
+    Anisotropy, Degrees, Factors, LineWidth, Rgb, Share, Strength, UvOffset, UvScale, UvSet,
+};
 use crate::scene::{Channel, Encoding, TextureFilter, Wrap};
 
 /// A colour of a material: `[r, g, b]` or `{ texture = "NAME" }`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum ColorDescription {
     /// Linear RGB.
-    Plain(DVec3),
+    Plain(#[schemars(with = "Rgb")] DVec3),
     /// From a texture.
     Texture(TextureReference),
 }
@@ -67,11 +71,11 @@ impl<'de> Deserialize<'de> for ColorDescription {
 }
 
 /// A number of a material: `0.5` or `{ texture = "NAME", channel = "g" }`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum ValueDescription {
     /// The same everywhere.
-    Plain(f64),
+    Plain(#[schemars(with = "Share")] f64),
     /// One of a texture's values.
     Texture(ChannelReference),
 }
@@ -138,7 +142,7 @@ impl<'de> Deserialize<'de> for ValueDescription {
 }
 
 /// `{ texture = "NAME" }`
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table, such as { texture = \"NAME\" }")]
 pub struct TextureReference {
     /// Name of the texture.
@@ -146,7 +150,7 @@ pub struct TextureReference {
 }
 
 /// `{ texture = "NAME", channel = "r" }`
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(
     deny_unknown_fields,
     expecting = "a table, such as { texture = \"NAME\", channel = \"g\" }"
@@ -160,13 +164,14 @@ pub struct ChannelReference {
 }
 
 /// `{ texture = "NAME", strength = 1 }`
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table, such as { texture = \"NAME\" }")]
 pub struct NormalMapDescription {
     /// Name of the texture.
     pub texture: String,
     /// Factor of the slopes.
     #[serde(default = "one")]
+    #[schemars(with = "Strength")]
     pub strength: f64,
 }
 
@@ -185,10 +190,11 @@ tagged! {
 }
 
 /// One colour.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConstantDescription {
     /// Linear RGB.
+    #[schemars(with = "Rgb")]
     pub color: DVec3,
 }
 
@@ -200,21 +206,26 @@ impl ConstantDescription {
 }
 
 /// Squares of two colours, of side 1.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CheckerDescription {
     /// Of the square from (0, 0) to (1, 1); linear RGB.
+    #[schemars(with = "Rgb")]
     pub even: DVec3,
     /// Of its neighbours.
+    #[schemars(with = "Rgb")]
     pub odd: DVec3,
     /// Factors of u and v.
     #[serde(default = "ones")]
+    #[schemars(with = "UvScale")]
     pub scale: [f64; 2],
     /// Counter-clockwise, in degrees.
     #[serde(default)]
+    #[schemars(with = "Degrees")]
     pub rotate: f64,
     /// Added to u and v.
     #[serde(default)]
+    #[schemars(with = "UvOffset")]
     pub offset: [f64; 2],
 }
 
@@ -232,23 +243,29 @@ impl CheckerDescription {
 }
 
 /// Lines around whole numbers.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LinesDescription {
     /// Between the lines; linear RGB.
+    #[schemars(with = "Rgb")]
     pub cell: DVec3,
     /// On the lines.
+    #[schemars(with = "Rgb")]
     pub line: DVec3,
     /// Of the lines; cells with their lines have width 1.
+    #[schemars(with = "LineWidth")]
     pub line_width: f64,
     /// Factors of u and v.
     #[serde(default = "ones")]
+    #[schemars(with = "UvScale")]
     pub scale: [f64; 2],
     /// Counter-clockwise, in degrees.
     #[serde(default)]
+    #[schemars(with = "Degrees")]
     pub rotate: f64,
     /// Added to u and v.
     #[serde(default)]
+    #[schemars(with = "UvOffset")]
     pub offset: [f64; 2],
 }
 
@@ -267,7 +284,7 @@ impl LinesDescription {
 }
 
 /// An image file, or an image of [`Assets::images`](crate::scene::Assets::images).
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageTextureDescription {
     /// Its path, relative to the scene file.
@@ -282,21 +299,27 @@ pub struct ImageTextureDescription {
     pub filter: TextureFilter,
     /// The largest ratio of a footprint's axes.
     #[serde(default = "sixteen")]
+    #[schemars(with = "Anisotropy")]
     pub max_anisotropy: f64,
     /// Factors of u and v.
     #[serde(default = "ones")]
+    #[schemars(with = "UvScale")]
     pub scale: [f64; 2],
     /// Counter-clockwise, in degrees.
     #[serde(default)]
+    #[schemars(with = "Degrees")]
     pub rotate: f64,
     /// Added to u and v.
     #[serde(default)]
+    #[schemars(with = "UvOffset")]
     pub offset: [f64; 2],
     /// Factors of red, green, blue and alpha.
     #[serde(default = "four_ones")]
+    #[schemars(with = "Factors")]
     pub factor: [f64; 4],
     /// Which set of a mesh's texture coordinates it lies by.
     #[serde(default)]
+    #[schemars(with = "UvSet")]
     pub uv_set: u32,
 }
 
@@ -319,7 +342,7 @@ impl ImageTextureDescription {
 }
 
 /// An image beyond its edges: `"repeat"`, or `["repeat", "clamp"]` along u and along v.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum WrapDescription {
     /// In both directions.

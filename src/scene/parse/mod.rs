@@ -25,7 +25,8 @@ use super::description::{
     MaterialDescription, MeshFileDescription, ShapeDescription, TextureDescription,
 };
 use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
-use super::validate::{BLADES, DEEPEST, MOST, UV_SETS, depths};
+use super::limits::{BLADES, DEEPEST, MOST, UV_SETS};
+use super::validate::depths;
 
 pub(super) use syntax::{NOT_UTF8, syntax_error};
 

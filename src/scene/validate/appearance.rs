@@ -6,6 +6,10 @@ use glam::DVec3;
 
 use super::super::decode::Header;
 use super::super::image_file::{File, Part, Place};
+use super::super::limits::{
+    ABSORPTIONS, ANISOTROPIES, ETAS, FACTORS, IORS, KS, LINE_WIDTHS, OFFSETS, SCALES, SHARES, SHININESS, STRENGTHS,
+    TURNS, UV_SETS,
+};
 use super::super::texture::{levels, words, words_around};
 use super::super::{
     Assets, Channel, ChannelReference, ColorDescription, ConductorDescription, Encoding, Facets, Image,
@@ -18,20 +22,6 @@ use super::{At, BTreeMap, Checked, Color, Problem, between, check, color, list, 
 
 /// What all texels together may take, in bytes, as they are rendered from.
 pub(in crate::scene) const TEXEL_MEMORY: u64 = 1 << 30;
-/// The exponents of highlights.
-pub(super) const SHININESS: (f64, f64) = (1e-6, 1e6);
-/// Largest index of refraction.
-const DENSEST: f64 = 100.0;
-/// Largest ratio of a footprint's axes.
-const LONGEST_FOOTPRINT: f64 = 64.0;
-/// The most light that is swallowed for each unit of length.
-pub(super) const DARKEST: f64 = 1e6;
-/// The largest factor of, and addend to, a texture coordinate.
-const FARTHEST_COORDINATE: f64 = 1e6;
-/// The largest factor of an image's values.
-const LARGEST_FACTOR: f64 = 1e6;
-/// How many sets of texture coordinates a mesh may have.
-pub(in super::super) const UV_SETS: u32 = 8;
 
 pub(super) fn textures(
     descriptions: &BTreeMap<String, TextureDescription>,
@@ -156,8 +146,9 @@ pub(super) fn texture(description: &TextureDescription, images: &mut Images) -> 
         },
         TextureDescription::Lines(grid) => {
             let line_width = grid.line_width;
-            check(line_width > 0.0 && line_width < 1.0, || {
-                format!("{} must be greater than 0 and less than 1", number(line_width))
+            let (low, high) = LINE_WIDTHS;
+            check(line_width > low && line_width < high, || {
+                format!("{} must be greater than {low} and less than {high}", number(line_width))
             })
             .at("line_width")?;
             Texture {
@@ -176,10 +167,10 @@ pub(super) fn texture(description: &TextureDescription, images: &mut Images) -> 
 
 /// A texture of a part of an image.
 fn image_texture(texture: &ImageTextureDescription, part: Part, images: &mut Images) -> Checked<Texture> {
-    let max_anisotropy = between(texture.max_anisotropy, 1.0, LONGEST_FOOTPRINT).at("max_anisotropy")?;
+    let max_anisotropy = between(texture.max_anisotropy, ANISOTROPIES).at("max_anisotropy")?;
     let transform = transform(texture.scale, texture.rotate, texture.offset)?;
     for x in texture.factor {
-        between(x, 0.0, LARGEST_FACTOR).at("factor")?;
+        between(x, FACTORS).at("factor")?;
     }
     check(texture.uv_set < UV_SETS, || {
         format!("{} must be from 0 to {}", texture.uv_set, UV_SETS - 1)
@@ -204,22 +195,20 @@ fn image_texture(texture: &ImageTextureDescription, part: Part, images: &mut Ima
 
 /// (u, v) is first scaled, then turned, then moved.
 fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 2]> {
-    let valid = scale
-        .iter()
-        .all(|s| (1.0 / FARTHEST_COORDINATE..=FARTHEST_COORDINATE).contains(&s.abs()));
-    let limits = || (number(1.0 / FARTHEST_COORDINATE), number(FARTHEST_COORDINATE));
+    let valid = scale.iter().all(|s| (SCALES.0..=SCALES.1).contains(&s.abs()));
     check(valid, || {
-        let (low, high) = limits();
+        let (low, high) = (number(SCALES.0), number(SCALES.1));
         format!(
             "{} must be finite and not 0: from {low} to {high}, or negative",
             show_pair(scale)
         )
     })
     .at("scale")?;
-    let rotate = between(rotate, -360.0, 360.0).at("rotate")?;
-    check(offset.iter().all(|x| x.abs() <= FARTHEST_COORDINATE), || {
-        let high = limits().1;
-        format!("{} must be finite, from -{high} to {high}", show_pair(offset))
+    let rotate = between(rotate, TURNS).at("rotate")?;
+    let (low, high) = OFFSETS;
+    check(offset.iter().all(|x| (low..=high).contains(x)), || {
+        let (low, high) = (number(low), number(high));
+        format!("{} must be finite, from {low} to {high}", show_pair(offset))
     })
     .at("offset")?;
     let (sin, cos) = rotate.to_radians().sin_cos();
@@ -293,7 +282,7 @@ impl Textures<'_> {
     pub(super) fn tint(&self, description: &ColorDescription) -> Checked<Color> {
         if let ColorDescription::Plain(tint) = description {
             for x in tint.to_array() {
-                between(x, 0.0, 1.0)?;
+                between(x, SHARES)?;
             }
         }
         let color = self.color(description)?;
@@ -333,7 +322,7 @@ impl Textures<'_> {
             format!("{name:?} must have no factor to be a normal map; its strength is the map's own")
         })
         .at("texture")?;
-        let strength = between(*strength, -100.0, 100.0).at("strength")?;
+        let strength = between(*strength, STRENGTHS).at("strength")?;
         Ok(Some(NormalMap { texture, strength }))
     }
 
@@ -357,7 +346,7 @@ impl Textures<'_> {
 
     pub(super) fn value(&self, description: &ValueDescription) -> Checked<Value> {
         Ok(match description {
-            ValueDescription::Plain(plain) => Value::Plain(between(*plain, 0.0, 1.0)?),
+            ValueDescription::Plain(plain) => Value::Plain(between(*plain, SHARES)?),
             ValueDescription::Texture(reference) => {
                 let found = self.find(&reference.texture)?;
                 let texture = match (reference.channel, self.alphas.get(reference.texture.as_str())) {
@@ -399,7 +388,7 @@ impl Textures<'_> {
                     ambient: self.factor(phong, &phong.ambient, "ambient")?,
                     diffuse: self.factor(phong, &phong.diffuse, "diffuse")?,
                     specular: self.factor(phong, &phong.specular, "specular")?,
-                    shininess: between(phong.shininess, SHININESS.0, SHININESS.1).at("shininess")?,
+                    shininess: between(phong.shininess, SHININESS).at("shininess")?,
                 };
                 (reflection, &phong.normal_map, &phong.emission)
             }
@@ -480,8 +469,8 @@ impl Textures<'_> {
     ) -> Checked<Facets> {
         Ok(Facets {
             roughness: self.value(roughness).at("roughness")?,
-            anisotropy: between(anisotropy, 0.0, 1.0).at("anisotropy")?,
-            rotation: between(rotation, -360.0, 360.0).at("anisotropy_rotation")?,
+            anisotropy: between(anisotropy, SHARES).at("anisotropy")?,
+            rotation: between(rotation, TURNS).at("anisotropy_rotation")?,
             compensated,
         })
     }
@@ -518,13 +507,14 @@ fn is_visible(description: &MaterialDescription) -> bool {
 }
 
 fn ior(ior: f64) -> Checked<f64> {
-    between(ior, 1.0 / DENSEST, DENSEST)
+    between(ior, IORS)
 }
 
 fn absorption(absorption: DVec3) -> Checked<DVec3> {
     for x in absorption.to_array() {
-        check((0.0..=DARKEST).contains(&x), || {
-            format!("{} must be finite, from 0 to {}", number(x), number(DARKEST))
+        let (low, high) = ABSORPTIONS;
+        check((low..=high).contains(&x), || {
+            format!("{} must be finite, from {} to {}", number(x), number(low), number(high))
         })?;
     }
     Ok(absorption)
@@ -564,10 +554,10 @@ fn metal_index(conductor: &ConductorDescription) -> Checked<Option<MetalIndex>> 
     })
     .at("eta")?;
     for x in eta.to_array() {
-        between(x, 0.001, DENSEST).at("eta")?;
+        between(x, ETAS).at("eta")?;
     }
     for x in k.to_array() {
-        between(x, 0.0, DENSEST).at("k")?;
+        between(x, KS).at("k")?;
     }
     Ok(Some(MetalIndex { eta, k }))
 }

@@ -1,24 +1,13 @@
 //! The rules of a camera, and of its path.
 
-use super::{Checked, FLATTEST, LENGTHS, between, check, length, number, point, show, unit};
+use super::{Checked, FLATTEST, between, check, length, number, point, show, unit};
 use crate::scene::camera_path::CameraPath;
 use crate::scene::error::{At, Problem};
+use crate::scene::limits::{APERTURES, BLADES, F_NUMBERS, FOVS, FRAMES, LENGTHS, TURNS};
 use crate::scene::{Camera, CameraDescription, CameraKeyDescription, Lens, PerspectiveDescription, Projection};
 
-/// The first and the last frame that a key may be at.
-const FRAMES: (f64, f64) = (-1e9, 1e9);
 /// How far apart keys must be at least, in frames: slopes between them stay finite.
 const CLOSEST: f64 = 1e-6;
-/// Vertical fields of view, in degrees.
-const FOVS: (f64, f64) = (0.001, 179.999);
-/// Diameters of lenses.
-const APERTURES: (f64, f64) = (0.0, 1e9);
-/// Focal lengths over diameters.
-const F_NUMBERS: (f64, f64) = (0.1, 1e9);
-/// Corners of lenses that are not round.
-pub(in crate::scene) const BLADES: (u32, u32) = (3, 16);
-/// By how many degrees they are turned.
-const ROTATIONS: (f64, f64) = (-360.0, 360.0);
 
 impl CameraDescription {
     /// Checks a camera by itself, as it stands; its path is checked with the scene.
@@ -36,7 +25,7 @@ fn camera(description: &CameraDescription) -> Checked<Camera> {
     let (position, look_at, up, projection) = match description {
         CameraDescription::Perspective(camera) => {
             lens = lens_of(camera)?;
-            let fov = between(camera.fov, FOVS.0, FOVS.1).at("fov")?.to_radians();
+            let fov = between(camera.fov, FOVS).at("fov")?.to_radians();
             (
                 camera.position,
                 camera.look_at,
@@ -89,7 +78,7 @@ fn camera(description: &CameraDescription) -> Checked<Camera> {
 fn lens_of(camera: &PerspectiveDescription) -> Checked<Option<Lens>> {
     let focal_length = length(camera.focal_length).at("focal_length")?;
     if let Some(f_number) = camera.f_number {
-        between(f_number, F_NUMBERS.0, F_NUMBERS.1).at("f_number")?;
+        between(f_number, F_NUMBERS).at("f_number")?;
         check(camera.aperture.is_none(), || {
             "must not be here beside \"aperture\": each says how wide the lens is".to_owned()
         })
@@ -102,7 +91,7 @@ fn lens_of(camera: &PerspectiveDescription) -> Checked<Option<Lens>> {
         format!("{blades} must be 0 or a whole number from {} to {}", BLADES.0, BLADES.1)
     })
     .at("blades")?;
-    let rotation = between(camera.blade_rotation, ROTATIONS.0, ROTATIONS.1).at("blade_rotation")?;
+    let rotation = between(camera.blade_rotation, TURNS).at("blade_rotation")?;
     let diameter = aperture.or(camera.f_number.map(|n| focal_length / n)).unwrap_or(0.0);
     Ok((diameter > 0.0).then(|| Lens {
         radius: diameter / 2.0,
@@ -113,7 +102,7 @@ fn lens_of(camera: &PerspectiveDescription) -> Checked<Option<Lens>> {
 }
 
 fn aperture(diameter: f64) -> Checked<f64> {
-    between(diameter, APERTURES.0, APERTURES.1)
+    between(diameter, APERTURES)
 }
 
 /// Checks a camera and its path, if it has one: each key by itself, the camera as it stands, and the camera at all keys.
@@ -154,7 +143,7 @@ fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f6
         aperture: diameter,
         focus_distance,
     } = *key;
-    between(frame, FRAMES.0, FRAMES.1).at("frame")?;
+    between(frame, FRAMES).at("frame")?;
     if let Some(before) = before {
         check(frame - before >= CLOSEST, || {
             let (frame, before, least) = (number(frame), number(before), number(CLOSEST));
@@ -182,7 +171,7 @@ fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f6
     position.map(point).transpose().at("position")?;
     look_at.map(point).transpose().at("look_at")?;
     up.map(unit).transpose().at("up")?;
-    let fov = fov.map(|fov| between(fov, FOVS.0, FOVS.1)).transpose().at("fov")?;
+    let fov = fov.map(|fov| between(fov, FOVS)).transpose().at("fov")?;
     let height = height.map(length).transpose().at("height")?;
     let diameter = diameter.map(aperture).transpose().at("aperture")?;
     let focus_distance = focus_distance.map(length).transpose().at("focus_distance")?;

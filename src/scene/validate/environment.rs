@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
+use super::super::limits::{ELEVATIONS, ENVIRONMENT_SCALES, TURBIDITIES, TURNS};
 use super::super::sky::{Sky, sky};
 use super::super::studio::studio;
 use super::super::{EnvironmentDescription, EnvironmentImage, EnvironmentName, EnvironmentRotation, Image, Rotation};
@@ -12,12 +13,6 @@ use super::mesh::turn;
 use super::path::needs_path;
 use super::{At, Checked, Description, Environment, Integrator, Problem, between, check, color, show};
 
-/// The largest factor of radiance.
-const MOST_SCALE: f64 = 1e6;
-/// How high the sun may stand, in degrees.
-const ELEVATIONS: (f64, f64) = (0.0, 90.0);
-/// How hazy a sky may be.
-const TURBIDITIES: (f64, f64) = (1.0, 10.0);
 /// Where the sun stands, in degrees, and how hazy it is, if nothing is said.
 const ELEVATION: f64 = 40.0;
 const TURBIDITY: f64 = 2.0;
@@ -55,7 +50,7 @@ fn plain(color: DVec3) -> Environment {
 }
 
 fn described(description: &EnvironmentDescription, images: &mut Images) -> Checked<Environment> {
-    let scale = between(description.scale, 0.0, MOST_SCALE).at("scale")?;
+    let scale = between(description.scale, ENVIRONMENT_SCALES).at("scale")?;
     let to_world = match &description.rotate {
         None => DMat3::IDENTITY,
         Some(EnvironmentRotation::Degrees(degrees)) => {
@@ -98,14 +93,14 @@ fn described(description: &EnvironmentDescription, images: &mut Images) -> Check
 /// The sky that is described; its keys belong to nothing else.
 fn sky_of(description: &EnvironmentDescription) -> Checked<Sky> {
     let is_sky = description.name == Some(EnvironmentName::Sky);
-    let value = |key: &str, value: Option<f64>, default: f64, (low, high): (f64, f64)| {
+    let value = |key: &str, value: Option<f64>, default: f64, limits: (f64, f64)| {
         let Some(value) = value else { return Ok(default) };
         check(is_sky, || "needs name = \"sky\"".to_owned()).at(key)?;
-        between(value, low, high).at(key)
+        between(value, limits).at(key)
     };
     Ok(Sky {
         elevation: value("sun_elevation", description.sun_elevation, ELEVATION, ELEVATIONS)?.to_radians(),
-        azimuth: value("sun_azimuth", description.sun_azimuth, 0.0, (-360.0, 360.0))?.to_radians(),
+        azimuth: value("sun_azimuth", description.sun_azimuth, 0.0, TURNS)?.to_radians(),
         turbidity: value("turbidity", description.turbidity, TURBIDITY, TURBIDITIES)?,
     })
 }

@@ -2,17 +2,14 @@
 
 use glam::DVec3;
 
+use super::super::limits::{CONES, LENGTHS};
 use super::super::{Light, SpotLightDescription};
-use super::{At, Checked, LENGTHS, Problem, between, check, color, number, point, show, unit};
-
-/// The smallest and the largest angle between a cone's middle and its edge, in degrees.
-const CONES: (f64, f64) = (0.01, 180.0);
+use super::{At, Checked, Problem, between, check, color, number, point, show, unit};
 
 pub(super) fn spot(light: &SpotLightDescription) -> Checked<Light> {
     let position = point(light.position).at("position")?;
     let direction = direction(light, position)?;
-    let (low, high) = CONES;
-    let cone = between(light.cone_angle, low, high).at("cone_angle")?;
+    let cone = between(light.cone_angle, CONES).at("cone_angle")?;
     let inner = light.inner_angle;
     check((0.0..=cone).contains(&inner), || {
         let [inner, cone] = [inner, cone].map(number);

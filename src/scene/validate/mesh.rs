@@ -7,13 +7,14 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use super::super::error::cut;
 use super::super::image_file::Place;
+use super::super::limits::{FARTHEST, LENGTHS, SCALES, TURNS};
 use super::super::mesh_file;
 use super::super::{
     Assets, Geometry, InstanceDescription, Material, MeshDescription, MeshFileDescription, Reflection, Rotation, Scale,
     Shape, ShapeDescription, Up,
 };
 use super::mtl::Looks;
-use super::{At, Checked, FARTHEST, FLATTEST, LENGTHS, Problem, between, check, list, number, point, show, unit};
+use super::{At, Checked, FLATTEST, Problem, between, check, list, number, point, show, unit};
 use crate::mesh::{Group, Mesh, Normals};
 
 /// The most groups of all meshes' instances together.
@@ -322,7 +323,7 @@ pub(in crate::scene) fn placement(
 }
 
 fn factors(factors: DVec3) -> Checked<DVec3> {
-    let (low, high) = (1e-6, 1e6);
+    let (low, high) = SCALES;
     for x in factors.to_array() {
         check((low..=high).contains(&x.abs()), || {
             let (x, low, high) = (number(x), number(low), number(high));
@@ -333,7 +334,7 @@ fn factors(factors: DVec3) -> Checked<DVec3> {
 }
 
 pub(super) fn turn(rotation: &Rotation) -> Checked<DMat3> {
-    let angle = |degrees: f64| between(degrees, -360.0, 360.0);
+    let angle = |degrees: f64| between(degrees, TURNS);
     Ok(match rotation {
         Rotation::Angles(angles) => {
             let [x, y, z] = [angle(angles.x)?, angle(angles.y)?, angle(angles.z)?];
@@ -379,7 +380,7 @@ fn matrix(rows: &[[f64; 4]]) -> Checked<DAffine3> {
     let column = |i: usize| DVec3::new(rows[0][i], rows[1][i], rows[2][i]);
     let columns = [column(0), column(1), column(2)];
     for (i, c) in columns.iter().enumerate() {
-        let (low, high) = (1e-6, 1e6);
+        let (low, high) = SCALES;
         check((low..=high).contains(&c.length()), || {
             let (c, low, high) = (show(*c), number(low), number(high));
             format!("its column {i}, {c}, must have a length from {low} to {high}")

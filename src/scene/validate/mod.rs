@@ -21,6 +21,9 @@ use self::mesh::Known;
 use self::mtl::Looks;
 use super::error::{At, Problem, cut};
 use super::gltf::Expanded;
+use super::limits::{
+    CLAMPS, COLORS, DEEPEST, FARTHEST, FILTER_RADII, LEAST_ADAPTIVE, LENGTHS, MOST, SHADOW_EPSILONS, SHARES,
+};
 use super::parse::list;
 use super::{
     Adaptive, AdaptiveDescription, Assets, Color, Description, EllipsoidDescription, Environment, Geometry,
@@ -30,25 +33,11 @@ use super::{
 };
 
 pub(super) use self::appearance::TEXEL_MEMORY;
-pub(super) use self::appearance::UV_SETS;
-pub(super) use self::camera::BLADES;
 pub(super) use self::mesh::placement;
 pub(super) use self::path::LIGHT_SAMPLES;
 
-/// Largest absolute coordinate.
-const FARTHEST: f64 = 1e9;
-/// Smallest and largest length.
-const LENGTHS: (f64, f64) = (1e-9, 1e9);
-/// Most bounces of a path of light from surface to surface.
-pub(super) const DEEPEST: u32 = 1024;
 /// From which bounce on a path may end at random, if nothing is said.
 const RR_DEPTH: u32 = 5;
-/// What the light of a sample may be limited to.
-const CLAMPS: (f64, f64) = (1e-6, 1e6);
-/// Largest component of a colour.
-const BRIGHTEST: f64 = 1e6;
-/// Most pixels along a side of the picture, and most samples.
-pub(super) const MOST: u32 = 65_536;
 /// The sine of the smallest angle between directions that are not parallel; likewise the smallest height of a
 /// triangle or tetrahedron relative to its longest edge.
 const FLATTEST: f64 = 1e-6;
@@ -210,7 +199,7 @@ fn render(description: &RenderDescription) -> Checked<Render> {
         integrator,
         ambient: if is_path { DVec3::ZERO } else { ambient },
         background: color(description.background).at("background")?,
-        shadow_epsilon: between(description.shadow_epsilon, 0.0, 0.1).at("shadow_epsilon")?,
+        shadow_epsilon: between(description.shadow_epsilon, SHADOW_EPSILONS).at("shadow_epsilon")?,
         shadows: if is_path { Shadows::Opaque } else { description.shadows },
         max_depth: max_depth(description.max_depth, integrator).at("max_depth")?,
         rr_depth: of_path(integrator, description.rr_depth, rr_depth)
@@ -231,13 +220,13 @@ fn render(description: &RenderDescription) -> Checked<Render> {
 
 fn filter(description: &PixelFilterDescription) -> Checked<PixelFilter> {
     let PixelFilterDescription { kind, radius } = *description;
-    let radius = between(radius.unwrap_or(kind.radius()), 0.01, 16.0).at("radius")?;
+    let radius = between(radius.unwrap_or(kind.radius()), FILTER_RADII).at("radius")?;
     Ok(PixelFilter { kind, radius })
 }
 
 /// The error that adaptive sampling aims at.
 pub(super) fn adaptive_error(error: f64) -> Checked<f64> {
-    between(error, 0.0, 1.0)
+    between(error, SHARES)
 }
 
 /// Adaptive sampling, of pixels with these samples.
@@ -262,7 +251,7 @@ pub(super) fn adaptive(
     let error = adaptive_error(description.error).at("error")?;
     let most = description.max_samples;
     let most = most.unwrap_or(count.saturating_mul(16).min(MOST));
-    let least = count.max(2); // one sample tells nothing of an error
+    let least = count.max(LEAST_ADAPTIVE); // one sample tells nothing of an error
     check((least..=MOST).contains(&most), || {
         format!("{most} must be from {least} to {MOST}, and not below the count of pixel_samples")
     })
@@ -295,7 +284,7 @@ fn rr_depth(depth: u32) -> Checked<u32> {
 }
 
 fn clamp(most: f64) -> Checked<f64> {
-    between(most, CLAMPS.0, CLAMPS.1)
+    between(most, CLAMPS)
 }
 
 /// A value of a key that only paths have, if it is there.
@@ -488,9 +477,10 @@ pub(super) fn point(p: DVec3) -> Checked<DVec3> {
 
 pub(super) fn color(c: DVec3) -> Checked<DVec3> {
     for x in c.to_array() {
-        check((0.0..=BRIGHTEST).contains(&x), || {
-            let (x, limit) = (number(x), number(BRIGHTEST));
-            format!("{x} must be finite, from 0 to {limit}")
+        let (low, high) = COLORS;
+        check((low..=high).contains(&x), || {
+            let (x, low, high) = (number(x), number(low), number(high));
+            format!("{x} must be finite, from {low} to {high}")
         })?;
     }
     Ok(c)
@@ -515,7 +505,7 @@ fn length(x: f64) -> Checked<f64> {
     Ok(x)
 }
 
-fn between(x: f64, low: f64, high: f64) -> Checked<f64> {
+fn between(x: f64, (low, high): (f64, f64)) -> Checked<f64> {
     check((low..=high).contains(&x), || {
         format!("{} must be from {} to {}", number(x), number(low), number(high))
     })?;

@@ -8,9 +8,10 @@ use glam::DVec3;
 
 use super::super::error::{cut, cut_to};
 use super::super::image_file::Place;
+use super::super::limits::{BRIGHTEST, SHININESS};
 use super::super::{Color, ImageTextureDescription, Material, Reflection, Texture, TextureDescription};
-use super::appearance::{Images, SHININESS, texture};
-use super::{BRIGHTEST, number, show};
+use super::appearance::{Images, texture};
+use super::{number, show};
 use crate::mesh::{Mesh, MtlMaterial, file_beside};
 
 /// What a material is like of which its file does not say it: `Kd` by Ramey, Rose and Tyerman, "MTL material format", 1995;

@@ -2,19 +2,15 @@
 
 use glam::DVec3;
 
+use super::super::limits::{ABSORPTIONS, ATTENUATION_DISTANCES, PRINCIPLED_IORS, SHARES, THICKNESSES, TURNS};
 use super::super::{Principled, PrincipledDescription};
-use super::appearance::{DARKEST, Textures};
+use super::appearance::Textures;
 use super::{At, Checked, between, check};
-
-/// Indices of refraction, from that of empty space on.
-pub(super) const IORS: (f64, f64) = (1.0, 100.0);
-/// Distances after which light is attenuated.
-pub(super) const ATTENUATION_DISTANCES: (f64, f64) = (1e-6, 1e9);
 
 impl Textures<'_> {
     pub(super) fn principled(&self, d: &PrincipledDescription) -> Checked<Principled> {
         let thin = d.thickness == 0.0;
-        between(d.thickness, 0.0, ATTENUATION_DISTANCES.1).at("thickness")?;
+        between(d.thickness, THICKNESSES).at("thickness")?;
         let absorption = absorption(d.attenuation_color, d.attenuation_distance)?;
         check(!thin || absorption == DVec3::ZERO, || {
             "needs a thickness: what is thin has no inside in which light is lost".to_owned()
@@ -25,14 +21,14 @@ impl Textures<'_> {
             metallic: self.value(&d.metallic).at("metallic")?,
             roughness: self.value(&d.roughness).at("roughness")?,
             anisotropy: self.value(&d.anisotropy).at("anisotropy")?,
-            anisotropy_rotation: between(d.anisotropy_rotation, -360.0, 360.0)
+            anisotropy_rotation: between(d.anisotropy_rotation, TURNS)
                 .at("anisotropy_rotation")?
                 .to_radians(),
             anisotropy_direction: self
                 .direction(&d.anisotropy_direction)
                 .at("texture")
                 .at("anisotropy_direction")?,
-            ior: between(d.ior, IORS.0, IORS.1).at("ior")?,
+            ior: between(d.ior, PRINCIPLED_IORS).at("ior")?,
             specular: self.value(&d.specular).at("specular")?,
             specular_color: self.color(&d.specular_color).at("specular_color")?,
             transmission: self.value(&d.transmission).at("transmission")?,
@@ -45,7 +41,7 @@ impl Textures<'_> {
             sheen_roughness: self.value(&d.sheen_roughness).at("sheen_roughness")?,
             alpha: self.value(&d.alpha).at("alpha")?,
             alpha_mode: d.alpha_mode,
-            alpha_cutoff: between(d.alpha_cutoff, 0.0, 1.0).at("alpha_cutoff")?,
+            alpha_cutoff: between(d.alpha_cutoff, SHARES).at("alpha_cutoff")?,
             vertex_colors: d.vertex_colors,
             double_sided: d.double_sided,
         })
@@ -55,7 +51,7 @@ impl Textures<'_> {
 /// How much light is swallowed for each unit of length, where `color` is left of it after a distance.
 fn absorption(color: DVec3, distance: Option<f64>) -> Checked<DVec3> {
     for x in color.to_array() {
-        between(x, 0.0, 1.0).at("attenuation_color")?;
+        between(x, SHARES).at("attenuation_color")?;
     }
     let Some(distance) = distance else {
         check(color == DVec3::ONE, || {
@@ -64,6 +60,6 @@ fn absorption(color: DVec3, distance: Option<f64>) -> Checked<DVec3> {
         .at("attenuation_distance")?;
         return Ok(DVec3::ZERO);
     };
-    let distance = between(distance, ATTENUATION_DISTANCES.0, ATTENUATION_DISTANCES.1).at("attenuation_distance")?;
-    Ok(color.map(|x| (-x.ln() / distance).clamp(0.0, DARKEST)))
+    let distance = between(distance, ATTENUATION_DISTANCES).at("attenuation_distance")?;
+    Ok(color.map(|x| (-x.ln() / distance).clamp(ABSORPTIONS.0, ABSORPTIONS.1)))
 }

@@ -2,6 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use super::super::limits::{ABSORPTIONS, BRIGHTEST};
 use super::super::{Camera, Material, Projection, Reflection, SceneError};
 use super::*;
 
@@ -445,7 +446,7 @@ fn the_page_has_the_limits() {
         format!("above 0: {} to {} |", number(CLAMPS.0), number(CLAMPS.1)),
         format!(
             "| `absorption` | `[0, 0, 0]` | three numbers from 0 to {} |",
-            number(appearance::DARKEST)
+            number(ABSORPTIONS.1)
         ),
         format!("| `count` | required | 1 to {MOST} |"),
         format!("sine of their angle must be above {}", number(FLATTEST)),

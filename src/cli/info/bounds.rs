@@ -1,0 +1,42 @@
+//! How far the shapes of a scene reach.
+
+use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
+use wgray::scene::{Geometry, Scene};
+
+/// A box, from its lowest corner to its highest.
+pub type Bounds = (DVec3, DVec3);
+
+/// The box around all shapes but planes, which are infinite; none where there are no others.
+pub fn bounds(scene: &Scene) -> Option<Bounds> {
+    let all = scene.shapes.iter().filter_map(|shape| of(&shape.geometry));
+    all.reduce(join)
+}
+
+fn join((low, high): Bounds, (other_low, other_high): Bounds) -> Bounds {
+    (low.min(other_low), high.max(other_high))
+}
+
+fn around(center: DVec3, reach: DVec3) -> Option<Bounds> {
+    Some((center - reach, center + reach))
+}
+
+fn of(geometry: &Geometry) -> Option<Bounds> {
+    // A disk or an ellipsoid reaches along an axis as far as its half axes' parts there, squared and summed.
+    let round = |axes: &[DVec3]| axes.iter().map(|axis| axis * axis).sum::<DVec3>().map(f64::sqrt);
+    match geometry {
+        Geometry::Rectangle(shape) => around(shape.center, shape.u.abs() + shape.v.abs()),
+        Geometry::Disk(shape) => around(shape.center, round(&[shape.u, shape.v])),
+        Geometry::Ellipsoid { center, axes } => around(*center, round(axes)),
+        Geometry::Triangles(triangles) => {
+            let points = triangles.iter().flatten().map(|point| (*point, *point));
+            points.reduce(join)
+        }
+        Geometry::Mesh { mesh, to_world, .. } => {
+            let place = |to_world: &DAffine3, point: glam::Vec3| to_world.transform_point3(point.as_dvec3());
+            let points = mesh.positions.par_iter().map(|point| place(to_world, *point));
+            points.map(|point| (point, point)).reduce_with(join)
+        }
+        Geometry::Plane { .. } => None,
+    }
+}

@@ -1,0 +1,76 @@
+//! `wgray info`: what is in a scene, and what would render it. Nothing is rendered.
+
+mod bounds;
+mod gather;
+mod kernel;
+mod show;
+
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::ValueHint;
+use clap::builder::NonEmptyStringValueParser;
+use wgray::device::{Device, foresee};
+use wgray::pack::pack;
+use wgray::scene::{Define, Overrides};
+
+use super::render::parse_size;
+use super::scene_options::SceneOptions;
+use gather::Info;
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = super::EXIT_CODES)]
+pub struct Args {
+    /// Scene file: .toml, .gltf or .glb, .json
+    scene: PathBuf,
+
+    /// Prints one JSON object in place of the table
+    #[arg(long)]
+    json: bool,
+
+    /// Size of the picture in pixels, in place of the scene's
+    #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
+    size: Option<(u32, u32)>,
+
+    /// Samples of every pixel, in place of the scene's
+    #[arg(long, visible_alias = "spp", value_name = "N")]
+    pixel_samples: Option<u32>,
+
+    /// What would render, as of wgray render
+    #[arg(long, value_name = "auto|gpu|cpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
+    device: String,
+
+    /// Folder that files named by the scene must lie in, in place of the scene's own
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    asset_root: Option<PathBuf>,
+
+    /// Puts a value in place of the scene's: -D render.integrator=path
+    #[arg(short = 'D', long, value_name = "KEY=VALUE")]
+    define: Vec<Define>,
+
+    #[command(flatten)]
+    options: SceneOptions,
+}
+
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let overrides = args.options.over(Overrides {
+        size: args.size,
+        pixel_samples: args.pixel_samples,
+        asset_root: args.asset_root.clone(),
+        define: args.define.clone(),
+        ..Overrides::default()
+    });
+    let scene = super::load(&args.scene, &overrides)?;
+    let packed = pack(&scene);
+    let foreseen = foresee(&packed, &Device::from(args.device.as_str()))?;
+    let info = Info::of(&args.scene, &scene, &packed, &foreseen);
+    let text = match args.json {
+        true => format!("{}\n", serde_json::to_string_pretty(&info)?),
+        false => show::table(&info),
+    };
+    Ok(super::ended(
+        io::stdout().lock().write_all(text.as_bytes()),
+        ExitCode::SUCCESS,
+    ))
+}

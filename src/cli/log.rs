@@ -1,0 +1,245 @@
+//! Messages on standard error: lines of text, or of JSON, each of which is an object.
+
+use std::fmt;
+use std::io::{self, IsTerminal as _, Write as _};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::SystemTime;
+
+use clap::ValueEnum;
+use serde::Serialize;
+use serde_json::{Map, Value};
+use tracing::field::{Field, Visit};
+use tracing::span::{Attributes, Id};
+use tracing::{Event, Subscriber};
+use tracing_subscriber::layer::{Context, Layer};
+use tracing_subscriber::registry::LookupSpan;
+
+/// How messages are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// Lines for people
+    #[default]
+    Text,
+    /// One JSON object a line, with level, message and what else is known
+    Json,
+}
+
+/// What kind of message it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    Error,
+    Warning,
+    Note,
+    /// How far a render is.
+    Progress,
+    /// What `--verbose` tells, and the end of a render.
+    Info,
+    Debug,
+}
+
+impl Level {
+    /// What a line of text begins with.
+    fn prefix(self) -> &'static str {
+        match self {
+            Level::Error => "error: ",
+            Level::Warning => "warning: ",
+            Level::Note => "note: ",
+            Level::Progress | Level::Info | Level::Debug => "",
+        }
+    }
+}
+
+/// What is told beside the message, in JSON alone.
+pub type Facts = Map<String, Value>;
+
+static JSON: AtomicBool = AtomicBool::new(false);
+
+/// Sets how messages are written from now on.
+pub fn choose(format: Format) {
+    JSON.store(format == Format::Json, Ordering::Relaxed);
+}
+
+/// Whether messages are JSON.
+pub fn is_json() -> bool {
+    JSON.load(Ordering::Relaxed)
+}
+
+/// The format that a command line asks for that cannot be read as a whole.
+pub fn asked(arguments: impl Iterator<Item = std::ffi::OsString>) -> Format {
+    let mut format = Format::default();
+    let mut arguments = arguments.take_while(|argument| argument != "--");
+    while let Some(argument) = arguments.next() {
+        let value = match argument.to_str() {
+            Some("--log-format") => arguments.next().and_then(|value| value.into_string().ok()),
+            Some(option) => option.strip_prefix("--log-format=").map(str::to_owned),
+            None => None,
+        };
+        if let Some(asked) = value.and_then(|value| Format::from_str(&value, false).ok()) {
+            format = asked;
+        }
+    }
+    format
+}
+
+/// Says something.
+pub fn say(level: Level, message: &str) {
+    tell(level, message, Facts::new());
+}
+
+/// Says something of which more is known.
+pub fn tell(level: Level, message: &str, facts: Facts) {
+    if !is_json() {
+        write(&format!("{}{message}", level.prefix()));
+        return;
+    }
+    #[derive(Serialize)]
+    struct Line<'a> {
+        level: Level,
+        message: &'a str,
+        /// Seconds since 1970 in UTC.
+        time: f64,
+        #[serde(flatten)]
+        facts: Facts,
+    }
+    let time = SystemTime::now()
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .unwrap_or_default();
+    let line = Line {
+        level,
+        message,
+        time: time.as_millis() as f64 / 1000.0,
+        facts,
+    };
+    // Names and numbers have no reason to fail.
+    write(&serde_json::to_string(&line).unwrap_or_default());
+}
+
+/// Text that belongs to the message before it; in JSON that has it among its facts.
+pub fn explain(text: &str) {
+    if !is_json() {
+        write(text);
+    }
+}
+
+/// A line on standard error. Where it cannot be written there is nobody to tell, and whatever is under way goes on.
+fn write(line: &str) {
+    let _ = io::stderr().lock().write_all(format!("{line}\n").as_bytes());
+}
+
+/// Makes lines of panics that are no errors of anything else, where messages are JSON.
+pub fn catch_panics() {
+    if is_json() {
+        std::panic::set_hook(Box::new(|panic| {
+            let facts = Facts::from_iter([("exit_code".to_owned(), Value::from(101))]);
+            tell(Level::Error, &panic.to_string(), facts);
+        }));
+    }
+}
+
+/// Events of this program on standard error, and warnings of others.
+pub fn speak() {
+    use tracing_subscriber::filter::{LevelFilter, Targets};
+    use tracing_subscriber::prelude::*;
+    let ours = Targets::new()
+        .with_target("wgray", LevelFilter::DEBUG)
+        .with_default(LevelFilter::WARN);
+    let lines = (!is_json()).then(|| {
+        tracing_subscriber::fmt::layer()
+            .with_writer(io::stderr)
+            .with_target(false)
+            .without_time()
+            .with_ansi(io::stderr().is_terminal())
+    });
+    let objects = is_json().then_some(Objects);
+    tracing_subscriber::registry()
+        .with(lines)
+        .with(objects)
+        .with(ours)
+        .init();
+}
+
+/// Writes events as JSON.
+struct Objects;
+
+impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for Objects {
+    fn on_new_span(&self, attributes: &Attributes<'_>, id: &Id, context: Context<'_, S>) {
+        let mut fields = Fields::default();
+        attributes.record(&mut fields);
+        if let Some(span) = context.span(id) {
+            span.extensions_mut().insert(fields);
+        }
+    }
+
+    fn on_event(&self, event: &Event<'_>, context: Context<'_, S>) {
+        let mut all = Fields::default();
+        for span in context.event_scope(event).into_iter().flatten() {
+            if let Some(fields) = span.extensions().get::<Fields>() {
+                all.0.extend(fields.0.clone());
+            }
+        }
+        event.record(&mut all);
+        let message = match all.0.remove("message") {
+            Some(Value::String(message)) => message,
+            _ => String::new(),
+        };
+        let level = match *event.metadata().level() {
+            tracing::Level::ERROR => Level::Error,
+            tracing::Level::WARN => Level::Warning,
+            tracing::Level::INFO => Level::Info,
+            _ => Level::Debug,
+        };
+        tell(level, &message, all.0);
+    }
+}
+
+/// The fields of an event, or of what it happened in.
+#[derive(Default)]
+struct Fields(Facts);
+
+impl Fields {
+    fn put(&mut self, field: &Field, value: impl Into<Value>) {
+        self.0.insert(field.name().to_owned(), value.into());
+    }
+}
+
+impl Visit for Fields {
+    fn record_f64(&mut self, field: &Field, value: f64) {
+        self.put(field, value);
+    }
+
+    fn record_i64(&mut self, field: &Field, value: i64) {
+        self.put(field, value);
+    }
+
+    fn record_u64(&mut self, field: &Field, value: u64) {
+        self.put(field, value);
+    }
+
+    fn record_bool(&mut self, field: &Field, value: bool) {
+        self.put(field, value);
+    }
+
+    fn record_str(&mut self, field: &Field, value: &str) {
+        self.put(field, value);
+    }
+
+    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
+        self.put(field, format!("{value:?}"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_format_is_found_on_a_bad_command_line() {
+        let asked = |line: &str| asked(line.split(' ').map(Into::into));
+        assert_eq!(asked("render --log-format json --bad"), Format::Json);
+        assert_eq!(asked("--log-format=json --log-format text"), Format::Text);
+        assert_eq!(asked("--log-format xml"), Format::Text);
+        assert_eq!(asked("check -- --log-format json"), Format::Text);
+        assert_eq!(asked("check --log-format"), Format::Text);
+    }
+}

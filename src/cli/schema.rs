@@ -1,0 +1,9 @@
+//! `wgray schema`: what editors complete and check scene files by.
+
+use std::io::{self, Write as _};
+use std::process::ExitCode;
+
+pub fn run() -> ExitCode {
+    let schema = wgray::scene::schema();
+    super::ended(io::stdout().lock().write_all(schema.as_bytes()), ExitCode::SUCCESS)
+}
