@@ -68,7 +68,7 @@ fn scripts_of_slurm_render_the_picture() {
     let told = written(
         &place,
         "slurm",
-        &[&[ODD, "-o", "- {{}} '.exr"], &SHAPE[..], &own].concat(),
+        &[&[ODD, "--output=- {{}} '.exr"], &SHAPE[..], &own].concat(),
     );
     let folder = format!("{}.farm", ODD.trim_end_matches(".toml"));
     assert!(
@@ -177,12 +177,11 @@ fn frames_are_told_as_ranges() {
     for (engine, file, line) in [
         ("openjd", "small.openjd.yaml", "    default: \"1-7:2,20\""),
         ("slurm", "small.farm/tile.sh", "frames=($(seq 1 2 7) 20)"),
-        ("slurm", "small.farm/merge.sh", "    --output=out.###.png \\"),
+        ("slurm", "small.farm/merge.sh", "    '--output=out.###.png' \\"),
     ] {
         let ran = farm(&place, engine, &[&options[..], &["--overwrite"]].concat());
         assert_eq!(ran.code, 0, "{}", ran.stderr);
         let text = text(&place, file);
-        let line = line.replace("out.###.png", "'--output=out.###.png'");
         assert!(text.lines().any(|found| found == line), "{line}:\n{text}");
     }
     // Around, frames are those of the circle.
@@ -418,7 +417,7 @@ fn what_is_not_for_farms_is_refused() {
                 "1",
             ],
             2,
-            "error: --exr-type: is for OpenEXR",
+            "error: --exr-type: is for an EXR",
         ),
         (
             &["small.toml", "-o", "small.toml", "--tiles", "1"],
