@@ -25,6 +25,7 @@ use clap::{Parser, Subcommand};
 use wgray::compare::Unreadable;
 use wgray::error::{Error, RenderError, ShaderError, ShaderErrors};
 use wgray::scene::{Overrides, Problem, Scene, SceneError};
+use wgray::visible::{visible, visible_lines};
 
 #[derive(Debug, Parser)]
 #[command(name = "wgray", version, about, max_term_width = 100, after_help = EXIT_CODES)]
@@ -182,13 +183,18 @@ fn report(error: &anyhow::Error) {
     for error in shader {
         say(&format!("error: {error}"));
         if let Some(excerpt) = &error.excerpt {
-            say(excerpt);
+            put(&visible_lines(excerpt));
         }
     }
 }
 
-/// A line on standard error. Where it cannot be written there is nobody to tell, and whatever is under way goes on.
+/// A line on standard error, in which names and values of files do nothing to a terminal.
 fn say(line: &str) {
+    put(&visible(line));
+}
+
+/// Lines on standard error. Where they cannot be written there is nobody to tell, and whatever is under way goes on.
+fn put(line: &str) {
     let _ = io::stderr().lock().write_all(format!("{line}\n").as_bytes());
 }
 
