@@ -134,11 +134,14 @@ fn a_flawed_oracle_is_found() {
             Flaw::Facets,
             Flaw::StretchedNormals,
         ] {
+            let everywhere = matches!(flaw, Flaw::MissingCosine | Flaw::ShiftedPixel | Flaw::CornerSamples);
+            if !everywhere && found.contains(&flaw) {
+                continue;
+            }
             let share = differing(&picture, &Oracle::new(&description, flaw).picture());
             if share > 10.0 * EDGES {
                 found.push(flaw);
             }
-            let everywhere = matches!(flaw, Flaw::MissingCosine | Flaw::ShiftedPixel | Flaw::CornerSamples);
             assert!(
                 !everywhere || share > 10.0 * EDGES,
                 "{name}: {flaw:?} differs in {share} of the pixels only"

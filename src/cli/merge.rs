@@ -1,13 +1,15 @@
 //! `wgray merge`: parts of a picture, joined.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::{fs, io};
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use wgray::error::RenderError;
 use wgray::image;
 use wgray::job::Parts;
 
+use super::frames::{self, Frame};
 use super::log::{self, Level};
 use super::outputs::{Layered, Outputs, Places};
 use super::picture_options::PictureOptions;
@@ -17,9 +19,13 @@ use super::{Interrupted, Usage, signal};
 #[command(after_help = super::EXIT_CODES)]
 #[command(allow_negative_numbers = true)] // so that a number out of range is told as such
 pub struct Args {
-    /// All parts of one picture, which wgray render --tile has written, in any order
+    /// All parts of one picture, which wgray render --tile has written, in any order; a folder stands for the parts in it
     #[arg(value_name = "PART", required = true)]
     parts: Vec<PathBuf>,
+
+    /// The number that # in names of outputs stand for: out.####.png is out.0007.png
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=i64::from(frames::LARGEST)))]
+    frame: Option<u32>,
 
     #[command(flatten)]
     pictures: PictureOptions,
@@ -31,17 +37,24 @@ pub struct Args {
 
 /// Writes the picture that the parts make, with their layers: the same bytes as those of one render.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let [first, ..] = args.pictures.output.as_slice() else {
+    let frame = Frame::one(args.frame);
+    let named = args.pictures.output.iter().map(|output| frame.name("--output", output));
+    let pictures = PictureOptions {
+        output: named.collect::<Result<_, _>>()?,
+        ..args.pictures.clone()
+    };
+    let [first, ..] = pictures.output.as_slice() else {
         return Err(Usage("--output: must be there: -o NAME.exr".to_owned()).into());
     };
+    let files = files(&args.parts)?;
     let parts = Parts::open(
-        &args.parts,
+        &files,
         args.pictures.view_transform.is_some() && args.pictures.exposure.is_some(),
     )?;
     let mut layout = parts.layout();
     layout.view = args.pictures.view(layout.view);
-    let outputs = Outputs::find(&args.pictures, first, (&layout.aovs, Layered::There), None)?;
-    outputs.check(&args.parts, None)?;
+    let outputs = Outputs::find(&pictures, first, (&layout.aovs, Layered::There), None)?;
+    outputs.check(&files, None)?;
     outputs.check_size(layout.region)?;
     let begun = outputs.begin().map_err(RenderError::Output)?;
     let stop = signal::stop().context("signal handler")?;
@@ -65,4 +78,29 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             Ok(ExitCode::SUCCESS)
         }
     }
+}
+
+/// The parts, with those that lie in folders. What another process is still writing there has a hidden name.
+fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let name = path.display();
+        let entries = fs::read_dir(path).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+        let entries = entries.with_context(|| format!("{name}: cannot be read"))?;
+        let is_part = |entry: &fs::DirEntry| {
+            let name = entry.file_name();
+            Path::new(&name).extension().is_some_and(|end| end == "part") && !name.as_encoded_bytes().starts_with(b".")
+        };
+        let before = files.len();
+        files.extend(entries.iter().filter(|entry| is_part(entry)).map(fs::DirEntry::path));
+        if files.len() == before {
+            bail!("{name}: is a folder without parts, NAME.part, which wgray render --tile writes");
+        }
+        files[before..].sort();
+    }
+    Ok(files)
 }

@@ -8,6 +8,8 @@ mod dev;
 mod devices;
 mod diff;
 mod exit_codes;
+mod farm;
+mod frames;
 mod info;
 mod log;
 mod man;
@@ -67,6 +69,9 @@ enum Command {
     Info(Box<info::Args>),
     /// Joins parts of a picture, which render --tile has written, to the picture
     Merge(Box<merge::Args>),
+    /// Writes what a render farm takes to render a scene in parts on many machines
+    #[command(subcommand)]
+    Farm(farm::Engine),
     /// Writes a scene, a glTF file for one, as a TOML file that renders the same picture
     Convert(Box<convert::Args>),
     /// Compares two pictures, and fails if they differ
@@ -109,6 +114,11 @@ pub fn main() -> ExitCode {
     log::catch_panics();
     let threads = match &cli.command {
         Command::Render(args) => args.threads,
+        Command::Farm(engine) => engine.threads(),
+        _ => None,
+    };
+    let requeue = match &cli.command {
+        Command::Render(args) => args.requeue_exit.map(|code| (code, args.quiet)),
         _ => None,
     };
     prepare_environment(threads);
@@ -120,6 +130,7 @@ pub fn main() -> ExitCode {
         Command::Info(args) => info::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Merge(args) => merge::run(&args),
+        Command::Farm(engine) => farm::run(&engine, start),
         Command::Diff(args) => diff::run(*args),
         Command::Devices => Ok(devices::run()),
         Command::Schema => Ok(schema::run()),
@@ -131,8 +142,13 @@ pub fn main() -> ExitCode {
     match result {
         Ok(code) => code,
         Err(error) => {
-            report(&error);
-            ExitCode::from(exit_code(&error))
+            let again = requeue.filter(|_| helps_again(&error));
+            let code = again.map_or_else(|| exit_code(&error), |(code, _)| code);
+            report(&error, code);
+            if again.is_some_and(|(_, quiet)| !quiet) {
+                log::say(Level::Note, &format!("exit code {code} asks for another try"));
+            }
+            ExitCode::from(code)
         }
     }
 }
@@ -208,8 +224,8 @@ fn option(problem: &Problem) -> Usage {
 }
 
 /// Says on standard error what went wrong.
-fn report(error: &anyhow::Error) {
-    let code = Value::from(exit_code(error));
+fn report(error: &anyhow::Error, code: u8) {
+    let code = Value::from(code);
     let shader = shader_errors(error);
     if shader.is_empty() {
         let hint = match error.downcast_ref() {
@@ -281,6 +297,15 @@ fn shader_errors(error: &anyhow::Error) -> &[ShaderError] {
         (Some(RenderError::Shader(error)), _) => std::slice::from_ref(error),
         (_, Some(errors)) => &errors.0,
         _ => &[],
+    }
+}
+
+/// Whether the same command may succeed after this, on another machine or later: not if the scene, the command line or the want of memory
+/// would end it again.
+fn helps_again(error: &anyhow::Error) -> bool {
+    match error.downcast_ref() {
+        Some(Interrupted(signal)) => *signal == signal_hook::consts::SIGTERM,
+        None => matches!(error.downcast_ref(), Some(RenderError::Lost { .. })),
     }
 }
 

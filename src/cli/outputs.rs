@@ -181,6 +181,11 @@ impl Outputs {
         all.all(is_there)
     }
 
+    /// Where the part of a picture is, if it is one and a file.
+    pub fn part(&self) -> Option<&Path> {
+        self.part.as_ref()?.path()
+    }
+
     /// The files that it writes, each with its option and its name in messages.
     pub fn files(&self) -> impl Iterator<Item = (&str, &str, &Path)> {
         let pictures = self.pictures.iter().flat_map(|picture| &picture.files);

@@ -18,6 +18,8 @@ pub enum Mode {
     Auto,
     /// Lines, at every tenth of the work and every ten seconds
     Plain,
+    /// Lines that Open Job Description takes progress from, openjd_progress: PERCENT
+    Openjd,
     /// Nothing
     None,
 }
@@ -38,7 +40,7 @@ pub struct Progress {
     frame: Option<u32>,
     start: Instant,
     bar: Option<ProgressBar>,
-    /// The tenths that lines have told of, and when the last one did.
+    /// The tenths, or hundredths, that lines have told of, and when the last one did.
     told: (u32, Instant),
 }
 
@@ -76,6 +78,13 @@ impl Progress {
                 if tenths > self.told.0 || self.told.1.elapsed() > SILENCE {
                     self.tell(share);
                     self.told = (tenths, Instant::now());
+                }
+            }
+            Mode::Openjd => {
+                let hundredths = (share * 100.0) as u32;
+                if hundredths > self.told.0 {
+                    log::say(Level::Progress, &format!("openjd_progress: {hundredths}"));
+                    self.told.0 = hundredths;
                 }
             }
             Mode::Auto | Mode::None => {}

@@ -1,6 +1,6 @@
 //! Parts of a picture, rendered apart and joined: files of finished pieces, with the first hits where layers need them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -16,6 +16,7 @@ use crate::error::RenderError;
 use crate::film::{Form, Region};
 use crate::image::{Aov, Band, Layout, Metadata, Pending, Sink};
 use crate::scene::{ViewSettings, ViewTransform};
+use crate::waiting;
 
 /// What a picture needs besides the films of its parts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -130,6 +131,19 @@ pub fn write_part(
     })?;
     file.flush()?;
     Ok(file.finish()?)
+}
+
+/// What a file is a part of, and which one, by its header.
+///
+/// # Errors
+///
+/// What cannot be read, and what is no part.
+pub fn read_part_header(path: &Path) -> io::Result<(Identity, PartHeader)> {
+    let (header, ..) = pieces_file::read_header(&mut File::open(path)?)?;
+    match header.part {
+        Some(part) => Ok((header.identity, part)),
+        None => Err(io::Error::new(io::ErrorKind::InvalidData, "is a checkpoint")),
+    }
 }
 
 /// Why parts cannot be joined.
@@ -295,10 +309,15 @@ fn missing(from: u32, to: u32, tiles: &[Tile]) -> String {
         return rows;
     };
     const MOST: usize = 20;
-    let absent = (1..=of).filter(|number| tiles.iter().all(|tile| tile.number != *number));
-    let names: Vec<String> = absent.map(|number| Tile { number, of }.to_string()).collect();
+    let there: BTreeSet<u32> = tiles.iter().map(|tile| tile.number).collect();
+    let absent = (1..=of).filter(|number| !there.contains(number));
+    let mut names: Vec<String> = absent
+        .take(MOST + 1)
+        .map(|number| Tile { number, of }.to_string())
+        .collect();
     let dots = if names.len() > MOST { " ..." } else { "" };
-    let listed = names.iter().take(MOST).cloned().collect::<Vec<_>>().join(", ");
+    names.truncate(MOST);
+    let listed = names.join(", ");
     format!("{rows}: there is no part {listed}{dots}")
 }
 
@@ -308,6 +327,7 @@ fn open(path: &Path) -> Result<(Key, Header, PartHeader, Vec<Entry>), PartError>
         what,
     };
     let io = |error: io::Error| bad(error.to_string());
+    waiting::check(path).map_err(io)?;
     let mut file = File::open(path).map_err(io)?;
     let data = file.metadata().map_err(io)?;
     if !data.is_file() {

@@ -120,7 +120,16 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
     crate::cli::heed_interrupts();
     let place = Place::new();
     let expected = expected(&place);
-    for (signal, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
+    let kept = "note: c has what was rendered; --resume goes on from it\nerror: cancelled\n";
+    let again = format!("{kept}note: exit code 75 asks for another try\n");
+    let requeue = &["--requeue-exit", "75"][..];
+    for (signal, code, more, told) in [
+        ("-INT", 130, &[][..], kept),
+        ("-TERM", 143, &[], kept),
+        ("-HUP", 129, &[], kept),
+        ("-TERM", 75, requeue, &again),
+        ("-INT", 130, requeue, kept), // somebody wants it to end
+    ] {
         // Nothing is kept for an hour, but at the signal.
         let child = start(
             &place,
@@ -134,7 +143,11 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
                 "out.exr",
                 "--device",
                 "cpu",
-            ],
+            ]
+            .iter()
+            .chain(more)
+            .copied()
+            .collect::<Vec<_>>(),
         );
         let before = fs::metadata(place.path("c")).map_or(0, |data| data.len());
         let begun = Instant::now();
@@ -146,14 +159,7 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
         let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
         assert!(sent.expect("kill").success());
         let ran = ended(child);
-        assert_eq!(
-            (ran.code, ran.stderr.as_str()),
-            (
-                code,
-                "note: c has what was rendered; --resume goes on from it\nerror: cancelled\n"
-            ),
-            "{signal}"
-        );
+        assert_eq!((ran.code, ran.stderr.as_str()), (code, told), "{signal} {more:?}");
         assert!(
             fs::metadata(place.path("c")).expect("the checkpoint").len() > before,
             "{signal}"

@@ -130,7 +130,11 @@ fn a_device_that_never_comes_back_is_an_error_or_leaves_the_work_to_the_cpu() {
         let end = "; it did not come back: its driver does not open it";
         assert!(ran.stderr.trim_end().ends_with(end), "{}", ran.stderr);
         assert_eq!((ran.count("device refused"), ran.count("lost")), (3, 1));
-        let ran = place.run_on(driver, &AUTO, &faults);
+        let requeue = ["--device", device, "--requeue-exit", "75"];
+        let ran = place.run_on(driver, &requeue, &faults);
+        assert_eq!((ran.code, ran.picture.is_some()), (75, false), "{lose}");
+        warned(&ran, 1, &["error: llvmpipe", "note: exit code 75 asks for another try"]);
+        let ran = place.run_on(driver, &[&AUTO[..], &requeue[2..]].concat(), &faults);
         assert_eq!(ran.code, 0, "{lose}: {}", ran.stderr);
         warned(&ran, 1, &["warning: rendering on the CPU: llvmpipe"]);
         assert!(ran.picture == Some(expected.clone()), "{lose}");

@@ -5,13 +5,15 @@ use std::time::Duration;
 
 use clap::ValueHint;
 use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser as _};
+use wgray::device::Device;
 use wgray::film::Region;
 use wgray::image::Aov;
 use wgray::job::Tile;
+use wgray::render::Options;
 use wgray::scene::{Define, Integrator, Overrides, Pattern, Scene, is_gltf};
 
-use super::frames::{Frame, Frames};
 use crate::cli::Usage;
+use crate::cli::frames::{Frame, Frames};
 use crate::cli::outputs::{Layered, Outputs};
 use crate::cli::picture_options::PictureOptions;
 use crate::cli::progress::Mode;
@@ -40,7 +42,7 @@ pub struct Args {
     #[arg(long, value_name = "F", value_parser = parse_fps, conflicts_with = "time")]
     pub fps: Option<f64>,
 
-    /// Leaves out each picture, or frame, of which all files are there
+    /// Leaves out each picture, or frame, of which all files are there; a part only if it is of this scene and these options
     #[arg(long)]
     pub skip_existing: bool,
 
@@ -139,6 +141,11 @@ pub struct Args {
     #[arg(long, value_name = "i/n", value_parser = parse_tile)]
     pub tile: Option<Tile>,
 
+    /// The exit code, in place of 6 or 143, of an end after which the same command may succeed elsewhere or later: the device was lost and did
+    /// not come back, or SIGTERM came, as farms send it before the time is up or the machine is wanted. 75 is usual
+    #[arg(long, value_name = "CODE", value_parser = clap::value_parser!(u8).range(9..=125))]
+    pub requeue_exit: Option<u8>,
+
     /// Writes what the render took, as JSON. - is standard output
     #[arg(long, value_name = "FILE.json|-")]
     pub stats: Option<PathBuf>,
@@ -172,6 +179,16 @@ impl Args {
             }
         }
         aovs
+    }
+
+    /// What the library is asked for.
+    pub fn rendering(&self) -> Options {
+        Options {
+            device: Device::from(self.device.as_str()),
+            crop: self.crop,
+            aovs: self.aovs(),
+            exact_rounding: self.exact_rounding,
+        }
     }
 
     /// How progress is shown.

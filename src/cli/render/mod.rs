@@ -1,9 +1,9 @@
 //! `wgray render`: a scene file to a picture, or to several.
 
 mod args;
-mod frames;
 mod plan;
 mod said;
+mod trial;
 mod work;
 
 use std::collections::BTreeMap;
@@ -14,69 +14,116 @@ use anyhow::Context as _;
 use tracing::info;
 use wgray::device::DeviceInfo;
 use wgray::error::RenderError;
+use wgray::film::Region;
 use wgray::job::{Keeper, Nowhere};
-use wgray::scene::{Scene, is_gltf};
+use wgray::scene::{Problem, Scene, is_gltf};
 
-use self::frames::Frame;
 use self::plan::Plan;
 use self::said::Said;
 use self::work::Took;
+use super::frames::Frame;
 use super::log::{self, Level};
 use super::outputs::Outputs;
 use super::signal::Stop;
 use super::stats::Stats;
 use super::{Interrupted, Usage, facts_of, plain, progress, signal};
 
-pub use args::Args;
-pub use args::parse_size;
+pub use args::{Args, parse_duration, parse_size};
+pub use trial::Trial;
 
 pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
-    if args.verbose {
-        log::speak();
-    }
-    if let Some(threads) = args.threads {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
-        pool.build_global().context("threads")?; // before anything else is done in parallel
-    }
-    let frames = args.frames();
-    let outputs: Vec<Outputs> = (frames.iter().map(|frame| args.outputs(*frame))).collect::<anyhow::Result<_>>()?;
-    let said = Said::new(args.quiet);
-    let mut scene = read(&args, &said)?;
-    let fps = args.fps(&scene)?;
-    check(&args, &scene, frames.iter().zip(&outputs))?;
+    let mut job = Job::new(&args)?;
     info!(seconds = start.elapsed().as_secs_f64(), "scene read");
     let (mut stop, mut start, mut skipped) = (None, start, 0);
-    for (frame, outputs) in frames.iter().zip(outputs) {
-        if args.skip_existing && outputs.are_there() {
+    let count = job.frames.len();
+    for (frame, outputs) in std::mem::take(&mut job.frames) {
+        let is_there = args.skip_existing && outputs.are_there();
+        if is_there && outputs.part().is_none() {
             skipped += 1;
             continue;
         }
-        if let Some((number, fps)) = frame.number.zip(fps) {
-            let mut overrides = args.overrides();
-            overrides.gltf.time = Some(f64::from(number) / fps);
-            let moment = super::load(&args.scene, &overrides)?;
-            let before = std::mem::replace(&mut scene, moment);
-            if args.options.is_framed(&scene) {
-                // Of the file at rest: it stands still, and a frame by itself is the same as in a run.
-                (scene.camera, scene.camera_path) = (before.camera, before.camera_path);
-            }
-        }
-        if let Some(number) = frame.number {
-            scene.camera = scene.camera_at(number.into()).map_err(|error| plain(error.into()))?;
-        }
-        let plan = Plan::resolve(&args, &scene, &said, *frame, start)?;
+        job.go_to(frame)?;
+        let plan = Plan::resolve(&args, &job.scene, &job.said, frame, start)?;
         outputs.check_size(plan.region())?;
+        if let Some(part) = outputs.part().filter(|_| is_there) {
+            if plan.is_done(part) {
+                skipped += 1;
+                continue;
+            }
+            let name = part.display();
+            let told = format!("{name} is of another scene or other options, and is rendered anew");
+            job.said.again(Level::Note, &told);
+        }
         picture(&plan, outputs, &mut stop, start)?;
         start = Instant::now();
     }
     if skipped > 0 {
-        let count = frames.len();
-        said.once(
-            Level::Note,
-            &format!("{skipped} of {count} left out, as their files are there"),
-        );
+        let told = format!("{skipped} of {count} left out, as their files are there");
+        job.said.once(Level::Note, &told);
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What the options ask for, looked at as a whole.
+pub struct Job<'a> {
+    args: &'a Args,
+    pub said: Said,
+    /// The scene, at the frame that was gone to.
+    pub scene: Scene,
+    fps: Option<f64>,
+    /// The frames to render, and where each goes to.
+    pub frames: Vec<(Frame, Outputs)>,
+}
+
+impl<'a> Job<'a> {
+    /// Reads the scene, and looks at all frames.
+    pub fn new(args: &'a Args) -> anyhow::Result<Job<'a>> {
+        if args.verbose {
+            log::speak();
+        }
+        if let Some(threads) = args.threads {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+            pool.build_global().context("threads")?; // before anything else is done in parallel
+        }
+        let frames = args.frames().into_iter();
+        let frames = frames.map(|frame| Ok((frame, args.outputs(frame)?)));
+        let frames: Vec<(Frame, Outputs)> = frames.collect::<anyhow::Result<_>>()?;
+        let said = Said::new(args.quiet);
+        let scene = read(args, &said)?;
+        let fps = args.fps(&scene)?;
+        check(args, &scene, frames.iter().map(|(frame, outputs)| (frame, outputs)))?;
+        Ok(Job {
+            args,
+            said,
+            scene,
+            fps,
+            frames,
+        })
+    }
+
+    /// The pixels of a picture that the options ask for.
+    pub fn region(&self) -> Result<Region, Problem> {
+        self.args.rendering().region(&self.scene)
+    }
+
+    /// Makes the scene what it is at a frame.
+    pub fn go_to(&mut self, frame: Frame) -> anyhow::Result<()> {
+        if let Some((number, fps)) = frame.number.zip(self.fps) {
+            let mut overrides = self.args.overrides();
+            overrides.gltf.time = Some(f64::from(number) / fps);
+            let moment = super::load(&self.args.scene, &overrides)?;
+            let before = std::mem::replace(&mut self.scene, moment);
+            if self.args.options.is_framed(&self.scene) {
+                // Of the file at rest: it stands still, and a frame by itself is the same as in a run.
+                (self.scene.camera, self.scene.camera_path) = (before.camera, before.camera_path);
+            }
+        }
+        if let Some(number) = frame.number {
+            let camera = self.scene.camera_at(number.into());
+            self.scene.camera = camera.map_err(|error| plain(error.into()))?;
+        }
+        Ok(())
+    }
 }
 
 /// Reads the scene, and tells what is odd about it.

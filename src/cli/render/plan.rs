@@ -1,21 +1,22 @@
 //! What the options of `wgray render` come to, checked against the scene.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use wgray::device::{Device, OnFault, Remedy, Renderer};
+use wgray::device::{OnFault, Remedy, Renderer};
 use wgray::error::RenderError;
 use wgray::film::Region;
+use wgray::image::Layout;
 use wgray::job::checkpoint::{Checkpoint, CheckpointError, Opening};
-use wgray::job::{Identity, Tile};
+use wgray::job::{self, Identity, PartHeader, Tile};
 use wgray::pack::Packed;
 use wgray::render::Options;
 use wgray::scene::{Scene, ViewSettings};
 
 use super::args::Args;
-use super::frames::Frame;
 use super::said::Said;
+use crate::cli::frames::Frame;
 use crate::cli::log::Level;
 use crate::cli::metadata::Told;
 use crate::cli::picture_options::PictureOptions;
@@ -50,12 +51,7 @@ impl<'a> Plan<'a> {
         if args.time_limit.is_some() {
             can_end_early(scene)?;
         }
-        let options = Options {
-            device: Device::from(args.device.as_str()),
-            crop: args.crop,
-            aovs: args.aovs(),
-            exact_rounding: args.exact_rounding,
-        };
+        let options = args.rendering();
         let picture = options.region(scene).map_err(|problem| option(&problem))?;
         let tile = match args.tile {
             None => None,
@@ -84,6 +80,28 @@ impl<'a> Plan<'a> {
     /// The pixels that are rendered.
     pub fn region(&self) -> Region {
         self.tile.map_or(self.picture, |(_, rows)| rows)
+    }
+
+    /// What its picture holds, if at its middle something is so far away.
+    pub fn layout(&self, middle_depth: f32) -> Layout {
+        Layout {
+            picture: (self.scene.camera.width, self.scene.camera.height),
+            region: self.region(),
+            aovs: self.options.aovs.clone(),
+            alpha: self.scene.has_alpha(),
+            middle_depth,
+            most_samples: self.scene.pixel_samples,
+            view: self.view,
+        }
+    }
+
+    /// Whether a file is the part that this would write, as far as can be told without a device.
+    pub fn is_done(&self, path: &Path) -> bool {
+        let (Some((tile, _)), Ok((identity, found))) = (self.tile, job::read_part_header(path)) else {
+            return false;
+        };
+        let layout = self.layout(f32::from_bits(found.middle_depth));
+        identity == self.identity() && found == PartHeader::of(tile, &layout, self.told.lasting())
     }
 
     /// What the job is.

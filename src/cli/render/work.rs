@@ -38,7 +38,8 @@ pub fn write(
     keeper: &mut dyn Keeper,
     stop: &Stop,
 ) -> Result<Took, RenderError> {
-    let layout = layout(plan, renderer)?;
+    let middle_depth = renderer.work(|backend, _| middle_depth(&plan.scene, &plan.options.aovs, backend))?;
+    let layout = plan.layout(middle_depth);
     let mut took = Took::default();
     let name = places.name().unwrap_or_default().to_owned();
     let metadata = plan.told.on(renderer.info(), plan.pictures.reproducible);
@@ -60,18 +61,6 @@ pub fn write(
         );
     }
     Ok(took)
-}
-
-fn layout(plan: &Plan, renderer: &mut Renderer) -> Result<Layout, RenderError> {
-    Ok(Layout {
-        picture: (plan.scene.camera.width, plan.scene.camera.height),
-        region: plan.region(),
-        aovs: plan.options.aovs.clone(),
-        alpha: plan.scene.has_alpha(),
-        middle_depth: renderer.work(|backend, _| middle_depth(&plan.scene, &plan.options.aovs, backend))?,
-        most_samples: plan.scene.pixel_samples,
-        view: plan.view,
-    })
 }
 
 fn write_part(

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use crate::cli::Usage;
 
 /// The largest number of a frame, and the most frames of a run: their names are all looked at before the first is rendered.
-const LARGEST: u32 = 999_999_999;
+pub const LARGEST: u32 = 999_999_999;
 const MOST: usize = 100_000;
 
 /// Frames in the order in which they are named, each once: `5`, `1-10`, `1-10:2`, `1-3,7`.
@@ -18,6 +18,37 @@ impl Frames {
     /// As many, from 1 on.
     pub fn first(count: u32) -> Frames {
         Frames((1..=count).collect())
+    }
+
+    /// The same frames in rising order, as few ranges: the first and the last of each, and the step.
+    pub fn ranges(&self) -> Vec<(u32, u32, u32)> {
+        let mut sorted = self.0.clone();
+        sorted.sort_unstable();
+        let (mut ranges, mut rest) = (Vec::new(), sorted.as_slice());
+        while let [first, more @ ..] = rest {
+            let step = more.first().map_or(1, |next| next - first);
+            let mut count = 1;
+            while rest.get(count).is_some_and(|next| *next - rest[count - 1] == step) {
+                count += 1;
+            }
+            if count == 2 && step > 1 {
+                count = 1; // the second may begin a range of another step
+            }
+            let range = &rest[..count];
+            ranges.push((*first, range[count - 1], if count > 1 { step } else { 1 }));
+            rest = &rest[count..];
+        }
+        ranges
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    /// The one in the middle.
+    pub fn middle(&self) -> Option<u32> {
+        self.0.get(self.0.len() / 2).copied()
     }
 }
 
@@ -94,6 +125,11 @@ impl Frame {
         numbers.iter().enumerate().map(frame).collect()
     }
 
+    /// One by itself.
+    pub fn one(number: Option<u32>) -> Frame {
+        Frame { number, place: (1, 1) }
+    }
+
     /// A file's name with the frame's number in place of its `#`, with zeros in front up to their count. Folders keep theirs.
     /// Where there are several frames, a name must tell them apart; `option` is what the name is of, in messages.
     pub fn name(&self, option: &str, pattern: &Path) -> Result<PathBuf, Usage> {
@@ -161,6 +197,28 @@ mod tests {
         }
         assert_eq!(frames("1-100000").unwrap().len(), 100_000);
         assert_eq!(frames("0-999999999:10000").unwrap().len(), 100_000);
+    }
+
+    #[test]
+    fn frames_are_told_in_few_ranges() {
+        for (text, wanted) in [
+            ("5", vec![(5, 5, 1)]),
+            ("1-4", vec![(1, 4, 1)]),
+            ("9,1-7:2", vec![(1, 9, 2)]),
+            ("1-10:9", vec![(1, 1, 1), (10, 10, 1)]),
+            ("3,1-2,7,9,11", vec![(1, 3, 1), (7, 11, 2)]),
+            ("1,5,6,7", vec![(1, 1, 1), (5, 7, 1)]),
+            ("0,999999999", vec![(0, 0, 1), (999_999_999, 999_999_999, 1)]),
+        ] {
+            let frames: Frames = text.parse().unwrap();
+            assert_eq!(frames.ranges(), wanted, "{text}");
+            let all = wanted
+                .into_iter()
+                .flat_map(|(first, last, step)| (first..=last).step_by(step as usize));
+            let mut sorted = frames.0.clone();
+            sorted.sort_unstable();
+            assert_eq!(all.collect::<Vec<_>>(), sorted, "{text}");
+        }
     }
 
     #[test]
