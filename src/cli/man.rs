@@ -17,9 +17,9 @@ use super::{Cli, Usage};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The command whose page is printed; if absent, the program's own
+    /// The command whose page is printed, as render or farm slurm; if absent, the program's own
     #[arg(value_name = "COMMAND", conflicts_with = "output")]
-    command: Option<String>,
+    command: Vec<String>,
 
     /// Folder to write all pages into, wgray.1, wgray-render.1 and so on, in place of printing one. It is made if it is not there
     #[arg(short, long, value_name = "DIR", value_hint = ValueHint::DirPath)]
@@ -29,16 +29,13 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let commands = commands();
     let Some(folder) = &args.output else {
-        let name = match &args.command {
-            None => "wgray".to_owned(),
-            Some(command) => format!("wgray-{command}"),
-        };
+        let name = [&["wgray".to_owned()], args.command.as_slice()].concat().join("-");
         let Some(command) = commands.iter().find(|command| name_of(command) == name) else {
             let names = commands
                 .iter()
                 .filter_map(|command| name_of(command).strip_prefix("wgray-"));
-            let names = names.collect::<Vec<_>>().join(", ");
-            let wanted = args.command.as_deref().unwrap_or_default();
+            let names = names.map(|name| name.replace('-', " ")).collect::<Vec<_>>().join(", ");
+            let wanted = args.command.join(" ");
             return Err(Usage(format!("COMMAND: {wanted:?} must be one of {names}")).into());
         };
         let text = page(command)?;
@@ -70,8 +67,20 @@ fn write(path: &Path, text: &[u8]) -> io::Result<()> {
 fn commands() -> Vec<clap::Command> {
     let mut program = Cli::command().disable_help_subcommand(true);
     program.build(); // which gives the subcommands their whole names
-    let own = program.get_subcommands().cloned().collect::<Vec<_>>();
-    std::iter::once(program).chain(own).collect()
+    let mut all = Vec::new();
+    add(program, &mut all);
+    all
+}
+
+/// Adds a command and those below it.
+fn add(command: clap::Command, all: &mut Vec<clap::Command>) {
+    let below: Vec<_> = command
+        .get_subcommands()
+        .filter(|below| below.get_name() != "help")
+        .cloned()
+        .collect();
+    all.push(command);
+    below.into_iter().for_each(|command| add(command, all));
 }
 
 /// `wgray-render`
@@ -82,7 +91,7 @@ fn name_of(command: &clap::Command) -> &str {
 /// A page in the language of man.
 fn page(command: &clap::Command) -> io::Result<Vec<u8>> {
     let name = name_of(command);
-    let is_program = !name.contains('-');
+    let is_program = name == "wgray";
     let man = Man::new(command.clone());
     // By hand: without a date, which a build has none of that stays, the next words would stand in its place.
     let (title, version) = (name.to_uppercase(), env!("CARGO_PKG_VERSION"));
@@ -90,7 +99,7 @@ fn page(command: &clap::Command) -> io::Result<Vec<u8>> {
     man.render_name_section(&mut text)?;
     man.render_synopsis_section(&mut text)?;
     man.render_description_section(&mut text)?;
-    if is_program {
+    if command.has_subcommands() {
         man.render_subcommands_section(&mut text)?;
     }
     man.render_options_section(&mut text)?;
@@ -181,7 +190,7 @@ mod tests {
     fn every_example_can_be_read() {
         for example in text::EXAMPLES {
             let words = example.line.split_whitespace().map(|word| word.trim_matches('\''));
-            let words: Vec<&str> = words.take_while(|word| *word != "|").collect();
+            let words: Vec<&str> = words.take_while(|word| !["|", ">"].contains(word)).collect();
             if let Err(error) = Cli::try_parse_from(words) {
                 panic!("{}: {error}", example.line);
             }

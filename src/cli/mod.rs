@@ -167,7 +167,8 @@ fn explain(told: &clap::Error) -> ExitCode {
     let (message, help) = text.split_once("\n\n").unwrap_or((&text, ""));
     let message = message.strip_prefix("error: ").unwrap_or(message);
     let facts = [("exit_code", Value::from(2)), ("help", Value::from(help.trim()))];
-    log::tell(Level::Error, message.trim(), facts_of(facts));
+    let message = message.split_whitespace().collect::<Vec<_>>().join(" ");
+    log::tell(Level::Error, &message, facts_of(facts));
     ExitCode::from(2)
 }
 

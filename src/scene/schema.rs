@@ -128,12 +128,11 @@ fn finish(schema: &mut Value) {
 /// TOML has no null.
 fn without_null(schema: &mut Value) {
     let null = json!("null");
-    if let Some(types) = schema.get_mut("type") {
-        if let Value::Array(list) = types {
-            list.retain(|name| *name != null);
-            if let [one] = list.as_slice() {
-                *types = one.clone();
-            }
+    let types = schema.get_mut("type");
+    if let Some(Value::Array(list)) = types {
+        list.retain(|name| *name != null);
+        if let [one] = list.as_slice() {
+            schema["type"] = one.clone();
         }
     }
     if let Some(Value::Array(list)) = schema.get_mut("enum") {

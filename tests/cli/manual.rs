@@ -23,7 +23,8 @@ fn every_command_has_a_page() {
     let place = Place::new();
     place.quietly(&["man", "-o", "pages/man1"]);
     let mut wanted: Vec<String> = commands(&place).iter().map(|name| format!("wgray-{name}.1")).collect();
-    wanted.push("wgray.1".to_owned());
+    let others = ["wgray.1", "wgray-farm-openjd.1", "wgray-farm-slurm.1"];
+    wanted.extend(others.map(str::to_owned));
     wanted.sort();
     let folder = place.folder().join("pages/man1");
     let mut there: Vec<String> = std::fs::read_dir(&folder)
@@ -45,6 +46,7 @@ fn every_command_has_a_page() {
             assert!(page.contains(part), "{name}: {part}");
         }
         let own = name.strip_prefix("wgray-").and_then(|name| name.strip_suffix(".1"));
+        let own = own.into_iter().flat_map(|name| name.split('-'));
         let arguments: Vec<&str> = std::iter::once("man").chain(own).collect();
         assert_eq!(place.run(&arguments).stdout, page, "{name} is printed");
     }

@@ -14,6 +14,7 @@ use clap::builder::NonEmptyStringValueParser;
 use wgray::device::{Device, foresee};
 use wgray::pack::pack;
 use wgray::scene::{Define, Overrides};
+use wgray::visible::visible_lines;
 
 use super::render::parse_size;
 use super::scene_options::SceneOptions;
@@ -67,7 +68,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let info = Info::of(&args.scene, &scene, &packed, &foreseen);
     let text = match args.json {
         true => format!("{}\n", serde_json::to_string_pretty(&info)?),
-        false => show::table(&info),
+        false => visible_lines(&show::table(&info)).into_owned(),
     };
     Ok(super::ended(
         io::stdout().lock().write_all(text.as_bytes()),

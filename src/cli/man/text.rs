@@ -3,7 +3,7 @@
 /// What a scene is.
 pub const SCENES: &str = "\
 A scene is a TOML file, a glTF file (.gltf, .glb), or a JSON file of a course on path tracing. The manual of the format, \
-docs/scene-format.md, documents every key; \
+docs/scene-format.md, documents every key; wgray schema prints a JSON Schema by which editors complete and check the keys; \
 wgray check says whether a file is sound.
 
 Files that a scene names lie in its folder or below, unless --asset-root names another one.";
@@ -51,7 +51,14 @@ pub const ENVIRONMENT: &[(&str, &str, &[&str])] = &[
 ];
 
 /// The commands that look for devices.
-const DEVICES: &[&str] = &["wgray-render", "wgray-devices", "wgray-info", "wgray-dev"];
+const DEVICES: &[&str] = &[
+    "wgray-render",
+    "wgray-devices",
+    "wgray-info",
+    "wgray-farm-openjd",
+    "wgray-farm-slurm",
+    "wgray-dev",
+];
 
 /// Files that are written.
 pub const FILES: &[(&str, &str)] = &[
@@ -80,10 +87,12 @@ pub struct Example {
 impl Example {
     /// Whether it is one of this command, `wgray-render`; the program's own page has the first of each.
     pub fn of(&self, command: &str) -> bool {
-        let own = self.line.split_whitespace().nth(1).unwrap_or_default();
-        match command.strip_prefix("wgray-") {
-            Some(name) => name == own,
-            None => PROGRAM.contains(&self.line),
+        match command {
+            "wgray" => PROGRAM.contains(&self.line),
+            command => {
+                self.line.starts_with(&format!("{} ", command.replace('-', " ")))
+                    || self.line == command.replace('-', " ")
+            }
         }
     }
 }
@@ -118,12 +127,32 @@ pub const EXAMPLES: &[Example] = &[
         line: "wgray render scene.toml --tile 2/4 -o 2.part",
     },
     Example {
+        what: "Messages that a program reads, one JSON object a line:",
+        line: "wgray render scene.toml --log-format json",
+    },
+    Example {
         what: "Whether a scene is sound:",
         line: "wgray check scene.toml",
     },
     Example {
+        what: "What is in a scene, and what would render it:",
+        line: "wgray info scene.toml",
+    },
+    Example {
+        what: "The same for a program:",
+        line: "wgray info scene.toml --json",
+    },
+    Example {
         what: "Four parts to a picture:",
         line: "wgray merge 1.part 2.part 3.part 4.part -o picture.exr",
+    },
+    Example {
+        what: "A template of Open Job Description, of 16 parts that it joins:",
+        line: "wgray farm openjd scene.toml -o picture.exr --tiles 16",
+    },
+    Example {
+        what: "Scripts of Slurm, with parts that take some five minutes each:",
+        line: "wgray farm slurm scene.toml -o picture.exr --task-time 5m",
     },
     Example {
         what: "A scene to edit that renders the same bits as a model:",
@@ -136,6 +165,10 @@ pub const EXAMPLES: &[Example] = &[
     Example {
         what: "What there is to render on:",
         line: "wgray devices",
+    },
+    Example {
+        what: "The JSON Schema of scene files, as a file for an editor:",
+        line: "wgray schema > wgray.schema.json",
     },
     Example {
         what: "Completions of the command line for bash:",

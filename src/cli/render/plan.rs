@@ -122,7 +122,7 @@ impl<'a> Plan<'a> {
             resume: self.resume,
             interval: self.checkpoint_interval,
             wait: Box::new(move || asked().is_none() && self.deadline.is_none_or(|end| Instant::now() < end)),
-            tell: Box::new(|what| self.said.again(Level::Warning, &format!("{what}"))),
+            tell: Box::new(|what| self.said.again(Level::Warning, &what.to_string())),
         };
         let identity = Identity::of(&self.scene, self.region(), self.options.exact_rounding);
         match Checkpoint::open(opening, identity, self.scene.form()) {
@@ -150,7 +150,7 @@ impl<'a> Plan<'a> {
         };
         let renderer = Renderer::new(&self.scene, &self.options, on_fault).map_err(plain)?;
         if let Some(why) = renderer.why() {
-            self.said.once(Level::Note, &format!("{why}"));
+            self.said.once(Level::Note, why);
         }
         Ok(renderer)
     }

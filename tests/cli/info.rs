@@ -1,0 +1,148 @@
+//! `wgray info`: what is in a scene, and what would render it.
+
+use serde_json::Value;
+
+use super::{NO_DRIVER, Place, SCENE, project_scene};
+
+/// What is told of a scene as JSON.
+fn info(place: &Place, arguments: &[&str]) -> Value {
+    let all = [&["info", "--json"], arguments].concat();
+    let ran = place.run(&all);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{arguments:?}");
+    serde_json::from_str(&ran.stdout).expect("JSON")
+}
+
+#[test]
+fn things_are_counted() {
+    let place = Place::new();
+    let small = info(&place, &["small.toml", "--device", "cpu"]);
+    assert_eq!(
+        (&small["picture"]["width"], &small["picture"]["light_samples"]),
+        (&10.into(), &4.into())
+    );
+    assert_eq!(small["shapes"]["count"], 2);
+    assert_eq!(
+        small["shapes"]["by_type"],
+        serde_json::json!({ "ellipsoid": 1, "plane": 1 })
+    );
+    assert_eq!(
+        small["bounds"],
+        serde_json::json!([[-0.8, -0.8, 0.19999999999999996], [0.8, 0.8, 1.8]])
+    );
+    assert_eq!(
+        (&small["materials"]["count"], &small["textures"]),
+        (&1.into(), &serde_json::json!([]))
+    );
+    assert_eq!(small["lights"]["by_type"], serde_json::json!({ "rectangle": 1 }));
+    assert_eq!(
+        (&small["device"]["name"], &small["device"]["why"]),
+        (&"cpu".into(), &"it was asked for".into())
+    );
+    assert_eq!(
+        (&small["kernel"]["compiled"], &small["memory"]["scene_on_device"]),
+        (&false.into(), &Value::Null)
+    );
+    // 10 x 6 pixels of four floats.
+    assert_eq!(
+        (&small["memory"]["film"], &small["memory"]["bands"]),
+        (&960.into(), &1.into())
+    );
+    let large = info(
+        &place,
+        &[
+            "small.toml",
+            "--device",
+            "cpu",
+            "--size",
+            "65536x65536",
+            "-D",
+            "render.seed=3",
+        ],
+    );
+    assert!(large["memory"]["bands"].as_u64() > Some(100), "{large}");
+    assert_eq!(large["picture"]["seed"], 3);
+    let tube = info(&place, &[&project_scene("twisted-tube.toml"), "--device", "cpu"]);
+    let shapes = &tube["shapes"];
+    assert!(
+        shapes["triangles"].as_u64() > shapes["mesh_triangles"].as_u64(),
+        "a mesh is there twice: {shapes}"
+    );
+    assert_eq!(tube["textures"][0]["type"], "checker");
+    assert!(
+        tube["kernel"]["uses"]
+            .as_array()
+            .unwrap()
+            .contains(&"trees of boxes".into())
+    );
+    assert!(place.files().is_empty(), "nothing is written");
+}
+
+#[test]
+fn the_device_is_that_of_a_render() {
+    let place = Place::new();
+    let cornell = project_scene("cornell.toml");
+    for scene in ["small.toml", &cornell, &project_scene("twisted-tube.toml")] {
+        let foreseen = info(&place, &[scene]);
+        let ran = place.run(&[
+            "render",
+            scene,
+            "--spp",
+            "1",
+            "--size",
+            "8x6",
+            "-o",
+            "a.png",
+            "--stats",
+            "stats.json",
+            "-q",
+        ]);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let stats: Value = serde_json::from_slice(&place.read("stats.json")).unwrap();
+        assert_eq!(foreseen["device"]["name"], stats["device"], "{scene}");
+        assert!(
+            foreseen["device"]["why"].as_str().is_some_and(|why| why.len() > 10),
+            "{foreseen}"
+        );
+    }
+    let on_gpu = info(&place, &["small.toml", "--device", "gpu"]);
+    assert!(on_gpu["memory"]["scene_on_device"].as_u64() > Some(500), "{on_gpu}");
+    assert_eq!(on_gpu["kernel"]["entry"], "render");
+    // Without any driver too.
+    let ran = place.run_with(&["info", "small.toml"], &NO_DRIVER);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    assert!(ran.stdout.contains("    device      cpu: no Vulkan"), "{}", ran.stdout);
+    let ran = place.run_with(&["info", "small.toml", "--device", "gpu"], &NO_DRIVER);
+    assert_eq!((ran.code, ran.stdout.as_str()), (4, ""));
+    let ran = place.run(&["info", "small.toml", "--device", "nonesuch"]);
+    assert_eq!((ran.code, ran.stdout.as_str()), (4, ""));
+}
+
+#[test]
+fn scenes_of_nothing_and_of_much_are_told_and_bad_ones_refused() {
+    let place = Place::new();
+    let head = SCENE.split("[materials.gray]").next().unwrap();
+    place.write("empty.toml", head);
+    let ran = place.run(&["info", "empty.toml"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    assert!(
+        ran.stdout.contains("shapes      0\n") && ran.stdout.contains("bounds      none"),
+        "{}",
+        ran.stdout
+    );
+    let mut many = format!("{head}[materials.gray]\ntype = 'phong'\ncolor = [1, 1, 1]\n");
+    for i in 0..100_000 {
+        let x = i % 1000;
+        many += &format!("[[shapes]]\ntype = 'sphere'\nmaterial = 'gray'\ncenter = [{x}, {i}, 0]\nradius = 0.4\n");
+    }
+    place.write("many.toml", &many);
+    let many = info(&place, &["many.toml", "--device", "cpu"]);
+    assert_eq!(
+        (&many["shapes"]["count"], &many["shapes"]["primitives"]),
+        (&100_000.into(), &100_000.into())
+    );
+    assert_eq!(many["bounds"][1], serde_json::json!([999.4, 99_999.4, 0.4]));
+    place.write("bad.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
+    let ran = place.run(&["info", "bad.toml", "--json"]);
+    assert_eq!((ran.code, ran.stdout.as_str()), (3, ""));
+    assert!(ran.stderr.contains("shapes[0].radius: -1 must be"), "{}", ran.stderr);
+}

@@ -1,0 +1,198 @@
+//! Messages as JSON: each line of standard error is an object, whatever happens.
+
+use serde_json::Value;
+
+use super::{NO_DRIVER, Place, Ran, SCENE};
+
+/// The lines of standard error.
+fn lines(ran: &Ran) -> Vec<Value> {
+    let lines = ran.stderr.lines().map(|line| {
+        let value: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {line}"));
+        for key in ["level", "message", "time"] {
+            assert!(value.get(key).is_some(), "{key}: {line}");
+        }
+        value
+    });
+    lines.collect()
+}
+
+fn log(place: &Place, arguments: &[&str]) -> (i32, Vec<Value>) {
+    let ran = place.run(&[&["--log-format", "json"], arguments].concat());
+    (ran.code, lines(&ran))
+}
+
+#[test]
+fn a_render_tells_how_far_it_is_and_what_it_took() {
+    let place = Place::new();
+    let (code, lines) = log(
+        &place,
+        &[
+            "render",
+            "small.toml",
+            "-o",
+            "a.png",
+            "--device",
+            "cpu",
+            "--size",
+            "200x100",
+        ],
+    );
+    assert_eq!(code, 0);
+    let (last, progress) = lines.split_last().expect("lines");
+    assert!(!progress.is_empty() && progress.len() <= 11, "{progress:?}");
+    let shares: Vec<f64> = progress.iter().map(|line| line["share"].as_f64().unwrap()).collect();
+    assert!(shares.is_sorted() && shares.last() == Some(&1.0), "{shares:?}");
+    assert!(progress.iter().all(|line| line["level"] == "progress"), "{progress:?}");
+    assert_eq!(
+        (&last["level"], &last["message"]),
+        (&"info".into(), &"render done".into())
+    );
+    assert_eq!(
+        (&last["files"][0], &last["stats"]["width"]),
+        (&"a.png".into(), &200.into())
+    );
+    // The same without lines of progress, and with all there is.
+    let (_, lines) = log(&place, &["render", "small.toml", "-o", "a.png", "--progress", "none"]);
+    assert_eq!(lines.len(), 1, "{lines:?}");
+    let (_, lines) = log(&place, &["render", "small.toml", "-o", "a.png", "--verbose"]);
+    let read = lines
+        .iter()
+        .find(|line| line["message"] == "scene read")
+        .expect("an event");
+    assert!(read["seconds"].as_f64() > Some(0.0), "{read}");
+    let (code, lines) = log(&place, &["render", "small.toml", "-o", "a.png", "--quiet"]);
+    assert_eq!((code, lines.len()), (0, 0));
+    let (_, lines) = log(&place, &["render", "small.toml", "-o", "#.png", "--frames", "1-2"]);
+    assert!(
+        lines.iter().any(|line| line["frame"] == 2 && line["share"] == 1.0),
+        "{lines:?}"
+    );
+    assert!(lines.iter().any(|line| line["level"] == "warning"), "{lines:?}");
+    // Text is as it was.
+    let ran = place.run(&["render", "small.toml", "-o", "a.png", "--log-format", "text"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+}
+
+#[test]
+fn errors_tell_their_place_and_exit_code() {
+    let place = Place::new();
+    place.write("value.toml", &SCENE.replace("radius = 0.8", "radius = -1"));
+    place.write("syntax.toml", "image = [\n[");
+    place.write("broken.gltf", "{ \"asset\": 3 }");
+    let one = |arguments: &[&str]| {
+        let (code, mut lines) = log(&place, arguments);
+        assert_eq!(lines.len(), 1, "{lines:?}");
+        let line = lines.remove(0);
+        assert_eq!(
+            (&line["level"], &line["exit_code"]),
+            (&"error".into(), &code.into()),
+            "{line}"
+        );
+        assert!(!line["message"].as_str().unwrap().starts_with("error"), "{line}");
+        line
+    };
+    let value = one(&["check", "value.toml"]);
+    assert_eq!((&value["exit_code"], &value["file"]), (&3.into(), &"value.toml".into()));
+    assert_eq!(
+        (&value["key"], &value["line"]),
+        (&"shapes[0].radius".into(), &22.into())
+    );
+    let syntax = one(&["render", "syntax.toml"]);
+    assert!(
+        syntax["line"].as_u64() > Some(0) && syntax["column"].as_u64() > Some(0),
+        "{syntax}"
+    );
+    assert_eq!(one(&["info", "nowhere.toml"])["file"], "nowhere.toml");
+    assert_eq!(one(&["check", "broken.gltf"])["file"], "broken.gltf");
+    assert_eq!(one(&["render", "small.toml", "--device", "nonesuch"])["exit_code"], 4);
+    assert_eq!(one(&["render", "small.toml", "-o", "small.toml"])["exit_code"], 2);
+    for arguments in [
+        &["render"][..],
+        &["render", "--bad"],
+        &["paint"],
+        &["render", "small.toml", "--size", "9"],
+        &[],
+    ] {
+        let usage = one(arguments);
+        assert_eq!(usage["exit_code"], 2, "{usage}");
+        assert!(
+            !usage["message"].as_str().unwrap().contains('\n') || arguments.is_empty(),
+            "{usage}"
+        );
+    }
+    // Of several scenes each has its line.
+    let (code, lines) = log(&place, &["check", "value.toml", "syntax.toml", "small.toml"]);
+    assert_eq!((code, lines.len()), (3, 2));
+    // Names that are no words are one line too.
+    let odd = one(&["render", "a\n\"b\".toml"]);
+    assert_eq!(odd["file"], "a\n\"b\".toml");
+}
+
+#[test]
+fn what_is_odd_is_a_warning_or_a_note() {
+    let place = Place::new();
+    let ran = place.run_with(
+        &[
+            "render",
+            "small.toml",
+            "-o",
+            "a.png",
+            "--log-format=json",
+            "--progress",
+            "none",
+        ],
+        &NO_DRIVER,
+    );
+    let lines = lines(&ran);
+    assert_eq!((ran.code, lines.len()), (0, 2), "{lines:?}");
+    assert_eq!(lines[0]["level"], "warning");
+    assert!(
+        lines[0]["message"]
+            .as_str()
+            .unwrap()
+            .starts_with("rendering on the CPU: "),
+        "{lines:?}"
+    );
+}
+
+#[test]
+#[cfg(unix)]
+fn a_signal_is_an_error_with_its_exit_code() {
+    super::heed_interrupts();
+    let place = Place::new();
+    let line = "$0 render small.toml --size 4000x4000 --spp 1024 --device cpu -o a.png --log-format json --progress none -v & \
+                child=$!; kill -TERM $child; wait $child";
+    // It may come before signals are heeded: then nothing is told.
+    let ran = place.shell("sh", line);
+    assert_eq!(ran.code, 143, "{}", ran.stderr);
+    let lines = lines(&ran);
+    let told = lines.iter().find(|line| line["level"] == "error");
+    assert!(
+        told.is_none_or(|line| line["exit_code"] == 143 && line["message"] == "cancelled"),
+        "{lines:?}"
+    );
+}
+
+#[test]
+#[cfg(unix)]
+fn a_stream_that_takes_nothing_ends_no_render() {
+    let place = Place::new();
+    for nowhere in ["2>/dev/full", "2>&-"] {
+        let ran = place.shell(
+            "sh",
+            &format!("$0 render small.toml -o a.png --log-format json {nowhere}"),
+        );
+        assert_eq!(ran.code, 0, "{nowhere}");
+    }
+    let ran = place.shell("sh", "$0 info small.toml --log-format json >/dev/full");
+    assert_eq!((ran.code, &lines(&ran)[0]["exit_code"]), (8, &8.into()));
+    for command in ["schema", "completions zsh", "man", "info small.toml"] {
+        let ran = place.shell("sh", &format!("$0 {command} | true"));
+        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{command}");
+        assert_eq!(
+            place.shell("sh", &format!("$0 {command} >/dev/full")).code,
+            8,
+            "{command}"
+        );
+    }
+}
