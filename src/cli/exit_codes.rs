@@ -1,7 +1,7 @@
 //! What the exit codes mean, as the manual pages tell it; the README has the same table.
 
 /// Each code with its meaning.
-pub const EXIT_CODES: [(&str, &str); 10] = [
+pub const EXIT_CODES: [(&str, &str); 11] = [
     ("0", "done; for wgray diff the same, or near enough"),
     (
         "1",
@@ -18,6 +18,10 @@ pub const EXIT_CODES: [(&str, &str); 10] = [
     ("7", "out of memory: the device's, or the machine's"),
     ("8", "a picture, a stream or another output could not be written"),
     (
+        "what --requeue-exit says",
+        "in place of 6 and of 143: the same command may succeed elsewhere or later",
+    ),
+    (
         "128 + n",
         "ended by signal n: 130 by SIGINT (Ctrl+C), 143 by SIGTERM, 129 by SIGHUP",
     ),
@@ -28,11 +32,9 @@ mod tests {
     #[test]
     fn the_readme_has_the_same_table() {
         let readme = include_str!("../../README.md").replace('`', "");
-        let rows = readme.lines().map(str::trim).filter_map(|line| {
-            let (code, meaning) = line.strip_prefix("| ")?.strip_suffix(" |")?.split_once(" | ")?;
-            code.starts_with(|c: char| c.is_ascii_digit())
-                .then_some((code, meaning))
-        });
+        let (_, table) = readme.split_once("| exit code | meaning |").expect("the table");
+        let rows = table.lines().skip(2).map(str::trim);
+        let rows = rows.map_while(|line| line.strip_prefix("| ")?.strip_suffix(" |")?.split_once(" | "));
         assert_eq!(rows.collect::<Vec<_>>(), super::EXIT_CODES);
     }
 

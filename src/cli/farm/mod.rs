@@ -38,6 +38,7 @@ pub enum Engine {
 #[derive(Debug, clap::Args)]
 #[command(after_help = super::EXIT_CODES)]
 #[command(allow_negative_numbers = true)] // so that a number out of range is told as such
+#[group(id = "farm")] // beside those of wgray render, which are among these
 pub struct Args {
     #[command(flatten)]
     own: Own,
