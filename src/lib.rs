@@ -90,6 +90,9 @@ mod picture;
 #[doc(hidden)]
 pub mod render;
 pub mod scene;
+#[doc(hidden)]
+pub mod visible;
+mod waiting;
 
 pub use device::{Device, DeviceInfo};
 pub use error::Error;

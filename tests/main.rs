@@ -17,6 +17,8 @@ mod dev;
 mod faults;
 mod gltf;
 mod grounds;
+#[cfg(unix)]
+mod hostile;
 mod inputs;
 mod integrator;
 mod jobs;

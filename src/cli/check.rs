@@ -9,6 +9,7 @@ use clap::ValueHint;
 use wgray::gpu::{Forms, check_kernels, compose::Shaders};
 use wgray::pack::pack;
 use wgray::scene::{CameraPath, Define, Overrides, Projection, Scene, SceneError};
+use wgray::visible::visible;
 
 use super::log::{self, Level};
 use super::scene_options::SceneOptions;
@@ -63,7 +64,11 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         );
         match checked {
             Ok(summary) if printed.is_ok() => {
-                printed = writeln!(io::stdout().lock(), "{}: {summary}", path.display());
+                printed = writeln!(
+                    io::stdout().lock(),
+                    "{}",
+                    visible(&format!("{}: {summary}", path.display()))
+                );
             }
             Ok(_) => {} // nobody reads any more
             Err(error) => {

@@ -13,6 +13,7 @@ use tracing::span::{Attributes, Id};
 use tracing::{Event, Subscriber};
 use tracing_subscriber::layer::{Context, Layer};
 use tracing_subscriber::registry::LookupSpan;
+use wgray::visible::{visible, visible_lines};
 
 /// How messages are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -90,7 +91,7 @@ pub fn say(level: Level, message: &str) {
 /// Says something of which more is known.
 pub fn tell(level: Level, message: &str, facts: Facts) {
     if !is_json() {
-        write(&format!("{}{message}", level.prefix()));
+        write(&visible(&format!("{}{message}", level.prefix())));
         return;
     }
     #[derive(Serialize)]
@@ -118,7 +119,7 @@ pub fn tell(level: Level, message: &str, facts: Facts) {
 /// Text that belongs to the message before it; in JSON that has it among its facts.
 pub fn explain(text: &str) {
     if !is_json() {
-        write(text);
+        write(&visible_lines(text));
     }
 }
 

@@ -4,6 +4,7 @@ use gltf::json::accessor::sparse::Sparse;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 
+use super::budget::Thing;
 use super::document::Document;
 use super::error::{Fault, GltfError};
 use super::extension;
@@ -11,6 +12,8 @@ use super::json::missing;
 
 /// The most elements of an accessor that has no bytes of its own.
 const MOST_ZEROS: u64 = 1 << 22;
+/// What reading an accessor takes besides its bytes, in bytes: there may be many of few elements.
+const BESIDE: u64 = 64;
 
 /// How the elements of an accessor lie in bytes.
 #[derive(Clone, Copy)]
@@ -206,6 +209,7 @@ impl Document {
             let rule = format!("its elements have {} numbers; here they must have {N}", layout.count());
             return Err(Fault::key(format!("{key}.type"), rule));
         }
+        self.may_read(&key, accessor, 4 * N)?;
         let mut vectors = match self.elements(&key, accessor, layout)? {
             Some(elements) => elements.vectors(),
             None => vec![[0.0; N]; accessor.count.0 as usize],
@@ -234,6 +238,7 @@ impl Document {
         if layout.count() != 1 {
             return Err(Fault::key(format!("{key}.type"), "indices must be SCALAR"));
         }
+        self.may_read(&key, accessor, size_of::<u32>())?;
         let mut indices = match self.elements(&key, accessor, layout)? {
             Some(elements) => elements.whole(),
             None => vec![0; accessor.count.0 as usize],
@@ -251,6 +256,13 @@ impl Document {
                 Err(Fault::key(key, format!("element {i} is {restart}, {rule}")))
             }
         }
+    }
+
+    /// Refuses an accessor where all that were read are too much for the file. Each element takes so many bytes in memory.
+    fn may_read(&self, key: &str, accessor: &Accessor, size: usize) -> Result<(), Fault> {
+        let bytes = accessor.count.0.saturating_mul(size as u64).saturating_add(BESIDE);
+        let room = self.budget.take(Thing::Read, bytes);
+        room.map_err(|rule| Fault::key(format!("{key}.count"), rule))
     }
 
     /// The elements of an accessor as its view has them; none where they are zeros, so many as can be.

@@ -1,5 +1,7 @@
 //! Animations: nodes at a time. Section 3.11 and appendix C.
 
+use std::collections::HashSet;
+
 use ::gltf::json::animation::{Interpolation, Property};
 use ::gltf::json::validation::Checked;
 use glam::{DQuat, DVec3};
@@ -13,10 +15,19 @@ const MOST_WEIGHTS: usize = 1 << 24;
 
 impl Document {
     /// Puts nodes where an animation has them at a time, in seconds. Before its first key and after its last it stands.
-    pub(super) fn animate(&self, poses: &mut [Pose], animation: usize, time: f64) -> Result<(), GltfError> {
+    /// What a user should know is put into `notes`.
+    pub(super) fn animate(
+        &self,
+        poses: &mut [Pose],
+        animation: usize,
+        time: f64,
+        notes: &mut Vec<String>,
+    ) -> Result<(), GltfError> {
         let place = |channel: usize| format!("animations[{animation}].channels[{channel}]");
         let animation = &self.json.animations[animation];
         let mut weights = 0;
+        let mut moved = HashSet::new();
+        let (mut equal, mut twice) = (None, None);
         for (i, channel) in animation.channels.iter().enumerate() {
             let node = channel.target.node.value();
             let sampler = animation.samplers.get(channel.sampler.value());
@@ -27,6 +38,14 @@ impl Document {
             let times: Vec<f64> = times.iter().map(|[time]| f64::from(*time)).collect();
             if times.is_empty() || !times.is_sorted() || !times.iter().all(|time| time.is_finite()) {
                 return Err(self.fault(place(i), "its times must be there, finite, and grow".to_owned()));
+            }
+            if times.windows(2).any(|pair| pair[0] == pair[1]) {
+                equal.get_or_insert(i);
+            }
+            if let Checked::Valid(path) = channel.target.path
+                && !moved.insert((node, path as u8))
+            {
+                twice.get_or_insert(i);
             }
             let Checked::Valid(interpolation) = sampler.interpolation else {
                 return Err(self.fault(place(i), "its interpolation is unknown".to_owned()));
@@ -69,6 +88,18 @@ impl Document {
                 }
                 Checked::Invalid => {} // a property of an extension
             }
+        }
+        if let Some(i) = equal {
+            notes.push(format!(
+                "{}: some of its times are the same, and each must be later than the one before; the last of these stands",
+                place(i)
+            ));
+        }
+        if let Some(i) = twice {
+            notes.push(format!(
+                "{}: moves what a channel before it moves, and there must be one for each; the last one stands",
+                place(i)
+            ));
         }
         Ok(())
     }

@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 
 use gltf::json::Root;
 
+use super::budget::{Budget, Thing};
 use super::error::Fault;
 use super::json::missing;
 use super::meshopt::{self, Compressed};
@@ -14,8 +15,6 @@ use super::uri::{self, Folder};
 
 /// The most bytes of all buffers together, and of a file.
 pub(super) const MOST_BYTES: u64 = 8 << 30;
-/// The most bytes of all compressed views together, once they are decoded.
-const MOST_DECODED: u64 = 4 << 30;
 
 /// Where the bytes of a buffer are.
 enum Bytes {
@@ -36,6 +35,8 @@ pub(super) struct Buffers {
     compressed: Vec<Option<Compressed>>,
     /// What compressed views are, once somebody has asked.
     decoded: Vec<OnceLock<Vec<u8>>>,
+    /// How many bytes all buffers that are used have.
+    total: u64,
 }
 
 impl Buffers {
@@ -49,7 +50,6 @@ impl Buffers {
     ) -> Result<Buffers, Fault> {
         let mut used = vec![false; root.buffers.len()];
         let mut compressed = Vec::with_capacity(root.buffer_views.len());
-        let mut decoded = 0u64;
         for (i, view) in root.buffer_views.iter().enumerate() {
             let how = match &view.extensions {
                 Some(all) => meshopt::compressed(&format!("bufferViews[{i}]"), &all.others, view.byte_length.0)?,
@@ -60,11 +60,6 @@ impl Buffers {
             match used.get_mut(buffer) {
                 Some(used) => *used = true,
                 None => return Err(missing(format!("bufferViews[{i}]"), buffer, root.buffers.len())),
-            }
-            decoded = decoded.saturating_add(how.map_or(0, |how| how.size()));
-            if decoded > MOST_DECODED {
-                let rule = format!("all compressed views together must have at most {MOST_DECODED} bytes");
-                return Err(Fault::key(format!("bufferViews[{i}]"), rule));
             }
             compressed.push(how);
         }
@@ -111,9 +106,25 @@ impl Buffers {
         Ok(Buffers {
             file,
             list,
+            total,
             compressed,
             decoded: root.buffer_views.iter().map(|_| OnceLock::new()).collect(),
         })
+    }
+
+    /// How many bytes all buffers that are used have.
+    pub fn total(&self) -> u64 {
+        self.total
+    }
+
+    /// Refuses compressed views that are too large once they are decoded.
+    pub fn check(&self, budget: &Budget) -> Result<(), Fault> {
+        for (i, how) in self.compressed.iter().enumerate() {
+            let size = how.map_or(0, |how| how.size());
+            let room = budget.take(Thing::Decompressed, size);
+            room.map_err(|rule| Fault::key(format!("bufferViews[{i}]"), rule))?;
+        }
+        Ok(())
     }
 
     /// The bytes of a buffer, as many as it says that it has.

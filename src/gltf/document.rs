@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use gltf::json::Root;
 
+use super::budget::Budget;
 use super::buffer::{Buffers, MOST_BYTES};
 use super::error::{Fault, GltfError};
 use super::json::missing;
@@ -27,6 +28,8 @@ pub(super) struct Document {
     pub path: PathBuf,
     /// What a user should know.
     pub notes: Vec<String>,
+    /// What it has asked for by now.
+    pub budget: Budget,
     folder: Folder,
     buffers: Buffers,
     /// How many bytes of images were asked for.
@@ -65,12 +68,13 @@ impl Document {
             root: here(root),
         };
         let mut notes = Vec::new();
-        let (mut json, file, chunk) = match glb::is_container(&file) {
+        let (mut json, text, file, chunk) = match glb::is_container(&file) {
             true => {
                 let chunks = glb::chunks(&file)?;
-                (json::root(&file[chunks.json], &mut notes)?, file, chunks.binary)
+                let text = chunks.json.len();
+                (json::root(&file[chunks.json], &mut notes)?, text, file, chunks.binary)
             }
-            false => (json::root(&file, &mut notes)?, Vec::new(), None),
+            false => (json::root(&file, &mut notes)?, file.len(), Vec::new(), None),
         };
         extension::check(&json, &mut notes)?;
         for image in &json.images {
@@ -81,10 +85,13 @@ impl Document {
             }
         }
         let buffers = Buffers::read(&mut json, file, chunk, &folder, files)?;
+        let budget = Budget::of(buffers.total().saturating_add(text as u64));
+        buffers.check(&budget)?;
         Ok(Document {
             json,
             path: path.to_owned(),
             notes,
+            budget,
             folder,
             buffers,
             given: AtomicU64::new(0),

@@ -149,6 +149,56 @@ fn cut(text: String) -> String {
     format!("{start}...{end}")
 }
 
+/// What the JSON library says of a value of the wrong type, in words of the file.
+pub(super) fn plain(message: &dyn std::fmt::Display) -> String {
+    let message = message.to_string();
+    if let Some((name, _)) = message
+        .strip_prefix("missing field `")
+        .and_then(|rest| rest.split_once('`'))
+    {
+        return format!("{} must be there", shown(name));
+    }
+    let starts = ["invalid type: ", "invalid value: ", "invalid length "];
+    let Some((start, rest)) = starts
+        .iter()
+        .find_map(|start| Some((*start, message.strip_prefix(start)?)))
+    else {
+        return message.replace('`', "\"");
+    };
+    // What the file has may have these words too.
+    let Some((found, wanted)) = rest.rsplit_once(", expected ") else {
+        return rest.replace('`', "\"");
+    };
+    let found = match found {
+        "map" => "an object".to_owned(),
+        "sequence" => "a list".to_owned(),
+        "null" | "unit value" => "null".to_owned(),
+        count if start == "invalid length " => format!("a list of {count}"),
+        _ => match (found.strip_prefix("string "), found.split_once('`')) {
+            // It is quoted as it should be.
+            (Some(text), _) if text.chars().count() <= 60 => text.to_owned(),
+            (Some(text), _) => shown(text.trim_matches('"')),
+            (None, Some((_, number))) => number.trim_end_matches('`').to_owned(),
+            (None, None) => found.to_owned(),
+        },
+    };
+    let digits: String = wanted.chars().filter(char::is_ascii_digit).collect();
+    let wanted = match wanted {
+        "f32" | "f64" => "a number".to_owned(),
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number from 0 on".to_owned(),
+        "a boolean" => "true or false".to_owned(),
+        "a string" | "a borrowed string" | "string" => "text".to_owned(),
+        "a sequence" => "a list".to_owned(),
+        "a map" | "map" => "an object".to_owned(),
+        _ if wanted.starts_with("struct ") => "an object".to_owned(),
+        _ if wanted.starts_with("an array of length ") || wanted.starts_with("a tuple of size ") => {
+            format!("a list of {digits}")
+        }
+        other => other.to_owned(),
+    };
+    format!("{found} must be {wanted}")
+}
+
 /// A name that a file gives, for a message: quoted, without its middle where it is long.
 pub(super) fn shown(name: &str) -> String {
     const LONGEST: usize = 60;
@@ -159,4 +209,56 @@ pub(super) fn shown(name: &str) -> String {
     let start: String = name.chars().take(LONGEST * 2 / 3).collect();
     let end: String = name.chars().skip(count - LONGEST / 4).collect();
     format!("{:?}", format!("{start}...{end}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::plain;
+
+    #[test]
+    fn wrong_types_are_told_in_words_of_the_file() {
+        #[derive(serde::Deserialize, Debug)]
+        #[expect(dead_code, reason = "it is for its errors")]
+        struct View {
+            name: String,
+            length: u32,
+            place: [f32; 3],
+            list: Vec<f32>,
+            is_on: bool,
+        }
+        let good = json!({ "name": "a", "length": 1, "place": [1, 2, 3], "list": [1], "is_on": true });
+        serde_json::from_value::<View>(good.clone()).unwrap();
+        for (key, value, told) in [
+            ("name", json!(3), "3 must be text"),
+            (
+                "length",
+                json!("\u{1b}[31m"),
+                "\"\\u{1b}[31m\" must be a whole number from 0 on",
+            ),
+            ("length", json!(-1), "-1 must be a whole number from 0 on"),
+            ("length", json!(1.5), "1.5 must be a whole number from 0 on"),
+            ("length", json!({}), "an object must be a whole number from 0 on"),
+            ("place", json!([1, 2]), "a list of 2 must be a list of 3"),
+            ("place", json!({}), "an object must be a list of 3"),
+            ("list", json!(null), "null must be a list"),
+            ("list", json!(["x, expected y"]), "\"x, expected y\" must be a number"),
+            ("is_on", json!(0), "0 must be true or false"),
+        ] {
+            let mut bad = good.clone();
+            bad[key] = value;
+            let error = serde_json::from_value::<View>(bad).unwrap_err();
+            assert_eq!(plain(&error), told, "{error}");
+        }
+        for (value, told) in [
+            (json!([1, 2, 3]), "3 must be text"),
+            (json!([]), "a list of 0 must be an object"),
+            (json!("x"), "\"x\" must be an object"),
+            (json!({}), "\"name\" must be there"),
+        ] {
+            let error = serde_json::from_value::<View>(value).unwrap_err();
+            assert!(plain(&error).starts_with(told), "{error}");
+        }
+    }
 }

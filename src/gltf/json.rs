@@ -6,7 +6,7 @@ use gltf::json::validation::{Checked, Error, Validate as _};
 use gltf::json::{Path, Root};
 use serde_json::{Map, Number, Value};
 
-use super::error::{Fault, Place, shown};
+use super::error::{Fault, Place, plain, shown};
 
 /// The longest text, in bytes. Data URIs make texts long.
 pub(super) const LARGEST_TEXT: usize = 512 << 20;
@@ -64,6 +64,10 @@ pub(super) fn root(text: &[u8], notes: &mut Vec<String>) -> Result<Root, Fault> 
     let mut value: Value = serde_json::from_slice(text).map_err(|error| {
         let message = error.to_string();
         let message = message.split(" at line ").next().unwrap_or_default();
+        let message = match message {
+            "recursion limit exceeded" => "lists and objects must be in each other at most 127 deep",
+            other => other,
+        };
         Fault::new(Place::Line(error.line().max(1), error.column().max(1)), message)
     })?;
     let Value::Object(top) = &mut value else {
@@ -74,7 +78,7 @@ pub(super) fn root(text: &[u8], notes: &mut Vec<String>) -> Result<Root, Fault> 
     repair(&mut value, notes);
     let root: Root = serde_path_to_error::deserialize(value).map_err(|error| {
         let key = error.path().to_string();
-        Fault::key(key, error.into_inner().to_string())
+        Fault::key(key, plain(error.inner()))
     })?;
     check(&root)?;
     Ok(root)

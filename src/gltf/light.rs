@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::UPRIGHT;
 use super::document::Document;
-use super::error::GltfError;
+use super::error::{GltfError, plain};
 use crate::scene::{DirectionalLightDescription, LightDescription, PointLightDescription, SpotLightDescription};
 
 /// The brightest colour of a light of a scene.
@@ -73,7 +73,7 @@ impl Document {
             return Err(self.fault(format!("nodes[{node}].extensions.{NAME}.light"), rule));
         };
         let place = format!("extensions.{NAME}.lights[{number}]");
-        let light = Light::deserialize(light).map_err(|error| self.fault(&place, error.to_string()))?;
+        let light = Light::deserialize(light).map_err(|error| self.fault(&place, plain(&error)))?;
         if light.range.is_some() {
             note(
                 notes,
@@ -115,6 +115,15 @@ impl Document {
                 if !(0.0..=180.0).contains(&outer) || !(0.0..=outer).contains(&inner) {
                     let rule = "its cone's angles must be 0 <= inner <= outer <= pi".to_owned();
                     return Err(self.fault(&place, rule));
+                }
+                // In degrees, rounded: a right angle is none.
+                if outer > 90.001 {
+                    note(
+                        notes,
+                        format!(
+                            "{place}: spot.outerConeAngle is larger than pi/2, as it must not be; it is taken as it is"
+                        ),
+                    );
                 }
                 SpotLightDescription {
                     direction: Some(direction),

@@ -1,12 +1,13 @@
 //! Meshes: section 3.7, with morph targets and skins as they are at the time that is shown.
 
 use std::collections::{BTreeMap, HashMap};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use ::gltf::json::mesh::{Mode, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 
+use super::budget::Thing;
 use super::document::Document;
 use super::error::GltfError;
 use super::material::{Materials, Used};
@@ -16,10 +17,20 @@ use super::tangent::{generated, unturned};
 use super::texture::LAST_SET;
 use crate::mesh::{Draft, Group, LARGEST_COORDINATE, Mesh, unit};
 
-/// The most triangles of all meshes together.
-const MOST_TRIANGLES: usize = 1 << 28;
 /// The most vertices of a mesh, those among them that no triangle has.
 const MOST_VERTICES: usize = 1 << 27;
+
+/// The sets of texture coordinates by their names.
+const TEXCOORDS: [&str; LAST_SET as usize + 1] = [
+    "TEXCOORD_0",
+    "TEXCOORD_1",
+    "TEXCOORD_2",
+    "TEXCOORD_3",
+    "TEXCOORD_4",
+    "TEXCOORD_5",
+    "TEXCOORD_6",
+    "TEXCOORD_7",
+];
 
 /// What tells meshes apart.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -89,8 +100,8 @@ pub struct Meshes<'a> {
     /// The first primitive that lacks texture coordinates which its material needs, with their set; and how many there are.
     bare: Option<(String, u32)>,
     bare_count: usize,
-    /// How many there are, of all meshes that are built by now.
-    triangles: AtomicUsize,
+    /// By attributes the first primitive that has numbers which are not finite, and how many have.
+    strange: Mutex<BTreeMap<&'static str, (String, usize)>>,
 }
 
 /// A primitive.
@@ -115,7 +126,7 @@ impl<'a> Meshes<'a> {
             lines: 0,
             bare: None,
             bare_count: 0,
-            triangles: AtomicUsize::new(0),
+            strange: Mutex::default(),
         };
         for key in keys {
             if meshes.parts.contains_key(&key.mesh) {
@@ -175,9 +186,32 @@ impl<'a> Meshes<'a> {
                 count => format!("{rule} (and {} more primitives)", count - 1),
             }
         });
+        let strange = self.strange.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let strange = strange.into_iter().map(|(name, (place, count))| {
+            let rule = format!(
+                "{place}.attributes.{name} has numbers that are not finite, which is as if they were not there"
+            );
+            match count {
+                1 => rule,
+                2 => format!("{rule} (and so has 1 more primitive)"),
+                count => format!("{rule} (and so have {} more primitives)", count - 1),
+            }
+        });
         [told(self.points, "points"), told(self.lines, "lines"), bare]
             .into_iter()
             .flatten()
+            .chain(strange)
+    }
+
+    /// Keeps in mind that an attribute has numbers that are none.
+    fn is_strange(&self, place: &str, name: &'static str) {
+        let mut strange = self.strange.lock().unwrap_or_else(PoisonError::into_inner);
+        let (first, count) = strange.entry(name).or_insert_with(|| (place.to_owned(), 0));
+        *count += 1;
+        // Meshes are built in any order.
+        if (place.len(), place) < (first.len(), first.as_str()) {
+            place.clone_into(first);
+        }
     }
 
     /// Makes a mesh; None if it has no triangles.
@@ -188,7 +222,7 @@ impl<'a> Meshes<'a> {
         let mut numbers = Vec::new();
         for part in parts {
             let used = materials.get(part.material);
-            let first = whole.vertices(self.document, part, used, key, skin.as_ref())?;
+            let first = whole.vertices(self, part, used, key, skin.as_ref())?;
             let count = whole.counts[&first];
             let triangles = self.triangles(part, count)?;
             let mirrors = key.flat().is_some_and(|map| map.matrix3.determinant() < 0.0);
@@ -242,10 +276,8 @@ impl<'a> Meshes<'a> {
             Mode::TriangleStrip | Mode::TriangleFan => indices.len(),
             _ => indices.len() / 3,
         };
-        if self.triangles.fetch_add(most, Ordering::Relaxed).saturating_add(most) > MOST_TRIANGLES {
-            let rule = format!("all meshes together must have at most {MOST_TRIANGLES} triangles");
-            return Err(self.document.fault(&part.place, rule));
-        }
+        let room = self.document.budget.take(Thing::Triangles, most as u64);
+        room.map_err(|rule| self.document.fault(&part.place, rule))?;
         let windows = indices.windows(3);
         Ok(match part.mode {
             Mode::TriangleStrip => {
@@ -303,13 +335,18 @@ impl Whole {
     /// Adds the vertices of a primitive, unless they are there; the number of the first.
     fn vertices(
         &mut self,
-        document: &Document,
+        meshes: &Meshes,
         part: &Part,
         used: &Used,
         key: &Key,
         skin: Option<&Skin>,
     ) -> Result<usize, GltfError> {
-        let primitive = part.primitive;
+        let (document, primitive) = (meshes.document, part.primitive);
+        let strange = |name: &'static str, is_finite: bool| {
+            if !is_finite {
+                meshes.is_strange(&part.place, name);
+            }
+        };
         let mut accessors = accessors(primitive);
         accessors.push(usize::from(used.tangents.is_some()));
         // What is turned differently is not the same.
@@ -347,12 +384,14 @@ impl Whole {
             Ok(Some(vectors.into_iter().map(Vec3::from_array).collect()))
         };
         let mut normals = triples("NORMAL", read(Semantic::Normals))?;
+        strange("NORMAL", normals.iter().flatten().all(|normal| normal.is_finite()));
         let tangents = read(Semantic::Tangents).filter(|_| used.tangents.is_some() && normals.is_some());
         let mut tangents = match tangents {
             None => None,
             Some(accessor) => {
                 let vectors = document.vectors::<4>(accessor)?;
                 same("TANGENT", vectors.len())?;
+                strange("TANGENT", vectors.as_flattened().iter().all(|x| x.is_finite()));
                 Some(vectors.into_iter().map(Vec4::from_array).collect::<Vec<Vec4>>())
             }
         };
@@ -426,6 +465,7 @@ impl Whole {
             let vectors = document.vectors::<2>(accessor)?;
             same(&format!("TEXCOORD_{set}"), vectors.len())?;
             let set = set as usize;
+            strange(TEXCOORDS[set], vectors.as_flattened().iter().all(|x| x.is_finite()));
             if self.uvs.len() <= set {
                 self.uvs.resize(set + 1, Vec::new());
             }
@@ -449,6 +489,7 @@ impl Whole {
                     .collect(),
             };
             same("COLOR_0", colors.len())?;
+            strange("COLOR_0", colors.iter().all(|color| color.is_finite()));
             let inside = |x: f32| if x > 0.0 { x.min(1.0) } else { 0.0 };
             self.draft.colors.resize(first, Vec4::ONE);
             let colors = colors

@@ -4,10 +4,15 @@
 
 mod accessor;
 mod animation;
+mod budget;
 mod buffer;
 mod camera;
+#[cfg(test)]
+mod changed;
 mod document;
 mod error;
+#[cfg(test)]
+mod everything;
 mod extension;
 #[cfg(test)]
 mod fuzz;
@@ -37,6 +42,7 @@ use std::time::SystemTime;
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
+use self::budget::Thing;
 use self::document::Document;
 use self::material::Materials;
 use self::mesh::{Key, Meshes};
@@ -256,12 +262,12 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
     let document = Document::open(path, root, files)?;
     let animation = document.animation(choice)?;
     let mut poses: Vec<Pose> = document.json.nodes.iter().map(Pose::of).collect();
+    let mut notes = Vec::new();
     if let Some(animation) = animation {
-        document.animate(&mut poses, animation, choice.time.unwrap_or(0.0))?;
+        document.animate(&mut poses, animation, choice.time.unwrap_or(0.0), &mut notes)?;
     }
     let nodes = Nodes::of(&document, &poses)?;
     let shown = nodes.of_scene(&document, document.scene(choice)?)?;
-    let mut notes = Vec::new();
     let mut placed = Vec::new();
     let mut numbers: HashMap<Key, usize> = HashMap::new();
     let mut keys = Vec::new();
@@ -275,13 +281,12 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
             None => nodes.globals[number],
         };
         let mut own_key = None;
-        for own in document.instances(number)? {
+        let own_maps = document.instances(number)?;
+        let room = document.budget.take(Thing::Instances, own_maps.len() as u64);
+        room.map_err(|rule| document.fault(format!("nodes[{number}]"), rule))?;
+        for own in own_maps {
             let to_world = UPRIGHT * global * own;
             total += 1;
-            if total > MOST_INSTANCES {
-                let rule = format!("there must be at most {MOST_INSTANCES} instances of meshes");
-                return Err(document.fault("nodes", rule));
-            }
             if !to_world.is_finite() {
                 flat += 1;
                 continue;

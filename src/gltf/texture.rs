@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use super::document::Document;
-use super::error::GltfError;
+use super::error::{GltfError, plain};
 use crate::scene::{Encoding, ImageTextureDescription, TextureFilter, Wrap};
 
 /// The smallest factor of a texture coordinate, and the largest factor and addend.
@@ -73,7 +73,7 @@ impl Slot {
             Some(transform) => {
                 let read = Transform::deserialize(transform);
                 read.map_err(|error| {
-                    document.fault(format!("{place}.extensions.KHR_texture_transform"), error.to_string())
+                    document.fault(format!("{place}.extensions.KHR_texture_transform"), plain(&error))
                 })?
             }
         };
@@ -98,7 +98,7 @@ impl Slot {
 
     /// What an extension names, with its `scale` if it is a normal map.
     pub fn of_value(document: &Document, place: &str, value: &Value) -> Result<(Slot, f64), GltfError> {
-        let info = Info::deserialize(value).map_err(|error| document.fault(place, error.to_string()))?;
+        let info = Info::deserialize(value).map_err(|error| document.fault(place, plain(&error)))?;
         let slot = Slot::new(document, place, (info.index, info.tex_coord), Some(&info.extensions))?;
         Ok((slot, info.scale.unwrap_or(1.0)))
     }

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 use crate::film::Region;
 use crate::pack::{Packed, PackedMesh, Specialization};
 
+/// The longest side of a picture, and the most samples of a pixel: those of scenes.
+const LARGEST: u32 = 65_536;
+
 /// All that decides on the bits of a film, and not the device that renders it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -51,6 +54,30 @@ impl Identity {
     pub fn region(&self) -> Region {
         let [x0, y0, x1, y1] = self.region;
         Region { x0, y0, x1, y1 }
+    }
+
+    /// Refuses what no job of this program has: sizes and regions that are none, of a file that somebody made.
+    pub fn check(&self) -> Result<(), String> {
+        let [width, height] = self.picture;
+        let sides = 1..=LARGEST;
+        if !sides.contains(&width) || !sides.contains(&height) {
+            return Err(format!(
+                "its picture of {width} x {height} pixels must have from 1 to {LARGEST} along a side"
+            ));
+        }
+        let region = self.region();
+        if region.is_empty() || region.within(Region::whole(width, height)) != region {
+            return Err(format!(
+                "its pixels, {region}, must lie in its picture of {width} x {height}"
+            ));
+        }
+        match sides.contains(&self.pixel_samples) {
+            true => Ok(()),
+            false => Err(format!(
+                "its {} samples of a pixel must be from 1 to {LARGEST}",
+                self.pixel_samples
+            )),
+        }
     }
 
     /// In what another job differs from this one, in words that end "it is of ..."; `None` if it is the same.
@@ -219,4 +246,44 @@ fn hash_mesh(hasher: &mut blake3::Hasher, mesh: &PackedMesh) {
 fn list(hasher: &mut blake3::Hasher, bytes: &[u8]) {
     hasher.update(&(bytes.len() as u64).to_le_bytes());
     hasher.update(bytes);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headers_of_jobs_that_cannot_be_are_refused() {
+        let good = Identity {
+            version: String::new(),
+            shaders: String::new(),
+            scene: String::new(),
+            picture: [65_536, 3],
+            region: [1, 0, 65_536, 3],
+            pixel_samples: 65_536,
+            adaptive: false,
+            layers: false,
+            exact_rounding: false,
+        };
+        good.check().unwrap();
+        for (picture, region, pixel_samples) in [
+            ([0, 3], [0, 0, 0, 3], 1),
+            ([65_537, 3], [0, 0, 1, 1], 1),
+            ([4, u32::MAX], [0, 0, 4, u32::MAX], 1),
+            ([4, 3], [0, 0, 4, 4], 1),
+            ([4, 3], [0, 0, 0, 3], 1),
+            ([4, 3], [3, 0, 2, 3], 1),
+            ([4, 3], [u32::MAX, 0, u32::MAX, 3], 1),
+            ([4, 3], [0, 0, 4, 3], 0),
+            ([4, 3], [0, 0, 4, 3], 65_537),
+        ] {
+            let bad = Identity {
+                picture,
+                region,
+                pixel_samples,
+                ..good.clone()
+            };
+            assert!(bad.check().unwrap_err().contains("must "), "{bad:?}");
+        }
+    }
 }

@@ -16,6 +16,7 @@ use crate::error::RenderError;
 use crate::film::{Form, Region};
 use crate::image::{Aov, Band, Layout, Metadata, Pending, Sink};
 use crate::scene::{ViewSettings, ViewTransform};
+use crate::waiting;
 
 /// What a picture needs besides the films of its parts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -326,6 +327,7 @@ fn open(path: &Path) -> Result<(Key, Header, PartHeader, Vec<Entry>), PartError>
         what,
     };
     let io = |error: io::Error| bad(error.to_string());
+    waiting::check(path).map_err(io)?;
     let mut file = File::open(path).map_err(io)?;
     let data = file.metadata().map_err(io)?;
     if !data.is_file() {

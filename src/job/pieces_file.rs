@@ -219,6 +219,7 @@ pub fn read_header(input: &mut impl Read) -> io::Result<(Header, Key, u64)> {
             "its format is {found}, of wgray {version}, and this program reads {FORMAT}"
         )));
     }
+    header.identity.check().map_err(|rule| bad(&rule))?;
     Ok((header, key, MAGIC.len() as u64 + input.bytes))
 }
 

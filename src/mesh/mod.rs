@@ -209,12 +209,21 @@ impl Mesh {
             file: file_beside(folder, name),
             ..Library::default()
         };
-        match read_library(folder, &library.file) {
-            Ok(bytes) => {
-                let (materials, problems) = mtl::read(&bytes);
+        // Each is read once, however often it is named, and no more of them than lines may name.
+        let is_known = self.libraries.iter().any(|known| known.file == library.file);
+        if is_known || self.libraries.len() >= obj::MOST_LIBRARIES {
+            return;
+        }
+        let read = read_library(folder, &library.file).and_then(|bytes| mtl::read(&bytes));
+        match read {
+            Ok(mtl::Mtl {
+                materials,
+                problems,
+                problem_count,
+            }) => {
                 library.materials = materials;
                 if let Some(problem) = problems.first() {
-                    let others = match problems.len() - 1 {
+                    let others = match problem_count - 1 {
                         0 => String::new(),
                         1 => "; 1 more line cannot be read".to_owned(),
                         count => format!("; {count} more lines cannot be read"),

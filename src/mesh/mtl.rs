@@ -4,14 +4,31 @@
 use super::MtlMaterial;
 use super::words::{Words, number};
 
-/// Reads the materials of a file. Messages begin with the line.
-pub(super) fn read(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
+/// The most materials of a file: each takes a few hundred bytes, and may have nine in the file.
+pub(super) const MOST_MATERIALS: usize = 1 << 16;
+/// How many lines that cannot be read are told apart.
+const MOST_PROBLEMS: usize = 100;
+
+/// What is in a file.
+#[derive(Debug, Default)]
+pub(super) struct Mtl {
+    pub materials: Vec<MtlMaterial>,
+    /// The first lines that cannot be read, each with the rule, and how many there are.
+    pub problems: Vec<String>,
+    pub problem_count: usize,
+}
+
+/// Reads the materials of a file. Messages begin with the line. The error is a rule that the whole file breaks.
+pub(super) fn read(bytes: &[u8]) -> Result<Mtl, String> {
     let mut words = Words::new(bytes);
     let mut materials: Vec<MtlMaterial> = Vec::new();
-    let mut problems = Vec::new();
+    let (mut problems, mut problem_count) = (Vec::new(), 0);
     while let Some(keyword) = words.anywhere() {
         let line = words.line();
         if keyword.eq_ignore_ascii_case(b"newmtl") {
+            if materials.len() >= MOST_MATERIALS {
+                return Err(format!("it must have at most {MOST_MATERIALS} materials"));
+            }
             materials.push(MtlMaterial {
                 name: words.name(),
                 line,
@@ -20,11 +37,18 @@ pub(super) fn read(bytes: &[u8]) -> (Vec<MtlMaterial>, Vec<String>) {
         } else if let Some(material) = materials.last_mut()
             && let Err(fault) = set(material, &keyword.to_ascii_lowercase(), &mut words)
         {
-            problems.push(fault);
+            problem_count += 1;
+            if problems.len() < MOST_PROBLEMS {
+                problems.push(fault);
+            }
         }
         words.next_line();
     }
-    (materials, problems)
+    Ok(Mtl {
+        materials,
+        problems,
+        problem_count,
+    })
 }
 
 /// Sets a field of a material by a line. The error is the line and the rule.
@@ -130,7 +154,9 @@ mod tests {
         let text = "# two\nKd 9 9 9\nnewmtl dark red\nKd 0.5 0.1 0.2\nKs 0.25\nNs 10\nKe 1 2 3\nd 0.5\nNi 1.5\nillum 2\n\
                     map_Kd -s 2 2 -clamp on my wood.png\nmap_Bump b.png\nMAP_BUMP b.png\nmap_Ka a.png\n\nNewMtl glass\r\ntr 0.75\r\n\
                     map_kd \"a.png\"\r\n";
-        let (materials, problems) = read(text.as_bytes());
+        let Mtl {
+            materials, problems, ..
+        } = read(text.as_bytes()).unwrap();
         assert_eq!(problems, Vec::<String>::new());
         let red = MtlMaterial {
             name: "dark red".to_string(),
@@ -157,7 +183,9 @@ mod tests {
 
     #[test]
     fn what_cannot_be_read_is_told() {
-        let (materials, problems) = read(b"newmtl a\nKd spectral a.rfl\nNs inf\nKd 1 b\nd 0.5");
+        let Mtl {
+            materials, problems, ..
+        } = read(b"newmtl a\nKd spectral a.rfl\nNs inf\nKd 1 b\nd 0.5").unwrap();
         assert_eq!(
             problems,
             [
@@ -167,5 +195,22 @@ mod tests {
             ]
         );
         assert_eq!((materials[0].diffuse, materials[0].opacity), (None, Some(0.5)));
+    }
+
+    #[test]
+    fn files_of_lines_alone_take_little() {
+        let bad = format!("newmtl a\n{}", "Kd x\n".repeat(100_000));
+        let Mtl {
+            problems,
+            problem_count,
+            ..
+        } = read(bad.as_bytes()).unwrap();
+        assert_eq!((problems.len(), problem_count), (MOST_PROBLEMS, 100_000));
+        let many = |count: usize| read("newmtl a\n".repeat(count).as_bytes());
+        assert_eq!(many(MOST_MATERIALS).unwrap().materials.len(), MOST_MATERIALS);
+        assert_eq!(
+            many(MOST_MATERIALS + 1).unwrap_err(),
+            "it must have at most 65536 materials"
+        );
     }
 }

@@ -152,7 +152,11 @@ impl Broken {
                 let message = whole.rsplit_once(" at line ").map_or(&*whole, |(message, _)| message);
                 let message = message
                     .replace(", expected any valid TOML value", "")
-                    .replace('`', "\"");
+                    .replace('`', "\"")
+                    .replace(
+                        "recursion limit exceeded",
+                        "lists and objects must be in each other at most 127 deep",
+                    );
                 (line, column, Problem { key, message }.to_string())
             }
             Broken::Value(problem) => {

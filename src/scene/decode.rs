@@ -13,6 +13,10 @@ pub(super) const LONGEST_SIDE: u32 = 16_384;
 /// What a decoder may take beside the image, in bytes: rows, tables, the parts of a compressed file.
 const BESIDE: usize = 64 << 20;
 
+/// What the values of an image may take while it is decoded, in bytes, and how many more for a byte of its file: a small file may be an
+/// image of 16,384 x 16,384 zeros.
+const LARGEST: (u64, u64) = (512 << 20, 32);
+
 /// What a header says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
@@ -39,6 +43,8 @@ pub(super) enum Refused {
     Image(ImageError),
     /// By a rule, which is told.
     Rule(String),
+    /// By a rule that is told behind its name.
+    Large(String),
     /// It has other channels than those that are read.
     Channels(Channels),
 }
@@ -86,7 +92,10 @@ pub(super) fn decode(
         return decode_png(bytes, fits);
     }
     if format == ImageFormat::OpenExr
-        && let Some(image) = gray_exr(bytes, |header| check(header, &fits))?
+        && let Some(image) = gray_exr(bytes, |header| {
+            check(header, &fits)?;
+            weigh(bytes, (header.width, header.height), 3 * size_of::<f32>() as u64)
+        })?
     {
         return Ok(image);
     }
@@ -100,7 +109,21 @@ pub(super) fn decode(
     let color = decoder.color_type();
     let is_deep = color.bytes_per_pixel() > color.channel_count();
     check(Header { width, height, is_deep }, &fits)?;
+    weigh(bytes, (width, height), color.bytes_per_pixel().into())?;
     Ok(DynamicImage::from_decoder(decoder)?)
+}
+
+/// Refuses an image whose values take far more than its file has bytes.
+fn weigh(file: &[u8], (width, height): (u32, u32), bytes_of_texel: u64) -> Result<(), Refused> {
+    let bytes = u64::from(width) * u64::from(height) * bytes_of_texel;
+    let length = file.len() as u64;
+    let most = LARGEST.0 + length * LARGEST.1;
+    match bytes <= most {
+        true => Ok(()),
+        false => Err(Refused::Large(format!(
+            "has {width} x {height} texels, which take {bytes} bytes; of a file of {length} bytes they must take at most {most}"
+        ))),
+    }
 }
 
 fn check(header: Header, fits: impl Fn(Header) -> Result<(), String>) -> Result<(), Refused> {
@@ -124,6 +147,9 @@ fn decode_png(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Resu
     check(Header { width, height, is_deep }, fits)?;
     let mut reader = decoder.read_info()?;
     let size = reader.output_buffer_size();
+    let (color, depth) = reader.output_color_type();
+    let bytes_of_texel = color.samples() as u64 * if depth == png::BitDepth::Sixteen { 2 } else { 1 };
+    weigh(bytes, (width, height), bytes_of_texel)?;
     let mut values = vec![0; size.ok_or_else(|| LimitErrorKind::InsufficientMemory.into_error())?];
     reader.next_frame(&mut values)?;
     let color = reader.output_color_type().0;

@@ -18,6 +18,8 @@ use crate::mesh::Mesh;
 
 /// The largest file, in bytes.
 const LARGEST_FILE: u64 = 512 << 20;
+/// The first bytes of a file for GPUs, which glTF files may have (Khronos Group, "KTX File Format", version 2.0).
+const KTX2: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
 /// The largest texel, as of any colour.
 const BRIGHTEST: f32 = 1e6;
 
@@ -137,8 +139,14 @@ impl Assets {
         let format = image::guess_format(&bytes)
             .ok()
             .filter(|format| NAMES.iter().any(|(known, _)| known == format));
-        let format = format.ok_or_else(|| format!("{file:?} must be a PNG, JPEG, WebP, EXR or HDR file"))?;
         let is_named = matches!(place, Place::File(_));
+        let format = format.ok_or_else(|| match is_named {
+            true => format!("{file:?} must be a PNG, JPEG, WebP, EXR or HDR file"),
+            false if bytes.starts_with(KTX2) => {
+                format!("{file:?} is a KTX2 file, which is not read; it must be a PNG, JPEG or WebP file")
+            }
+            false => format!("{file:?} must be a PNG, JPEG or WebP file"),
+        })?;
         if is_named {
             check_name(file, format)?;
         }
@@ -164,6 +172,7 @@ impl Assets {
         };
         let decoded = decode(&bytes, format, fits).map_err(|refused| match refused {
             Refused::Rule(rule) => rule,
+            Refused::Large(rule) => format!("{file:?} {rule}"),
             Refused::Channels(channels) => format!("{file:?} {}", refused_channels(&channels)),
             Refused::Image(error) => format!("{file:?} {}", refused_image(&error)),
         })?;

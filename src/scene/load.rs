@@ -18,6 +18,7 @@ use super::{
     SamplesDescription, Scene,
 };
 use crate::gltf::GltfError;
+use crate::waiting;
 
 /// The largest scene file in bytes: far above what anyone writes, far below what fills the memory.
 const LARGEST_FILE: u64 = 64 << 20;
@@ -291,6 +292,7 @@ fn read_text(path: &Path) -> Result<String, SceneError> {
 }
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
+    waiting::check(path)?;
     if path.is_dir() {
         return Err(io::Error::new(
             io::ErrorKind::IsADirectory,

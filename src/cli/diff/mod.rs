@@ -13,6 +13,7 @@ use png::{BitDepth, ColorType, Compression, Encoder, EncodingError};
 use wgray::compare::{self, COLOR, Flip, Kind, Layer, Picture, layer_of};
 use wgray::error::RenderError;
 use wgray::image::{Output, Pending};
+use wgray::visible::visible_lines;
 
 use super::Usage;
 use measure::measure;
@@ -154,7 +155,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let text = match args.json {
         true => serde_json::to_string_pretty(&report)? + "\n",
-        false => report.to_string(),
+        false => visible_lines(&report.to_string()).into_owned(),
     };
     let printed = io::stdout().lock().write_all(text.as_bytes());
     if let Some((output, layer, flip)) = shown {

@@ -9,7 +9,7 @@ use exr::error::Error;
 use exr::meta::attribute::SampleType;
 use exr::meta::header::Header;
 
-use super::read::{Source, Unreadable, room};
+use super::read::{Source, Unreadable, check, length_of, room};
 use super::{Channel, Kind, Picture, Plane};
 
 impl From<Error> for Unreadable {
@@ -25,6 +25,7 @@ impl From<Error> for Unreadable {
 
 /// Block by block, so that nothing but the picture's own values is in memory.
 pub(super) fn read(source: &mut dyn Source) -> Result<Picture, Unreadable> {
+    let length = length_of(source)?;
     let reader = exr::block::read(source, false)?;
     let headers = reader.headers().to_vec();
     let first = headers
@@ -44,6 +45,11 @@ pub(super) fn read(source: &mut dyn Source) -> Result<Picture, Unreadable> {
     let (Some(columns), Some(rows)) = (side(width), side(height)) else {
         return Err(Unreadable::Damaged("it has no pixels".to_owned()));
     };
+    let channels = headers.iter().flat_map(|header| &header.channels.list);
+    let pixel = channels
+        .map(|channel| channel.sample_type.bytes_per_sample() as u64)
+        .sum();
+    check(length, columns.into(), rows.into(), pixel)?;
     let names = names(&headers)?;
     let mut planes = Vec::new();
     for header in &headers {

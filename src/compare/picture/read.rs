@@ -8,12 +8,17 @@ use std::sync::Arc;
 use image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader, Limits};
 
 use super::{Channel, Kind, Picture, Plane};
+use crate::waiting;
 
 /// What a decoder may take beside the picture, in bytes.
 const BESIDE: usize = 64 << 20;
 
 /// The most pixels that a byte of a JPEG can stand for: each block of 8 x 8 takes a bit, and covers up to 32 x 32 pixels.
 const PIXELS_OF_JPEG: u64 = 8 * 32 * 32;
+
+/// The most bytes that a picture's values take, and how many more they may take for a byte of its file: a small file may be a picture
+/// of 65,536 x 65,536 zeros.
+const LARGEST: (u64, u64) = (1 << 30, 256);
 
 /// Why there is no picture.
 #[derive(Debug, thiserror::Error)]
@@ -37,6 +42,22 @@ pub enum Unreadable {
     /// It is a picture of a kind that is not read.
     #[error("is of a kind that is not read: {0}")]
     Kind(String),
+    /// It takes far more memory than its file has bytes.
+    #[error(
+        "has {width} x {height} pixels, which take {bytes} bytes; of a file of {length} bytes they must take at most {most}"
+    )]
+    Large {
+        /// Columns.
+        width: u64,
+        /// Rows.
+        height: u64,
+        /// What its values take.
+        bytes: u64,
+        /// The bytes of the file.
+        length: u64,
+        /// What they may take.
+        most: u64,
+    },
     /// It does not fit memory.
     #[error("does not fit memory: {width} x {height} pixels take {bytes} bytes")]
     Memory {
@@ -65,6 +86,7 @@ impl Picture {
             io::stdin().lock().read_to_end(&mut bytes)?;
             return Picture::decode(bytes);
         }
+        waiting::check(path)?;
         let mut file = File::open(path)?;
         let data = file.metadata()?;
         if data.is_dir() {
@@ -104,6 +126,22 @@ fn decode(source: &mut dyn Source) -> Result<Picture, Unreadable> {
     }
 }
 
+/// Refuses a picture whose values take far more than its file has bytes.
+pub(super) fn check(length: u64, width: u64, height: u64, bytes_of_pixel: u64) -> Result<(), Unreadable> {
+    let bytes = width.saturating_mul(height).saturating_mul(bytes_of_pixel);
+    let most = LARGEST.0.saturating_add(length.saturating_mul(LARGEST.1));
+    match bytes <= most {
+        true => Ok(()),
+        false => Err(Unreadable::Large {
+            width,
+            height,
+            bytes,
+            length,
+            most,
+        }),
+    }
+}
+
 /// Room for values, if there is as much memory.
 pub(super) fn room<T>(width: u64, height: u64, count: u64) -> Result<Vec<T>, Unreadable> {
     let refused = Unreadable::Memory {
@@ -133,8 +171,16 @@ impl From<png::DecodingError> for Unreadable {
     }
 }
 
+/// How many bytes there are; they are read from the first on after that.
+pub(super) fn length_of(source: &mut dyn Source) -> io::Result<u64> {
+    let length = source.seek(SeekFrom::End(0))?;
+    source.seek(SeekFrom::Start(0))?;
+    Ok(length)
+}
+
 /// Row by row, so that nothing but the picture's own values is in memory.
 fn png(source: &mut dyn Source) -> Result<Picture, Unreadable> {
+    let length = length_of(source)?;
     let mut options = png::DecodeOptions::default();
     options.set_ignore_text_chunk(true);
     options.set_ignore_iccp_chunk(true);
@@ -148,6 +194,7 @@ fn png(source: &mut dyn Source) -> Result<Picture, Unreadable> {
     let samples = color.samples();
     let is_deep = depth == png::BitDepth::Sixteen;
     let (columns, rows) = (u64::from(width), u64::from(height));
+    check(length, columns, rows, samples as u64 * if is_deep { 2 } else { 1 })?;
     let mut planes = Planes::new(columns, rows, samples, is_deep)?;
     if is_interlaced {
         let size = reader.output_buffer_size().unwrap_or(usize::MAX) as u64;
@@ -232,8 +279,7 @@ impl Planes {
 
 /// Files that the image library reads whole.
 fn other(source: &mut dyn Source, format: ImageFormat) -> Result<Picture, Unreadable> {
-    let length = source.seek(SeekFrom::End(0))?;
-    source.seek(SeekFrom::Start(0))?;
+    let length = length_of(source)?;
     let mut reader = ImageReader::with_format(source, format);
     reader.limits(Limits::no_limits());
     let decoder = reader.into_decoder().map_err(refused)?;
@@ -247,6 +293,7 @@ fn other(source: &mut dyn Source, format: ImageFormat) -> Result<Picture, Unread
         )));
     }
     let color = decoder.color_type();
+    check(length, width.into(), height.into(), color.bytes_per_pixel().into())?;
     // asked for before the library does, which would end the program
     drop(room::<u8>(width.into(), height.into(), decoder.total_bytes())?);
     let image = DynamicImage::from_decoder(decoder).map_err(refused)?;

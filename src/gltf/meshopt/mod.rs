@@ -11,7 +11,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use self::filter::Filter;
-use super::error::{Fault, shown};
+use super::error::{Fault, plain, shown};
 
 /// The extensions' names, the one that goes first before the other.
 const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
@@ -60,7 +60,7 @@ pub(super) fn compressed(key: &str, others: &Map<String, Value>, length: u64) ->
     };
     let key = format!("{key}.extensions.{name}");
     let said: Said = serde_path_to_error::deserialize(said)
-        .map_err(|error| Fault::key(format!("{key}.{}", error.path()), error.inner().to_string()))?;
+        .map_err(|error| Fault::key(format!("{key}.{}", error.path()), plain(error.inner())))?;
     let fault = |field: &str, value: &dyn std::fmt::Display, rule: &str| {
         Err(Fault::key(format!("{key}.{field}"), format!("{value} {rule}")))
     };

@@ -1,7 +1,7 @@
 //! Shapes of type `gltf` as what they stand for: meshes in memory and their instances, textures of images in memory, materials
 //! and lights. What is behind this knows nothing of glTF.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -28,7 +28,17 @@ pub struct Expanded {
     /// The files as they were read, which are kept as long as the scene is.
     pub imported: Vec<Arc<Imported>>,
     origins: Vec<Origin>,
+    /// How many shapes name each file.
+    numbers: BTreeMap<String, usize>,
+    prefixes: BTreeSet<String>,
+    /// How many things all shapes have brought, and some more for each.
+    brought: usize,
 }
+
+/// The most things that all glTF files of a scene bring: instances, meshes, materials and lights, each as often as a shape names its file.
+const MOST_BROUGHT: usize = 1 << 21;
+/// What a shape counts for besides what it brings.
+const SHAPE: usize = 16;
 
 /// What a shape brought.
 struct Origin {
@@ -48,13 +58,20 @@ impl Expanded {
             notes: Vec::new(),
             imported: Vec::new(),
             origins: Vec::new(),
+            numbers: BTreeMap::new(),
+            prefixes: BTreeSet::new(),
+            brought: 0,
         };
         for (i, shape) in description.shapes.iter().enumerate() {
             if let ShapeDescription::Gltf(gltf) = shape {
                 expanded.add(i, gltf, files).at(i).at("shapes")?;
             }
         }
-        if let Some((longest, bytes)) = longest_side(&expanded.description, &expanded.assets) {
+        let fitting = longest_side(&expanded.description, &expanded.assets).map_err(|rule| {
+            let first = expanded.origins.first().map_or(0, |origin| origin.shape);
+            Problem::of("file", rule).at(first).at("shapes")
+        })?;
+        if let Some((longest, bytes)) = fitting {
             expanded.assets.longest_side = Some(longest);
             let gib = bytes as f64 / f64::from(1 << 30);
             expanded.notes.push(format!(
@@ -104,6 +121,19 @@ impl Expanded {
         let choice = Choice::of(gltf)?;
         let read = load(&path, &self.assets.root, &choice, files);
         let imported = read.map_err(|error| Problem::new(error.to_string())).at("file")?;
+        let counts = [
+            imported.instances.len(),
+            imported.meshes.len(),
+            imported.materials.len(),
+            imported.lights.len(),
+        ];
+        self.brought += SHAPE + counts.iter().sum::<usize>();
+        if self.brought > MOST_BROUGHT {
+            let rule = format!(
+                "all shapes of type \"gltf\" together must bring at most {MOST_BROUGHT} instances, meshes, materials and lights"
+            );
+            return Err(Problem::of("file", rule));
+        }
         let prefix = self.prefix(&gltf.file);
         let names = self.materials(gltf, &imported, &prefix)?;
         let mesh_name = |i: usize| format!("{prefix}meshes[{i}]");
@@ -147,11 +177,19 @@ impl Expanded {
     }
 
     /// What the names begin with that a file brings: another one for each shape.
-    fn prefix(&self, file: &str) -> String {
-        let is_taken = |prefix: &String| self.origins.iter().any(|origin| origin.prefix == *prefix);
-        let numbered = (2..).map(|i| format!("{file} ({i})/"));
-        let mut prefixes = std::iter::once(format!("{file}/")).chain(numbered);
-        prefixes.find(|prefix| !is_taken(prefix)).unwrap_or_default()
+    fn prefix(&mut self, file: &str) -> String {
+        let number = self.numbers.entry(file.to_owned()).or_default();
+        loop {
+            *number += 1;
+            let prefix = match *number {
+                1 => format!("{file}/"),
+                i => format!("{file} ({i})/"),
+            };
+            // Another file may have such a name.
+            if self.prefixes.insert(prefix.clone()) {
+                return prefix;
+            }
+        }
     }
 
     /// The names of the file's materials here: the scene's where it has others for them.

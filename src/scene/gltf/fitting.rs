@@ -8,12 +8,17 @@ use super::super::texture::{levels, words};
 use super::super::validate::TEXEL_MEMORY;
 use super::super::{Assets, Channel, Description, Encoding, MaterialDescription, TextureDescription, ValueDescription};
 
+/// The most texels that are decoded of all images together, and how many more for a byte of their files: it takes long, and a small
+/// file may have many.
+const TEXELS: (u64, u64) = (1 << 28, 64);
 /// What is left for other textures and surroundings, in bytes.
 const OTHERS: u64 = 128 << 20;
 
 /// An image, and how many times it is kept: as colours, as numbers, and for its alpha.
 struct Kept {
     header: Header,
+    /// The bytes of its file.
+    length: u64,
     times: u64,
     has_levels: bool,
 }
@@ -29,19 +34,30 @@ impl Kept {
     }
 }
 
-/// The longest side of images such that they fit, and the bytes that they take as they are; None if they fit as they are.
-pub fn longest_side(description: &Description, assets: &Assets) -> Option<(u32, u64)> {
+/// The longest side of images such that they fit, and the bytes that they take as they are; None if they fit as they are. The
+/// error is the rule that they break.
+pub fn longest_side(description: &Description, assets: &Assets) -> Result<Option<(u32, u64)>, String> {
     let kept = kept(description, assets);
+    let texels = |of: &Kept| u64::from(of.header.width) * u64::from(of.header.height) * of.times;
+    let (texels, bytes) = kept.iter().fold((0_u64, 0_u64), |(texels_before, bytes), image| {
+        (texels_before.saturating_add(texels(image)), bytes + image.length)
+    });
+    let most = TEXELS.0 + bytes * TEXELS.1;
+    if texels > most {
+        return Err(format!(
+            "the images of all glTF files have {texels} texels together; of files of {bytes} bytes they must be at most {most}"
+        ));
+    }
     let all = |longest: u32| kept.iter().map(|image| image.bytes(longest)).sum::<u64>();
     let whole = all(LONGEST_SIDE);
     if whole <= TEXEL_MEMORY - OTHERS {
-        return None;
+        return Ok(None);
     }
     let mut longest = LONGEST_SIDE;
     while longest > 1 && all(longest) > TEXEL_MEMORY - OTHERS {
         longest /= 2;
     }
-    Some((longest, whole))
+    Ok(Some((longest, whole)))
 }
 
 fn kept(description: &Description, assets: &Assets) -> Vec<Kept> {
@@ -65,8 +81,10 @@ fn kept(description: &Description, assets: &Assets) -> Vec<Kept> {
         }
     }
     let kept = files.into_iter().filter_map(|(file, (parts, has_levels))| {
+        let bytes = assets.encoded.get(file)?;
         Some(Kept {
-            header: header(assets.encoded.get(file)?)?,
+            header: header(bytes)?,
+            length: bytes.len() as u64,
             times: parts.len() as u64,
             has_levels,
         })
@@ -121,7 +139,7 @@ mod tests {
         description
             .textures
             .insert("d".to_owned(), texture("small", Encoding::Srgb));
-        assert_eq!(longest_side(&description, &assets), None);
+        assert_eq!(longest_side(&description, &assets), Ok(None));
         for i in 0..4 {
             let name = format!("large {i}");
             let bytes = assets.encoded["large"].clone();
@@ -130,7 +148,7 @@ mod tests {
                 .textures
                 .insert(name.clone(), texture(&name, Encoding::Srgb));
         }
-        let (longest, bytes) = longest_side(&description, &assets).unwrap();
+        let (longest, bytes) = longest_side(&description, &assets).unwrap().unwrap();
         assert_eq!(longest, 4096);
         assert!((1.0e9..1.1e9).contains(&(bytes as f64)), "{bytes}");
         assets.longest_side = Some(16);

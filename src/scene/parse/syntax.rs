@@ -3,20 +3,41 @@
 use std::collections::BTreeMap;
 
 use crate::scene::error::{KeyPath, SceneError, Segment, cut};
+use crate::visible::visible;
 
 /// The message of bytes that are no text.
 pub(in crate::scene) const NOT_UTF8: &str = "not valid UTF-8";
 
 /// The error of a text that goes wrong at the byte `at`; `message` is what the parser says.
 pub(in crate::scene) fn syntax_error(text: &str, origin: &str, at: usize, message: &str) -> SceneError {
-    let at = text.floor_char_boundary(at);
+    let at = match message.contains(DEEP) && at == 0 {
+        true => deepest_line(text), // of names with points the parser says no place
+        false => text.floor_char_boundary(at),
+    };
     let line_start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
     SceneError::Syntax {
         origin: origin.to_owned(),
         line: super::line_number(text, at),
         column: text[line_start..at].chars().count() + 1,
-        message: explain(text, at, message),
+        message: visible(&explain(text, at, message)).into_owned(),
     }
+}
+
+/// What the parser says of names with too many points.
+const DEEP: &str = "recursion limit";
+
+/// Where the first line begins that has the most points, which is where they are too many.
+fn deepest_line(text: &str) -> usize {
+    let points = |line: &str| line.bytes().filter(|byte| *byte == b'.').count();
+    let (mut at, mut deepest) = (0, (0, 0));
+    for line in text.split_inclusive('\n') {
+        let count = points(line);
+        if count > deepest.0 {
+            deepest = (count, at);
+        }
+        at += line.len();
+    }
+    deepest.1
 }
 
 fn explain(text: &str, at: usize, message: &str) -> String {
@@ -26,7 +47,9 @@ fn explain(text: &str, at: usize, message: &str) -> String {
     let place = Place::of(text, at);
     let token = token(text, at);
     let shown = cut(token);
-    let rule = if message == "duplicate key" {
+    let rule = if message.contains(DEEP) || message.contains("recurse") {
+        "tables and lists must be in each other at most 80 deep".to_owned()
+    } else if message == "duplicate key" {
         return twice(text, &place, name(text, at));
     } else if message.contains("mantissa") {
         let digits = token.trim_start_matches(['+', '-']);
@@ -94,6 +117,11 @@ fn token(text: &str, at: usize) -> &str {
     let start = text[..at]
         .rfind(ends)
         .map_or(0, |end| end + text[end..].chars().next().map_or(1, char::len_utf8));
+    // In a list it is the value behind the last comma.
+    let start = match is_in_list(text, start) {
+        true => text[start..at].rfind(',').map_or(start, |comma| start + comma + 1),
+        false => start,
+    };
     // A comma parts the values of a list, but may be meant as a point.
     let end = text[at..].find(ends).map_or(text.len(), |end| at + end);
     let all = &text[start..end];
@@ -265,6 +293,21 @@ fov = 45
                 "up = [.1, .2, 1]",
                 "8:7: camera.up: .1 must have a digit before its point, as 0.1 has",
             ),
+            (
+                "up = [1,.5,0]",
+                "8:9: camera.up: .5 must have a digit before its point, as 0.5 has",
+            ),
+            (
+                "up = [1,2.,0]",
+                "8:11: camera.up: 2. must have a digit after its point, as 2.0 has",
+            ),
+            (
+                "up = [0,-.5,0]",
+                "8:10: camera.up: -.5 must have a digit before its point, as -0.5 has",
+            ),
+            ("up = [1,05,0]", "8:9: camera.up: 05 must not begin with 0"),
+            ("up = [1,,0]", "8:9: camera.up: extra comma in array, expected value"),
+            ("a\u{1b}[31m=1", "8:2: a\\u{1b}[31m=1 must be KEY = VALUE"),
             (
                 "up = [\n  0, # none\n  .1, 1]",
                 "10:3: camera.up: .1 must have a digit before its point, as 0.1 has",

@@ -1,0 +1,14 @@
+//! The text of a scene in a course's JSON.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use wgray::Scene;
+use wgray_fuzz::{render, small};
+
+fuzz_target!(|bytes: &[u8]| {
+    if let Ok(text) = std::str::from_utf8(bytes)
+        && let Ok(scene) = Scene::parse_with(text, "a.json", &small())
+    {
+        render(&scene);
+    }
+});

@@ -1,0 +1,33 @@
+//! A glTF file that has everything, with some values of its JSON and some words of its bytes changed; the whole way to a picture.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use wgray::Scene;
+use wgray_fuzz::{Choices, changed, container, everything, file, render, small};
+
+fuzz_target!(|bytes: &[u8]| {
+    let mut choices = Choices(bytes);
+    let (mut json, mut binary) = everything();
+    let animated = choices.below(2) == 1;
+    for _ in 0..choices.below(4) {
+        changed(&mut json, &mut |count| choices.below(count));
+    }
+    let words = binary.len() / 4;
+    while choices.are_left() {
+        let at = choices.below(words) * 4;
+        let strange = [f32::NAN, f32::INFINITY, -3e38, 1e-40, 1e9, 0.0].map(f32::to_bits);
+        let word = match choices.below(8) {
+            i @ 0..6 => strange[i],
+            _ => choices.word(),
+        };
+        binary[at..at + 4].copy_from_slice(&word.to_le_bytes());
+    }
+    let mut overrides = small();
+    if animated {
+        overrides.gltf.time = Some(0.7);
+        overrides.gltf.variant = Some(wgray::scene::Selection::Number(1));
+    }
+    if let Ok(scene) = Scene::load_with(file("a.glb", &container(&json, &binary)), &overrides) {
+        render(&scene);
+    }
+});

@@ -1,0 +1,12 @@
+//! The bytes of a glTF file, with or without a container.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use wgray::Scene;
+use wgray_fuzz::{file, render, small};
+
+fuzz_target!(|bytes: &[u8]| {
+    if let Ok(scene) = Scene::load_with(file("a.gltf", bytes), &small()) {
+        render(&scene);
+    }
+});

@@ -1,0 +1,10 @@
+//! The bytes of a picture that wgray diff reads.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use wgray::compare::Picture;
+use wgray_fuzz::file;
+
+fuzz_target!(|bytes: &[u8]| {
+    let _ = Picture::read(&file("a", bytes));
+});

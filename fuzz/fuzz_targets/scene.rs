@@ -1,0 +1,50 @@
+//! The whole way: a scene with some of its values changed, to a description, to a scene, to a picture, and to a file and back.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use serde_json::Value;
+use wgray::Description;
+use wgray::scene::Assets;
+use wgray::{Overrides, Scene};
+use wgray_fuzz::{Choices, changed, render, small};
+
+const SCENES: [&str; 12] = [
+    include_str!("../../scenes/balls-checker.toml"),
+    include_str!("../../scenes/cornell-path.toml"),
+    include_str!("../../scenes/cornell.toml"),
+    include_str!("../../scenes/ellipsoids.toml"),
+    include_str!("../../scenes/ground-grid.toml"),
+    include_str!("../../scenes/lens.toml"),
+    include_str!("../../scenes/lights.toml"),
+    include_str!("../../scenes/materials.toml"),
+    include_str!("../../scenes/mirror-glass.toml"),
+    include_str!("../../scenes/orthographic.toml"),
+    include_str!("../../scenes/panorama.toml"),
+    include_str!("../../scenes/turntable.toml"),
+];
+
+fuzz_target!(|bytes: &[u8]| {
+    let mut choices = Choices(bytes);
+    let text = SCENES[choices.below(SCENES.len())];
+    let mut file: Value = toml::from_str(text).expect("a scene");
+    while choices.are_left() {
+        changed(&mut file, &mut |count| choices.below(count));
+    }
+    // What has no form in TOML stays as it was.
+    let Ok(text) = toml::to_string(&file) else { return };
+    let Ok(description) = Description::parse(&text, "a.toml") else {
+        return;
+    };
+    let written = description.to_toml().expect("a text");
+    let again = Description::parse(&written, "a.toml").expect("what was written");
+    assert_eq!(again.to_toml().ok(), Some(written));
+    let _ = description.validate_with(&Assets::default());
+    let overrides = Overrides {
+        pixel_pattern: Some(wgray::scene::Pattern::Random),
+        frame: (choices.byte() % 2 == 1).then_some(2.5),
+        ..small()
+    };
+    if let Ok(scene) = Scene::parse_with(&text, "a.toml", &overrides) {
+        render(&scene);
+    }
+});

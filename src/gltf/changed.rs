@@ -1,0 +1,83 @@
+//! A JSON with a value that is strange, for tests; the fuzz targets have it too.
+
+use serde_json::{Value, json};
+
+/// All ways to values of a JSON.
+fn ways(value: &Value, way: &mut String, all: &mut Vec<String>) {
+    all.push(way.clone());
+    let length = way.len();
+    let mut inner = |key: &str, value: &Value| {
+        way.push('/');
+        way.push_str(key);
+        ways(value, way, all);
+        way.truncate(length);
+    };
+    match value {
+        Value::Object(map) => map.iter().for_each(|(key, value)| inner(key, value)),
+        Value::Array(list) => list
+            .iter()
+            .enumerate()
+            .for_each(|(i, value)| inner(&i.to_string(), value)),
+        _ => {}
+    }
+}
+
+/// Puts something else in the place of one value, or takes it away. `below` chooses among so many.
+pub fn changed(json: &mut Value, below: &mut dyn FnMut(usize) -> usize) {
+    let mut all = Vec::new();
+    ways(json, &mut String::new(), &mut all);
+    let other = json.pointer(&all[below(all.len())]).cloned();
+    let way = &all[1 + below(all.len() - 1)];
+    let (outer, key) = way.rsplit_once('/').unwrap_or_default();
+    let strange = [
+        json!(0),
+        json!(1),
+        json!(2),
+        json!(3),
+        json!(-1),
+        json!(7),
+        json!(1000),
+        json!(u32::MAX),
+        json!(1u64 << 32),
+        json!(u64::MAX),
+        json!(0.5),
+        json!(-0.25),
+        json!(3e38),
+        json!(-3e38),
+        json!(1e-45),
+        json!(1e39),
+        json!(4_194_304),
+        json!(5126),
+        json!(5121),
+        json!(5123),
+        json!(5125),
+        json!(null),
+        json!(true),
+        json!(""),
+        json!("x"),
+        json!("SCALAR"),
+        json!("VEC4"),
+        json!([]),
+        json!({}),
+        json!([0]),
+        json!([1e38, 1e38, 1e38]),
+        json!([0, 0, 0]),
+        json!([0, 0, 0, 0]),
+    ];
+    let kind = below(10);
+    if kind < 2 {
+        match json.pointer_mut(outer) {
+            Some(Value::Object(map)) => drop(map.remove(key)),
+            Some(Value::Array(list)) if kind == 0 => drop(list.pop()),
+            Some(Value::Array(list)) => list.extend(list.last().cloned()),
+            _ => {}
+        }
+    } else if let Some(value) = json.pointer_mut(way) {
+        *value = match (kind, other) {
+            (2, Some(other)) => other,
+            // Numbers become numbers, most of the time.
+            (3..7, _) if value.is_number() => strange[below(21)].clone(),
+            _ => strange[below(strange.len())].clone(),
+        };
+    }
+}

@@ -1,0 +1,351 @@
+//! Small files that ask for much, each of which took minutes or gigabytes once: a message that says the limit, or a picture.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use super::seeds::{START, container, triangle};
+use super::{Ran, render, run};
+
+/// What is told of a glTF file; soon, and in a gigabyte.
+fn model(json: &Value, binary: &[u8]) -> Ran {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.glb"), container(json, binary)).unwrap();
+    render(folder.path(), "a.glb")
+}
+
+fn refused(json: &Value, binary: &[u8], told: &str) {
+    let ran = model(json, binary);
+    assert!(ran.code == 3 && ran.said.contains(told), "{}: {}", ran.code, ran.said);
+}
+
+fn zeros(count: u32, kind: &str) -> Value {
+    json!({ "componentType": 5126, "count": count, "type": kind })
+}
+
+fn push(list: &mut Value, value: Value) {
+    list.as_array_mut().unwrap().push(value);
+}
+
+#[test]
+fn instances_are_in_proportion_to_the_file() {
+    let (mut json, binary) = triangle();
+    let node = |count| json!([{ "mesh": 0, "extensions": { "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": count } } } }]);
+    push(&mut json["accessors"], zeros(1 << 20, "VEC3"));
+    push(&mut json["accessors"], zeros(1 << 16, "VEC3"));
+    json["nodes"] = node(1);
+    refused(&json, &binary, "nodes[0]: a file of ");
+    refused(&json, &binary, " bytes must have at most 656");
+    json["nodes"] = node(2);
+    assert_eq!(model(&json, &binary).code, 0);
+    // By nodes alone: as many as the text has room for.
+    json["nodes"] = json!(vec![json!({ "mesh": 0 }); 100_000]);
+    assert_eq!(model(&json, &binary).code, 0);
+}
+
+#[test]
+fn meshes_that_share_all_they_have_are_few() {
+    let count = 40_000;
+    let corners = (0..3 * count).flat_map(|i| [i % 173, i * 7 % 131, i % 11]);
+    let binary: Vec<u8> = corners.flat_map(|x| (x as f32).to_le_bytes()).collect();
+    let (mut json, _) = triangle();
+    json["buffers"][0]["byteLength"] = json!(binary.len());
+    json["bufferViews"][0]["byteLength"] = json!(binary.len());
+    json["accessors"][0]["count"] = json!(3 * count);
+    let meshes = |json: &mut Value, count: usize| {
+        json["meshes"] = json!(vec![
+            json!({ "primitives": [{ "attributes": { "POSITION": 0 } }] });
+            count
+        ]);
+        json["nodes"] = (0..count).map(|i| json!({ "mesh": i })).collect();
+    };
+    meshes(&mut json, 1000);
+    refused(&json, &binary, " triangles");
+    meshes(&mut json, 20);
+    assert_eq!(model(&json, &binary).code, 0);
+}
+
+#[test]
+fn accessors_are_not_read_for_ever() {
+    let (mut json, binary) = triangle();
+    push(&mut json["accessors"], zeros(1 << 22, "VEC3"));
+    push(&mut json["accessors"], zeros(1 << 22, "MAT4"));
+    let rule = "counted as often as they are read";
+    // Meshes of points that nothing uses.
+    let mut many = json.clone();
+    many["meshes"] = json!(vec![
+        json!({ "primitives": [{ "attributes": { "POSITION": 1 }, "mode": 6 }] });
+        400
+    ]);
+    many["nodes"] = (0..400).map(|i| json!({ "mesh": i })).collect();
+    refused(&many, &binary, "a file of ");
+    // Morph targets.
+    let mut morphed = json.clone();
+    morphed["meshes"] = json!([{
+        "weights": vec![1; 1000],
+        "primitives": [{ "attributes": { "POSITION": 1 }, "targets": vec![json!({ "POSITION": 1 }); 1000] }],
+    }]);
+    refused(&morphed, &binary, rule);
+    // Skins.
+    let mut skinned = json.clone();
+    skinned["skins"] = json!(vec![json!({ "joints": [0], "inverseBindMatrices": 2 }); 200]);
+    skinned["nodes"] = (0..200).map(|i| json!({ "mesh": 0, "skin": i })).collect();
+    refused(&skinned, &binary, rule);
+    // Channels.
+    push(&mut json["accessors"], zeros(1 << 22, "SCALAR"));
+    json["animations"] = json!([{
+        "samplers": [{ "input": 3, "output": 1 }],
+        "channels": vec![json!({ "sampler": 0, "target": { "node": 0, "path": "translation" } }); 1000],
+    }]);
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.glb"), container(&json, &binary)).unwrap();
+    let ran = super::render_with(folder.path(), "a.glb", &["--time", "0.5"]);
+    assert!(ran.code == 3 && ran.said.contains(rule), "{}: {}", ran.code, ran.said);
+}
+
+#[test]
+fn compressed_views_are_in_proportion() {
+    let (mut json, mut binary) = triangle();
+    // A stream that says that it is 4 GB of zeros.
+    binary.push(0xa0);
+    json["buffers"][0]["byteLength"] = json!(binary.len());
+    json["extensionsUsed"] = json!(["EXT_meshopt_compression"]);
+    let (stride, count) = (256, 1 << 24);
+    let how = json!({ "buffer": 0, "byteOffset": 36, "byteLength": 1, "byteStride": stride, "count": count, "mode": "ATTRIBUTES" });
+    let view =
+        json!({ "buffer": 0, "byteLength": stride * count as u64, "extensions": { "EXT_meshopt_compression": how } });
+    push(&mut json["bufferViews"], view);
+    refused(&json, &binary, "bytes of compressed views, once they are decoded");
+}
+
+#[test]
+fn sparse_files_are_refused_by_their_length() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (name, length) in [
+        ("a.bin", 9_u64 << 30),
+        ("a.obj", 9 << 30),
+        ("a.png", 1 << 30),
+        ("a.toml", 9 << 30),
+        ("a.glb", 9 << 30),
+    ] {
+        fs::File::create(folder.join(name)).unwrap().set_len(length).unwrap();
+    }
+    let (mut json, _) = triangle();
+    json["buffers"][0]["uri"] = json!("a.bin");
+    fs::write(folder.join("b.gltf"), json.to_string()).unwrap();
+    let material = "[materials.m]\ntype = 'diffuse'\ncolor = [1, 1, 1]\n";
+    let mesh = format!("{START}{material}[[shapes]]\ntype = 'mesh'\nmaterial = 'm'\nfile = 'a.obj'\n");
+    fs::write(folder.join("mesh.toml"), mesh).unwrap();
+    let texture = "[textures.t]\ntype = 'image'\nfile = 'a.png'\n[materials.m]\ntype = 'diffuse'\ncolor = { texture = 't' }\n\
+        [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
+    fs::write(folder.join("texture.toml"), format!("{START}{texture}")).unwrap();
+    for name in ["b.gltf", "a.toml", "a.glb", "mesh.toml", "texture.toml"] {
+        let ran = render(folder, name);
+        assert!(
+            ran.code == 3 && ran.said.contains("larger than"),
+            "{name}: {}: {}",
+            ran.code,
+            ran.said
+        );
+    }
+}
+
+#[test]
+fn shapes_that_name_one_file_often_are_few() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let (mut json, binary) = triangle();
+    json["nodes"] = json!(vec![json!({ "mesh": 0 }); 2000]);
+    fs::write(folder.join("a.glb"), container(&json, &binary)).unwrap();
+    let shape = "[[shapes]]\ntype = 'gltf'\nfile = 'a.glb'\n";
+    fs::write(folder.join("a.toml"), START.to_owned() + &shape.repeat(20_000)).unwrap();
+    let ran = render(folder, "a.toml");
+    assert!(
+        ran.code == 3 && ran.said.contains("together must bring at most 2097152"),
+        "{}",
+        ran.said
+    );
+    // Their names are found soon.
+    json["nodes"] = json!([{ "mesh": 0 }]);
+    fs::write(folder.join("a.glb"), container(&json, &binary)).unwrap();
+    fs::write(folder.join("a.toml"), START.to_owned() + &shape.repeat(5000)).unwrap();
+    let ran = render(folder, "a.toml");
+    assert_eq!(ran.code, 0, "{}", ran.said);
+}
+
+/// A PNG of zeros, written row by row.
+fn blank(width: u32, height: u32, color: png::ColorType, depth: png::BitDepth) -> Vec<u8> {
+    use std::io::Write as _;
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.set_compression(png::Compression::Balanced);
+    let mut writer = encoder.write_header().unwrap();
+    let mut stream = writer.stream_writer().unwrap();
+    let bits = color.samples() * depth as usize;
+    let row = vec![0; (width as usize * bits).div_ceil(8)];
+    (0..height).for_each(|_| stream.write_all(&row).unwrap());
+    stream.finish().unwrap();
+    drop(writer);
+    bytes
+}
+
+#[test]
+fn images_that_grow_a_thousandfold_are_told() {
+    // 65 KB, 67 million texels.
+    let image = blank(8192, 8192, png::ColorType::Grayscale, png::BitDepth::Eight);
+    let (mut json, mut binary) = triangle();
+    let start = binary.len();
+    binary.extend(&image);
+    json["buffers"][0]["byteLength"] = json!(binary.len());
+    push(
+        &mut json["bufferViews"],
+        json!({ "buffer": 0, "byteOffset": start, "byteLength": image.len() }),
+    );
+    let slots = |i: usize| json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": i } } });
+    json["images"] = json!(vec![json!({ "bufferView": 1 }); 50]);
+    json["textures"] = (0..50).map(|i| json!({ "source": i })).collect();
+    json["materials"] = (0..50).map(slots).collect();
+    let primitive = |i: usize| json!({ "attributes": { "POSITION": 0 }, "material": i });
+    json["meshes"][0]["primitives"] = (0..50).map(primitive).collect();
+    refused(&json, &binary, "texels together; of files of ");
+    // 2 MB that decode to 2 GB, in a model, where large images are halved.
+    let deep = blank(16_384, 16_384, png::ColorType::Rgba, png::BitDepth::Sixteen);
+    binary.truncate(start);
+    binary.extend(&deep);
+    json["buffers"][0]["byteLength"] = json!(binary.len());
+    json["bufferViews"][1]["byteLength"] = json!(deep.len());
+    json["meshes"][0]["primitives"] = json!([primitive(0)]);
+    json["materials"] = json!([slots(0)]);
+    refused(&json, &binary, "they must take at most ");
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("deep.png"), &deep).unwrap();
+    let ran = run(folder.path(), &["diff", "deep.png", "deep.png"]);
+    assert!(ran.code == 1 && ran.said.contains("must take at most"), "{}", ran.said);
+}
+
+#[test]
+fn files_that_would_wait_or_never_end_are_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    super::seeds::put(folder);
+    for name in ["pipe", "pipe.gltf", "pipe.obj", "pipe.png"] {
+        let made = std::process::Command::new("mkfifo").arg(folder.join(name)).status();
+        assert!(made.unwrap().success());
+    }
+    let plain = ["render", "plain.toml", "--device", "cpu", "-o", "out.png"];
+    for name in ["pipe", "/dev/zero"] {
+        for (arguments, codes) in [
+            (vec!["check", name], [3]),
+            (vec!["diff", name, "t.png"], [1]),
+            (vec!["merge", name, "-o", "out.exr"], [1]),
+            ([&plain[..], &["--checkpoint", name, "--resume"]].concat(), [2]),
+            (
+                [&plain[..], &["--environment", name, "--integrator", "path"]].concat(),
+                [2],
+            ),
+        ] {
+            let ran = run(folder, &arguments);
+            assert!(codes.contains(&ran.code), "{arguments:?}: {}: {}", ran.code, ran.said);
+        }
+    }
+    assert_eq!(run(folder, &["check", "pipe.gltf"]).code, 3);
+    for (named, text) in [
+        (
+            "pipe.obj",
+            "[materials.m]\ntype = 'diffuse'\ncolor = [1, 1, 1]\n[[shapes]]\ntype = 'mesh'\nmaterial = 'm'\nfile = 'FILE'\n",
+        ),
+        ("pipe.png", "[textures.t]\ntype = 'image'\nfile = 'FILE'\n"),
+        ("pipe.png", "[environment]\nfile = 'FILE'\n"),
+    ] {
+        fs::write(folder.join("a.toml"), format!("{START}{}", text.replace("FILE", named))).unwrap();
+        let ran = run(folder, &["check", "a.toml"]);
+        assert!(ran.code == 3 && ran.said.contains("must be a file"), "{}", ran.said);
+    }
+    // A pipe that a shell makes has a writer.
+    let ran = shell(
+        folder,
+        "\"$0\" check <(cat plain.toml) && \"$0\" check /dev/stdin < plain.toml && cat plain.toml | \"$0\" check /dev/stdin",
+    );
+    assert_eq!(ran.matches("good; 8 x 6 pixels").count(), 3, "{ran}");
+}
+
+fn shell(folder: &Path, script: &str) -> String {
+    let mut command = std::process::Command::new("bash");
+    command
+        .args(["-c", script, env!("CARGO_BIN_EXE_wgray")])
+        .current_dir(folder);
+    let out = command.output().unwrap();
+    String::from_utf8_lossy(&[out.stdout, out.stderr].concat()).into_owned()
+}
+
+#[test]
+fn texts_that_go_deep_or_on_for_ever_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let deep = 100_000;
+    let dots = vec!["a"; deep].join(".");
+    let rule = "at most 80 deep";
+    let json = "lists and objects must be in each other at most 127 deep";
+    for (name, text, told) in [
+        ("a.toml", format!("x = {}{}", "[".repeat(deep), "]".repeat(deep)), rule),
+        (
+            "a.toml",
+            format!("x = {}1{}", "{a = ".repeat(deep), "}".repeat(deep)),
+            rule,
+        ),
+        ("a.toml", format!("b = 1\n{dots} = 1"), "a.toml:2:1: "),
+        ("a.toml", format!("[{dots}]"), rule),
+        ("a.toml", "[".repeat(deep), "a.toml:1:"),
+        (
+            "a.toml",
+            format!("x = \"{}", "a".repeat(3_000_000)),
+            "text must end with the quotes",
+        ),
+        ("a.json", "[".repeat(deep), json),
+        ("a.gltf", format!("{{\"x\":{}", "[".repeat(deep)), json),
+        ("a.gltf", format!("{{\"asset\":{}", "{\"a\":".repeat(deep)), json),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+        let ran = run(folder.path(), &["check", name]);
+        assert!(
+            ran.code == 3 && ran.said.contains(told),
+            "{name}: {told}: {}: {}",
+            ran.code,
+            ran.said
+        );
+    }
+}
+
+#[test]
+fn what_acts_on_a_terminal_is_shown() {
+    // `run` looks at what is said.
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    super::seeds::put(folder);
+    for text in [
+        "a\u{1b}[31m=1",
+        "a=\u{7f}\u{9b}31m",
+        "\u{202e}a=1",
+        "[[shapes]]\ntype=\"\\u009b\\u202ex\\nerror: b\"\n",
+        "[materials.\"a\\u001b[31m\"]\ntype=\"nope\\u001b\"\n",
+        "[[shapes]]\ntype=\"mesh\"\nfile=\"a\\u001b[31m\\n.obj\"\n",
+    ] {
+        fs::write(folder.join("a.toml"), format!("{START}{text}")).unwrap();
+        let ran = run(folder, &["check", "a.toml"]);
+        assert_eq!((ran.code, ran.said.lines().count()), (3, 1), "{text:?}: {}", ran.said);
+        assert!(!ran.said.contains('\u{202e}'), "{}", ran.said);
+    }
+    // A file's own name.
+    let name = "a\u{1b}[31m\nerror: b.toml";
+    fs::copy(folder.join("plain.toml"), folder.join(name)).unwrap();
+    let ran = run(folder, &["check", name]);
+    assert!(
+        ran.code == 0 && ran.said.starts_with("a\\u{1b}[31m\\nerror: b.toml: good"),
+        "{}",
+        ran.said
+    );
+    assert_eq!(ran.said.lines().count(), 1);
+}

@@ -1,0 +1,318 @@
+//! Sound files of every kind, to be changed.
+
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+
+use glam::DVec3;
+use image::{DynamicImage, ImageFormat, Rgb, Rgb32FImage, Rgba, RgbaImage};
+use serde_json::{Value, json};
+
+use super::everything::everything;
+use crate::sources::path as project;
+
+/// A kind of file, and how the program meets one.
+pub struct Kind {
+    /// What it is called, which the file's name ends with.
+    pub ending: &'static str,
+    /// A sound one.
+    pub bytes: Vec<u8>,
+    /// The same as values, where it has some, and how they are written.
+    pub values: Option<(Value, fn(&Value) -> Option<Vec<u8>>)>,
+    /// The exit codes beside 0 that a changed one may have.
+    pub codes: &'static [i32],
+    pub how: How,
+}
+
+/// How the program meets a file.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum How {
+    Scene,
+    /// Named by a scene with this text.
+    Named(&'static str),
+    /// By `wgray diff` too.
+    Picture(&'static str),
+    Checkpoint,
+    Part,
+}
+
+/// What a scene has that names a file.
+pub const START: &str = "
+image = { width = 8, height = 6 }
+camera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 50 }
+render = { integrator = 'path', pixel_samples = { pattern = 'random', count = 1 } }
+lights = [{ type = 'point', position = [1, -4, 3], color = [9, 9, 9] }]
+";
+const TEXTURE: &str = "
+[textures.t]
+type = 'image'
+file = 'FILE'
+[materials.m]
+type = 'diffuse'
+color = { texture = 't' }
+[[shapes]]
+type = 'sphere'
+material = 'm'
+center = [0, 0, 0]
+radius = 1
+";
+const SURROUNDINGS: &str = "
+[environment]
+file = 'FILE'
+[materials.m]
+type = 'diffuse'
+color = [1, 1, 1]
+[[shapes]]
+type = 'sphere'
+material = 'm'
+center = [0, 0, 0]
+radius = 1
+";
+const MESH: &str = "
+[materials.m]
+type = 'diffuse'
+color = [1, 1, 1]
+[[shapes]]
+type = 'mesh'
+file = 'FILE'
+material = 'm'
+";
+const LIBRARY: &str = "
+[[shapes]]
+type = 'mesh'
+file = 'named.obj'
+";
+
+const OBJ: &str = "mtllib a.mtl\no thing\nv 0 0 0\nv 1 0 0\nv 0 1 0.5\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\n# a comment\n\
+    usemtl a\nf 1/1/1 2/2/1 3/3/1\nf 2//1 4//1 3//1\ng other\nf -4 -3 -2 -1 \\\n 1\n";
+const MTL: &str = "newmtl a\nKd 0.5 0.4 0.3\nKs 0.1 0.1 0.1\nNs 20\nd 0.9\nNi 1.4\nillum 2\nmap_Kd -s 2 2 1 t.png\nnewmtl b\nKe 1 1 1\nTr 0.5\n";
+const STL: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nfacet normal 0 0 1\n\
+    outer loop\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
+const COURSE: &str = r#"{
+  "spp": 1, "max_depth": 2, "image_resolution": [8, 6],
+  "cam_config": { "position": [0, 1, 4], "look_at": [0, 0, 0], "ref_up": [0, 1, 0], "vertical_fov": 40, "focal_length": 1 },
+  "light_config": { "position": [0, 4, 0], "size": [1, 1], "radiance": [5, 5, 5] },
+  "materials": [{ "name": "grey", "type": "diffuse", "color": [0.5, 0.5, 0.5] }],
+  "objects": [{ "obj_file_path": "named.obj", "material_name": "grey", "translate": [0, 0, 0], "scale": 1, "has_bvh": false }]
+}"#;
+
+fn ply() -> Vec<u8> {
+    let header = "ply\nformat binary_little_endian 1.0\ncomment a\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 2\nproperty list uchar int vertex_indices\n\
+        property uchar flags\nend_header\n";
+    let mut bytes = header.as_bytes().to_vec();
+    for corner in [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5], [1.0, 1.0, 0.0f32]] {
+        bytes.extend(corner.iter().flat_map(|x| x.to_le_bytes()));
+        bytes.extend([200, 100, 50]);
+    }
+    for face in [[0, 1, 2], [1, 3, 2i32]] {
+        bytes.push(3);
+        bytes.extend(face.iter().flat_map(|i| i.to_le_bytes()));
+        bytes.push(7);
+    }
+    bytes
+}
+
+/// An image of 16 x 8 pixels that is no plain one.
+fn image(format: ImageFormat) -> Vec<u8> {
+    let bytes = RgbaImage::from_fn(16, 8, |x, y| {
+        Rgba([x as u8 * 16, y as u8 * 30, (x * y) as u8, 255 - x as u8])
+    });
+    let floats = Rgb32FImage::from_fn(16, 8, |x, y| Rgb([x as f32 / 8.0, y as f32, (x * y) as f32 / 3.0]));
+    let image = match format {
+        ImageFormat::OpenExr | ImageFormat::Hdr => DynamicImage::ImageRgb32F(floats),
+        ImageFormat::Jpeg => DynamicImage::ImageRgb8(DynamicImage::ImageRgba8(bytes).into_rgb8()),
+        _ => DynamicImage::ImageRgba8(bytes),
+    };
+    let mut file = Cursor::new(Vec::new());
+    image.write_to(&mut file, format).unwrap();
+    file.into_inner()
+}
+
+fn model() -> (Value, Vec<u8>) {
+    let (json, binary) = everything();
+    let file = container(&json, &binary);
+    (json, file)
+}
+
+/// A container of a JSON and bytes.
+pub fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
+    let mut text = json.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let mut binary = binary.to_vec();
+    binary.resize(binary.len().next_multiple_of(4), 0);
+    let mut file = b"glTF".to_vec();
+    let mut words = |words: &[usize], bytes: &[u8]| {
+        file.extend(words.iter().flat_map(|word| (*word as u32).to_le_bytes()));
+        file.extend(bytes);
+    };
+    words(&[2, 12 + 8 + text.len() + 8 + binary.len()], &[]);
+    words(&[text.len(), 0x4E4F_534A], &text);
+    words(&[binary.len(), 0x004E_4942], &binary);
+    file
+}
+
+/// The same without a container, its bytes in a data URI.
+fn in_text(json: &Value) -> Option<Vec<u8>> {
+    let (_, binary) = everything();
+    let mut json = json.clone();
+    let coded: String = binary.iter().map(|byte| format!("%{byte:02x}")).collect();
+    let buffer = json.get_mut("buffers")?.get_mut(0)?.as_object_mut()?;
+    buffer.insert("uri".to_owned(), json!(format!("data:,{coded}")));
+    Some(json.to_string().into_bytes())
+}
+
+fn in_container(json: &Value) -> Option<Vec<u8>> {
+    Some(container(json, &everything().1))
+}
+
+fn in_toml(values: &Value) -> Option<Vec<u8>> {
+    toml::to_string(values).ok().map(String::into_bytes)
+}
+
+fn in_json(values: &Value) -> Option<Vec<u8>> {
+    Some(values.to_string().into_bytes())
+}
+
+/// What files beside them name.
+pub fn put(folder: &Path) {
+    fs::write(folder.join("named.obj"), OBJ).unwrap();
+    fs::write(folder.join("a.mtl"), MTL).unwrap();
+    fs::write(folder.join("t.png"), image(ImageFormat::Png)).unwrap();
+    fs::write(folder.join("plain.toml"), SCENE).unwrap();
+}
+
+/// The scene of checkpoints and parts.
+const SCENE: &str = "
+image = { width = 8, height = 6 }
+camera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 50 }
+lights = [{ type = 'point', position = [1, -4, 3], color = [9, 9, 9] }]
+render = { pixel_samples = { pattern = 'random', count = 1 } }
+[materials.m]
+type = 'phong'
+color = [1, 1, 1]
+shininess = 5
+[[shapes]]
+type = 'sphere'
+material = 'm'
+center = [0, 0, 0]
+radius = 1
+";
+
+/// All kinds.
+pub fn all(folder: &Path) -> Vec<Kind> {
+    put(folder);
+    let text = fs::read_to_string(project("scenes/materials.toml")).unwrap();
+    let texts = ["cornell", "lights", "lens", "turntable"].map(|name| {
+        let path = project(&format!("scenes/{name}.toml"));
+        fs::read_to_string(path).unwrap()
+    });
+    // All that they have, in one.
+    let mut scene: Value = toml::from_str(&text).unwrap();
+    for text in texts {
+        let other: Value = toml::from_str(&text).unwrap();
+        join(&mut scene, &other);
+    }
+    let toml = in_toml(&scene).unwrap();
+    let (json, glb) = model();
+    let made = |arguments: &[&str], file: &str| {
+        let ran = super::run(folder, arguments);
+        assert_eq!(ran.code, 0, "{}", ran.said);
+        fs::read(folder.join(file)).unwrap()
+    };
+    let render = ["render", "plain.toml", "--device", "cpu", "--threads", "2"];
+    let checkpoint = made(
+        &[&render[..], &["--checkpoint", "made.checkpoint", "-o", "made.png"]].concat(),
+        "made.checkpoint",
+    );
+    let part = made(
+        &[
+            &render[..],
+            &["--tile", "1/1", "--aov", "normal,depth", "-o", "made.part"],
+        ]
+        .concat(),
+        "made.part",
+    );
+    let course: Value = serde_json::from_str(COURSE).unwrap();
+    let kind = |ending, bytes: Vec<u8>, how| Kind {
+        ending,
+        bytes,
+        values: None,
+        codes: &[3],
+        how,
+    };
+    let picture = |ending, format, text| Kind {
+        // Of `wgray diff`: what is no picture, and what is too large.
+        codes: &[1, 3, 5, 7],
+        ..kind(ending, image(format), How::Picture(text))
+    };
+    vec![
+        Kind {
+            values: Some((scene, in_toml)),
+            ..kind("toml", toml, How::Scene)
+        },
+        Kind {
+            values: Some((course, in_json)),
+            ..kind("json", COURSE.into(), How::Scene)
+        },
+        Kind {
+            values: Some((json.clone(), in_text)),
+            ..kind("gltf", in_text(&json).unwrap(), How::Scene)
+        },
+        Kind {
+            values: Some((json, in_container)),
+            ..kind("glb", glb, How::Scene)
+        },
+        kind("obj", OBJ.into(), How::Named(MESH)),
+        kind("mtl", MTL.into(), How::Named(LIBRARY)),
+        kind("ply", ply(), How::Named(MESH)),
+        kind("stl", STL.into(), How::Named(MESH)),
+        picture("png", ImageFormat::Png, TEXTURE),
+        picture("jpg", ImageFormat::Jpeg, TEXTURE),
+        picture("webp", ImageFormat::WebP, TEXTURE),
+        picture("exr", ImageFormat::OpenExr, SURROUNDINGS),
+        picture("hdr", ImageFormat::Hdr, SURROUNDINGS),
+        Kind {
+            codes: &[2],
+            ..kind("checkpoint", checkpoint, How::Checkpoint)
+        },
+        Kind {
+            codes: &[1],
+            ..kind("part", part, How::Part)
+        },
+    ]
+}
+
+/// Puts what another scene has beside what is there.
+fn join(scene: &mut Value, other: &Value) {
+    match (scene, other) {
+        (Value::Object(scene), Value::Object(other)) => {
+            for (key, value) in other {
+                match scene.get_mut(key) {
+                    Some(known) => join(known, value),
+                    None => drop(scene.insert(key.clone(), value.clone())),
+                }
+            }
+        }
+        (Value::Array(scene), Value::Array(other)) if other.iter().all(Value::is_object) => {
+            scene.extend(other.iter().cloned());
+        }
+        _ => {}
+    }
+}
+
+/// A mesh of one triangle, for files that are made to ask for much.
+pub fn triangle() -> (Value, Vec<u8>) {
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+    let numbers = corners.iter().flat_map(|corner| corner.to_array());
+    let binary: Vec<u8> = numbers.flat_map(|x| (x as f32).to_le_bytes()).collect();
+    let json = json!({
+        "asset": { "version": "2.0" },
+        "buffers": [{ "byteLength": binary.len() }],
+        "bufferViews": [{ "buffer": 0, "byteLength": binary.len() }],
+        "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3" }],
+        "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }],
+    });
+    (json, binary)
+}

@@ -1,0 +1,47 @@
+//! The limits as docs/reliability.md has them: each is told in these words somewhere, and has a test.
+
+use std::fs;
+use std::path::Path;
+
+use crate::sources::path as project;
+
+fn texts(folder: &Path, all: &mut String) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        match path.is_dir() {
+            true => texts(&path, all),
+            false if path.extension().is_some_and(|ending| ending == "rs") => {
+                // Messages go over several lines by a backslash.
+                let text = fs::read_to_string(&path).unwrap();
+                let lines = text.split("\\\n").map(str::trim_start);
+                all.push_str(&lines.collect::<String>());
+            }
+            false => {}
+        }
+    }
+}
+
+#[test]
+fn every_limit_in_the_table_is_told_and_tested() {
+    let docs = fs::read_to_string(project("docs/reliability.md")).unwrap();
+    let section = docs.split("## Files from strangers").nth(1).unwrap();
+    let section = section.split("\n## ").next().unwrap();
+    let mut all = [String::new(), String::new()];
+    texts(&project("src"), &mut all[0]);
+    texts(&project("src"), &mut all[1]);
+    texts(&project("tests"), &mut all[1]);
+    let code = |cell: &str| cell.trim().trim_matches('`').to_owned();
+    let mut count = 0;
+    for row in section.lines().filter(|line| line.starts_with("| ")) {
+        let cells: Vec<&str> = row.trim_matches('|').split(" | ").collect();
+        let [what, _, told, test] = cells[..] else { continue };
+        if !test.contains('`') {
+            continue; // the head
+        }
+        count += 1;
+        let told = told.trim();
+        assert!(!told.starts_with('`') || all[0].contains(&code(told)), "{what}: {told}");
+        assert!(all[1].contains(&format!("fn {}()", code(test))), "{what}: {test}");
+    }
+    assert!(count >= 20, "{count}");
+}
