@@ -174,8 +174,13 @@ fn submit(work: &Work) -> String {
 {head}set -eu
 cd -- "$(dirname -- "$0")"
 mkdir -p logs
+
 # Submits a script for so many tasks, in as few arrays as the cluster has room for; prints their numbers with colons before them.
 most=$(( $(scontrol show config | sed -n 's/^MaxArraySize *= *//p') ))   # an array's indices are less than this
+if [ "$most" -lt 1 ]; then
+    echo "$0: scontrol does not tell MaxArraySize" >&2
+    exit 1
+fi
 arrays() {{
     local script=$1 count=$2 first job
     shift 2
