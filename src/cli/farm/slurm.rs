@@ -73,7 +73,7 @@ fn tile(work: &Work) -> String {
         )
     });
     let (frame, picture) = picture(work, "task / tiles");
-    let mut words = vec![format!("exec {} render", word(&work.program))];
+    let mut words = vec![format!("{} render", word(&work.program))];
     words.extend(work.render.iter().cloned());
     if work.frames.is_some() {
         words.push("--frames=\"$frame\"".to_owned());
@@ -90,13 +90,13 @@ fn tile(work: &Work) -> String {
         ]
         .map(str::to_owned),
     );
-    words.push(format!("-- {}", word(&work.scene)));
+    words.push(format!("-- {} &", word(&work.scene)));
     format!(
         r#"#!/bin/bash
 {head}#SBATCH --job-name=wgray-tile
 #SBATCH --requeue
 #SBATCH --open-mode=append
-{limit}#SBATCH --signal=B:TERM@60   # a minute before, wgray keeps what it has and ends with code 75, by which Slurm requeues the task
+{limit}#SBATCH --signal=B:USR1@60   # a minute before, wgray is told, keeps what it has, and the task is requeued: the last lines
 
 {names}
 task=$(( ${{1:-0}} + SLURM_ARRAY_TASK_ID ))   # of all, from 0; an array holds so many, and there may be several
@@ -107,12 +107,25 @@ kept=$place/checkpoints/{picture}-of-$tiles
 cd -- "$folder" || exit
 mkdir -p -- "$parts" "$kept" || exit
 
-# A lost device, and a time that is up, are worth another try. What was finished is not rendered again.
+# A lost device, and a time that is up, are worth another try: then wgray ends with code 75. What was finished is not rendered again.
 again=(--requeue-exit=75)
 if [ "${{SLURM_RESTART_COUNT:-0}}" -ge {MOST_RESTARTS} ]; then
     again=()
 fi
 {command}
+wgray=$!
+trap 'kill -TERM $wgray' USR1
+trap 'cancelled=1' TERM   # by scancel, which tells wgray too
+while kill -0 $wgray 2>/dev/null; do
+    wait $wgray   # or until a signal
+done
+wait $wgray
+code=$?
+# A task that ended with a code, by RequeueExit of slurm.conf too, would count as failed for the job that joins the parts.
+if [ $code = 75 ] && [ -z "${{cancelled:-}}" ]; then
+    scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID" && sleep 60   # Slurm ends this at once
+fi
+exit $code
 "#,
         limit = limit.unwrap_or_default(),
         names = names(work),
@@ -161,18 +174,13 @@ fn submit(work: &Work) -> String {
 {head}set -eu
 cd -- "$(dirname -- "$0")"
 mkdir -p logs
-config=$(scontrol show config)
-value() {{
-    sed -n "s/^$1 *= *//p" <<<"$config"
-}}
-
-if [[ ! ",$(value RequeueExit)," =~ ,75, ]]; then
-    echo "note: this cluster does not requeue what ends with code 75 (RequeueExit in slurm.conf): where a device is lost or the time" \
-        "is up the job fails, and $0 again goes on from there" >&2
-fi
 
 # Submits a script for so many tasks, in as few arrays as the cluster has room for; prints their numbers with colons before them.
-most=$(( $(value MaxArraySize) ))   # an array's indices are less than this
+most=$(( $(scontrol show config | sed -n 's/^MaxArraySize *= *//p') ))   # an array's indices are less than this
+if [ "$most" -lt 1 ]; then
+    echo "$0: scontrol does not tell MaxArraySize" >&2
+    exit 1
+fi
 arrays() {{
     local script=$1 count=$2 first job
     shift 2
