@@ -360,10 +360,15 @@ integrator = "path"
 ];
 
 /// The program refuses these for what several values are together, or for what a name or a file is; the messages have one of these texts.
-const OF_SEVERAL: [&str; 26] = [
+const OF_SEVERAL: [&str; 29] = [
     "is no texture",
     "is no material",
     "is no mesh",
+    "has no such group",
+    // A direction's length is of three numbers; of what is exactly 0 the schema knows.
+    "must not be zero: its length",
+    // Under "phong".
+    "max_depth: 0 must be from 1 to 64",
     "cannot be read",
     "must be a file that can be read",
     "must be a texture of type",
