@@ -360,38 +360,53 @@ integrator = "path"
 ];
 
 /// The program refuses these for what several values are together, or for what a name or a file is; the messages have one of these texts.
-const OF_SEVERAL: [&str; 29] = [
+const OF_SEVERAL: &[&str] = &[
+    // names and files
     "is no texture",
     "is no material",
     "is no mesh",
     "has no such group",
-    // A direction's length is of three numbers; of what is exactly 0 the schema knows.
-    "must not be zero: its length",
-    // Under "phong".
-    "max_depth: 0 must be from 1 to 64",
-    "cannot be read",
-    "must be a file that can be read",
+    ".file: ",
+    "is missing; ",
+    "reaches to",
+    "no texture here",
+    "no normal map here",
     "must be a texture of type",
+    "must have encoding",
+    "must have no factor",
+    "texture's factor",
+    "texture with uv_set",
+    // what stands beside other keys, or needs them
     "integrator = \"path\"",
-    "square number",
-    "must not be parallel",
-    "must not lie",
-    "must not be the camera's position",
-    "must not be where the light is",
+    "must be from 1 to 64",
     "must not be here",
     "must not be there",
-    "must not emit light",
-    "must be greater than that of the key before",
-    "which has no further samples",
-    "and not below the count",
-    "to cone_angle",
     "cannot stand beside",
     "is missing beside",
     "is missing, and",
     "needs a thickness",
     "needs name",
+    "needs alpha_mode",
+    "thin is true",
     "must have one of \"color\"",
     "must have position",
+    "square number",
+    "which has no further samples",
+    "and not below the count",
+    "to cone_angle",
+    "must not emit light",
+    "must be greater than that of the key before",
+    "camera.path: at frame",
+    // several numbers: places, directions, maps. Of lists of 0 alone, and of their lengths, the schema knows
+    "must not be parallel",
+    "must not lie",
+    "must not be the camera's position",
+    "must not be where the light is",
+    "must not be zero: its length",
+    "must have a length from",
+    " apart",
+    "must be [0, 0, 0, 1]",
+    "must have at least one key",
 ];
 
 /// All ways to a value, the table itself among them.
