@@ -131,7 +131,7 @@ fn bash_completes_commands_options_names_and_files() {
         files.sort();
         files
     };
-    assert_eq!(files("--checkpoint")[1..], ["small.toml", "smalls"]);
+    assert_eq!(files("--checkpoint"), ["small.toml", "smalls"]);
     // Bash finds folders by itself.
     assert_eq!(files("--asset-root"), ["", "compopt -o plusdirs"]);
     assert!(offered(&place, &["wgray", "xyz"]).iter().all(String::is_empty));
