@@ -14,8 +14,8 @@ use super::pieces_file::{self, Entry, FORMAT, Header, Key};
 use super::steps::Reached;
 use crate::error::RenderError;
 use crate::film::{Form, Region};
-use crate::image::{Aov, Band, Layout, Metadata, Pending, Sink};
-use crate::scene::{ViewSettings, ViewTransform};
+use crate::image::{Aov, AovSource, Band, Layout, Metadata, Pending, Sink};
+use crate::scene::{Integrator, ViewSettings, ViewTransform};
 use crate::waiting;
 
 /// What a picture needs besides the films of its parts.
@@ -51,6 +51,39 @@ impl PartHeader {
         } else {
             None
         }
+    }
+
+    /// Refuses what this program never writes: pieces that are not finished, layers that nothing is there for, and numbers that show
+    /// nothing.
+    fn check(&self, identity: &Identity, entries: &[Entry]) -> Result<(), String> {
+        let samples = identity.pixel_samples;
+        for Entry {
+            region, film, reached, ..
+        } in entries
+        {
+            if film != region || reached.pass != (samples..samples) {
+                return Err(format!("the piece of the pixels {region} is not a finished one"));
+            }
+        }
+        let known = |name: &String| Aov::ALL.into_iter().find(|aov| aov.name() == name);
+        for aov in self.aovs.iter().filter_map(known) {
+            let is_there = match aov.source(Integrator::Phong) {
+                AovSource::Adaptive => identity.adaptive,
+                AovSource::Samples => identity.layers,
+                AovSource::FirstHit => {
+                    entries.iter().all(|entry| entry.has_hits) || aov == Aov::ShadingNormal && identity.layers
+                }
+            };
+            if !is_there {
+                return Err(format!("has the layer {}, and no values for it", aov.name()));
+            }
+        }
+        let depth = f32::from_bits(self.middle_depth);
+        if !(depth > 0.0 && depth.is_finite()) {
+            return Err(format!("the depth {depth} must be finite and greater than 0"));
+        }
+        let exposure = ViewSettings::check_exposure(f64::from_bits(self.exposure));
+        exposure.map(drop).map_err(|rule| format!("its exposure {rule}"))
     }
 
     /// That of a part of a picture.
@@ -326,6 +359,7 @@ fn open(path: &Path) -> Result<(Key, Header, PartHeader, Vec<Entry>), PartError>
         return Err(bad(what.to_owned()));
     };
     let contents = pieces_file::scan(&file, &header.identity, &key, start).map_err(io)?;
+    part.check(&header.identity, &contents.entries).map_err(bad)?;
     let rows = part.tile.rows(header.identity.region());
     let height: u64 = contents
         .entries
