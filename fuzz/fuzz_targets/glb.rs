@@ -3,7 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use wgray::Scene;
-use wgray_fuzz::{Choices, changed, container, everything, file, render, small};
+use wgray_fuzz::{Choices, changed, container, everything, file, render, small_model};
 
 fuzz_target!(|bytes: &[u8]| {
     let mut choices = Choices(bytes);
@@ -22,7 +22,7 @@ fuzz_target!(|bytes: &[u8]| {
         };
         binary[at..at + 4].copy_from_slice(&word.to_le_bytes());
     }
-    let mut overrides = small();
+    let mut overrides = small_model();
     if animated {
         overrides.gltf.time = Some(0.7);
         overrides.gltf.variant = Some(wgray::scene::Selection::Number(1));

@@ -3,10 +3,10 @@
 
 use libfuzzer_sys::fuzz_target;
 use wgray::Scene;
-use wgray_fuzz::{file, render, small};
+use wgray_fuzz::{file, render, small_model};
 
 fuzz_target!(|bytes: &[u8]| {
-    if let Ok(scene) = Scene::load_with(file("a.gltf", bytes), &small()) {
+    if let Ok(scene) = Scene::load_with(file("a.gltf", bytes), &small_model()) {
         render(&scene);
     }
 });

@@ -7,7 +7,7 @@ use base64::Engine as _;
 use libfuzzer_sys::fuzz_target;
 use serde_json::json;
 use wgray::Scene;
-use wgray_fuzz::{Choices, container, file, small};
+use wgray_fuzz::{Choices, container, file, small_model};
 
 const STREAMS: &str = include_str!("../../src/gltf/meshopt/streams.txt");
 
@@ -67,5 +67,5 @@ fuzz_target!(|bytes: &[u8]| {
         "nodes": [{ "mesh": 0 }],
         "meshes": [{ "primitives": [{ "attributes": attributes, "indices": 0 }, { "attributes": attributes }] }],
     });
-    let _ = Scene::load_with(file("a.glb", &container(&json, &stream)), &small());
+    let _ = Scene::load_with(file("a.glb", &container(&json, &stream)), &small_model());
 });

@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use tempfile::TempDir;
+use wgray::scene::EnvironmentDescription;
 use wgray::{Device, Options, Overrides, Scene};
 
 pub use changed::changed;
@@ -60,6 +61,14 @@ pub fn small() -> Overrides {
         pixel_samples: Some(1),
         light_samples: Some(1),
         ..Overrides::default()
+    }
+}
+
+/// The same for models, before a colour: the tables of the studio take longer than all else.
+pub fn small_model() -> Overrides {
+    Overrides {
+        environment: Some(EnvironmentDescription::new([0.5, 0.5, 0.5])),
+        ..small()
     }
 }
 

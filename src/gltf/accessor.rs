@@ -12,6 +12,8 @@ use super::json::missing;
 
 /// The most elements of an accessor that has no bytes of its own.
 const MOST_ZEROS: u64 = 1 << 22;
+/// The most bytes that they take in memory.
+const LARGEST_ZEROS: u64 = 64 << 20;
 /// What reading an accessor takes besides its bytes, in bytes: there may be many of few elements.
 const BESIDE: u64 = 64;
 
@@ -276,8 +278,9 @@ impl Document {
             if let Some(name) = others.filter(|_| accessor.sparse.is_none()) {
                 return Err(extension::only_in(key, name));
             }
-            if count > MOST_ZEROS {
-                let rule = format!("{count} elements without a bufferView; there must be at most {MOST_ZEROS}");
+            let most = MOST_ZEROS.min(LARGEST_ZEROS / (4 * layout.count() as u64));
+            if count > most {
+                let rule = format!("{count} elements without a bufferView; there must be at most {most}");
                 return Err(Fault::key(format!("{key}.count"), rule));
             }
             return Ok(None);

@@ -25,7 +25,7 @@ impl Skin {
             Some(accessor) => {
                 let matrices = document.vectors::<16>(accessor.value())?;
                 let map = |of: [f32; 16]| DAffine3::from_mat4(DMat4::from_cols_array(&of.map(f64::from)));
-                matrices.into_iter().map(map).collect()
+                matrices.into_iter().take(skin.joints.len()).map(map).collect()
             }
         };
         if bind.len() < skin.joints.len() {

@@ -14,8 +14,8 @@ use super::pieces_file::{self, Entry, FORMAT, Header, Key};
 use super::steps::Reached;
 use crate::error::RenderError;
 use crate::film::{Form, Region};
-use crate::image::{Aov, Band, Layout, Metadata, Pending, Sink};
-use crate::scene::{ViewSettings, ViewTransform};
+use crate::image::{Aov, AovSource, Band, Layout, Metadata, Pending, Sink};
+use crate::scene::{Integrator, ViewSettings, ViewTransform};
 use crate::waiting;
 
 /// What a picture needs besides the films of its parts.
@@ -51,6 +51,39 @@ impl PartHeader {
         } else {
             None
         }
+    }
+
+    /// Refuses what this program never writes: pieces that are not finished, layers that nothing is there for, and numbers that show
+    /// nothing.
+    fn check(&self, identity: &Identity, entries: &[Entry]) -> Result<(), String> {
+        let samples = identity.pixel_samples;
+        for Entry {
+            region, film, reached, ..
+        } in entries
+        {
+            if film != region || reached.pass != (samples..samples) {
+                return Err(format!("the piece of the pixels {region} is not a finished one"));
+            }
+        }
+        let known = |name: &String| Aov::ALL.into_iter().find(|aov| aov.name() == name);
+        for aov in self.aovs.iter().filter_map(known) {
+            let is_there = match aov.source(Integrator::Phong) {
+                AovSource::Adaptive => identity.adaptive,
+                AovSource::Samples => identity.layers,
+                AovSource::FirstHit => {
+                    entries.iter().all(|entry| entry.has_hits) || aov == Aov::ShadingNormal && identity.layers
+                }
+            };
+            if !is_there {
+                return Err(format!("has the layer {}, and no values for it", aov.name()));
+            }
+        }
+        let depth = f32::from_bits(self.middle_depth);
+        if !(depth > 0.0 && depth.is_finite()) {
+            return Err(format!("the depth {depth} must be finite and greater than 0"));
+        }
+        let exposure = ViewSettings::check_exposure(f64::from_bits(self.exposure));
+        exposure.map(drop).map_err(|rule| format!("its exposure {rule}"))
     }
 
     /// That of a part of a picture.
@@ -344,6 +377,7 @@ fn open(path: &Path) -> Result<(Key, Header, PartHeader, Vec<Entry>), PartError>
         return Err(bad(what.to_owned()));
     };
     let contents = pieces_file::scan(&file, &header.identity, &key, start).map_err(io)?;
+    part.check(&header.identity, &contents.entries).map_err(bad)?;
     let rows = part.tile.rows(header.identity.region());
     let height: u64 = contents
         .entries
@@ -358,4 +392,99 @@ fn open(path: &Path) -> Result<(Key, Header, PartHeader, Vec<Entry>), PartError>
         )));
     }
     Ok((key, header, part, contents.entries))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::film::Film;
+
+    /// What is told of a part of 4 x 3 pixels whose header and piece were changed; nothing if it is good.
+    fn told(change: impl Fn(&mut Header, &mut Piece)) -> String {
+        let region = Region::whole(4, 3);
+        let mut header = Header {
+            format: FORMAT,
+            identity: Identity {
+                version: "1".to_owned(),
+                shaders: String::new(),
+                scene: String::new(),
+                picture: [4, 3],
+                region: [0, 0, 4, 3],
+                pixel_samples: 16,
+                adaptive: false,
+                layers: false,
+                exact_rounding: false,
+            },
+            part: Some(PartHeader {
+                tile: Tile { number: 1, of: 1 },
+                aovs: Vec::new(),
+                alpha: false,
+                middle_depth: 1f32.to_bits(),
+                view_transform: "gamma22".to_owned(),
+                exposure: 0f64.to_bits(),
+                told: Vec::new(),
+            }),
+        };
+        let mut piece = Piece {
+            region,
+            reached: Reached {
+                pass: 16..16,
+                next: [0, 0],
+            },
+            film: Film::of(region, Form::default()),
+        };
+        change(&mut header, &mut piece);
+        let mut bytes = Vec::new();
+        let (key, _) = pieces_file::write_header(&mut bytes, &header).unwrap();
+        pieces_file::write_piece(&mut bytes, &key, &piece, &[]).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.part");
+        fs::write(&path, bytes).unwrap();
+        let name = format!("{}: ", path.display());
+        match Parts::open(&[path], false) {
+            Ok(_) => String::new(),
+            Err(error) => error.to_string().replace(&name, ""),
+        }
+    }
+
+    fn part(header: &mut Header) -> &mut PartHeader {
+        header.part.as_mut().unwrap()
+    }
+
+    /// Files with the right hashes that no program wrote. Fuzzing found the panic that the first made.
+    #[test]
+    fn what_no_program_writes_is_refused() {
+        assert_eq!(told(|_, _| ()), "");
+        for aov in ["normal", "shading_normal", "albedo", "variance", "sample_count"] {
+            let without = told(|header, _| part(header).aovs = vec![aov.to_owned()]);
+            assert_eq!(without, format!("has the layer {aov}, and no values for it"));
+        }
+        assert_eq!(told(|header, _| part(header).aovs = vec!["other".to_owned()]), "");
+        for (depth, exposure, wanted) in [
+            (f32::NAN, 0.0, "the depth NaN must be"),
+            (0.0, 0.0, "the depth 0 must be"),
+            (1.0, f64::INFINITY, "its exposure "),
+        ] {
+            let told = told(|header, _| {
+                part(header).middle_depth = depth.to_bits();
+                part(header).exposure = exposure.to_bits();
+            });
+            assert!(told.starts_with(wanted), "{told}");
+        }
+        let unfinished = told(|_, piece| piece.reached.pass = 8..16);
+        assert_eq!(unfinished, "the piece of the pixels 0,0,4,3 is not a finished one");
+        let rows = told(|_, piece| piece.region.y1 = 2);
+        assert_eq!(rows, "the piece of the pixels 0,0,4,2 is not a finished one");
+        let huge = told(|header, _| {
+            header.identity.picture = [1, u32::MAX];
+            header.identity.region = [0, 0, 1, u32::MAX];
+            part(header).tile.of = u32::MAX;
+        });
+        assert_eq!(
+            huge,
+            "its picture of 1 x 4294967295 pixels must have from 1 to 65536 along a side"
+        );
+    }
 }

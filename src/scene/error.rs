@@ -123,6 +123,8 @@ impl Problem {
 /// The longest value or key in a message, and the longest message, in characters.
 const LONGEST: usize = 60;
 const LONGEST_MESSAGE: usize = 1000;
+/// The most steps of a way to a value that are shown.
+const MOST_SEGMENTS: usize = 20;
 
 /// A value or a key for a message: where it is long, its start and its end.
 pub(super) fn cut(text: &str) -> Cow<'_, str> {
@@ -179,7 +181,14 @@ impl From<usize> for Segment {
 impl fmt::Display for KeyPath {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        let end = self.0.len().saturating_sub(MOST_SEGMENTS / 2);
         for (i, segment) in self.0.iter().enumerate() {
+            if self.0.len() > MOST_SEGMENTS && (MOST_SEGMENTS / 2..end).contains(&i) {
+                if i == MOST_SEGMENTS / 2 {
+                    f.write_str("...")?;
+                }
+                continue;
+            }
             match segment {
                 Segment::Index(index) => write!(f, "[{index}]")?,
                 Segment::Key(key) => {

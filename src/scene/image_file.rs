@@ -306,11 +306,16 @@ fn check_name(file: &str, format: ImageFormat) -> Result<(), String> {
 
 fn read(file: &str, path: &Path) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
+    let too_large = || format!("{file:?} must not be larger than {} MiB", LARGEST_FILE >> 20);
+    // What says so at once is not read.
+    if fs::metadata(path).is_ok_and(|data| data.len() > LARGEST_FILE) {
+        return Err(too_large());
+    }
     fs::File::open(path)
         .and_then(|opened| opened.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
         .map_err(|error| unreadable(file, &error))?;
     if bytes.len() as u64 > LARGEST_FILE {
-        return Err(format!("{file:?} must not be larger than {} MiB", LARGEST_FILE >> 20));
+        return Err(too_large());
     }
     Ok(bytes)
 }

@@ -173,7 +173,7 @@ fn a_mesh_names_nothing_outside() {
         let ran = render(&folder, "a.toml");
         // A texture that cannot be had is left out, and told.
         assert!(
-            ran.said.contains("secret.png") && !ran.said.contains("# secret"),
+            ran.said.contains("map_Kd") && !ran.said.contains("# secret"),
             "{name}: {}",
             ran.said
         );

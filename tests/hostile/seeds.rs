@@ -199,21 +199,12 @@ center = [0, 0, 0]
 radius = 1
 ";
 
+/// The scenes that are changed, which name no other files.
+pub const SCENES: [&str; 5] = ["materials", "cornell", "lens", "lights", "turntable"];
+
 /// All kinds.
 pub fn all(folder: &Path) -> Vec<Kind> {
     put(folder);
-    let text = fs::read_to_string(project("scenes/materials.toml")).unwrap();
-    let texts = ["cornell", "lights", "lens", "turntable"].map(|name| {
-        let path = project(&format!("scenes/{name}.toml"));
-        fs::read_to_string(path).unwrap()
-    });
-    // All that they have, in one.
-    let mut scene: Value = toml::from_str(&text).unwrap();
-    for text in texts {
-        let other: Value = toml::from_str(&text).unwrap();
-        join(&mut scene, &other);
-    }
-    let toml = in_toml(&scene).unwrap();
     let (json, glb) = model();
     let made = |arguments: &[&str], file: &str| {
         let ran = super::run(folder, arguments);
@@ -246,11 +237,14 @@ pub fn all(folder: &Path) -> Vec<Kind> {
         codes: &[1, 3, 5, 7],
         ..kind(ending, image(format), How::Picture(text))
     };
-    vec![
+    let scenes = SCENES.map(|name| {
+        let text = fs::read_to_string(project(&format!("scenes/{name}.toml"))).unwrap();
         Kind {
-            values: Some((scene, in_toml)),
-            ..kind("toml", toml, How::Scene)
-        },
+            values: Some((toml::from_str(&text).unwrap(), in_toml)),
+            ..kind("toml", text.into_bytes(), How::Scene)
+        }
+    });
+    let others = vec![
         Kind {
             values: Some((course, in_json)),
             ..kind("json", COURSE.into(), How::Scene)
@@ -280,25 +274,8 @@ pub fn all(folder: &Path) -> Vec<Kind> {
             codes: &[1],
             ..kind("part", part, How::Part)
         },
-    ]
-}
-
-/// Puts what another scene has beside what is there.
-fn join(scene: &mut Value, other: &Value) {
-    match (scene, other) {
-        (Value::Object(scene), Value::Object(other)) => {
-            for (key, value) in other {
-                match scene.get_mut(key) {
-                    Some(known) => join(known, value),
-                    None => drop(scene.insert(key.clone(), value.clone())),
-                }
-            }
-        }
-        (Value::Array(scene), Value::Array(other)) if other.iter().all(Value::is_object) => {
-            scene.extend(other.iter().cloned());
-        }
-        _ => {}
-    }
+    ];
+    scenes.into_iter().chain(others).collect()
 }
 
 /// A mesh of one triangle, for files that are made to ask for much.

@@ -31,12 +31,14 @@ pub struct Expanded {
     /// How many shapes name each file.
     numbers: BTreeMap<String, usize>,
     prefixes: BTreeSet<String>,
-    /// How many things all shapes have brought, and some more for each.
-    brought: usize,
+    /// How many things shapes have brought, and some more for each: all, and those whose file another shape had named.
+    brought: [usize; 2],
 }
 
 /// The most things that all glTF files of a scene bring: instances, meshes, materials and lights, each as often as a shape names its file.
 const MOST_BROUGHT: usize = 1 << 21;
+/// The most of these that shapes bring whose file another shape has named. Each takes a kilobyte or more.
+const MOST_AGAIN: usize = 1 << 18;
 /// What a shape counts for besides what it brings.
 const SHAPE: usize = 16;
 
@@ -60,7 +62,7 @@ impl Expanded {
             origins: Vec::new(),
             numbers: BTreeMap::new(),
             prefixes: BTreeSet::new(),
-            brought: 0,
+            brought: [0; 2],
         };
         for (i, shape) in description.shapes.iter().enumerate() {
             if let ShapeDescription::Gltf(gltf) = shape {
@@ -127,11 +129,17 @@ impl Expanded {
             imported.materials.len(),
             imported.lights.len(),
         ];
-        self.brought += SHAPE + counts.iter().sum::<usize>();
-        if self.brought > MOST_BROUGHT {
-            let rule = format!(
-                "all shapes of type \"gltf\" together must bring at most {MOST_BROUGHT} instances, meshes, materials and lights"
-            );
+        let brought = SHAPE + counts.iter().sum::<usize>();
+        let is_again = self.numbers.contains_key(&gltf.file);
+        let what = "instances, meshes, materials and lights";
+        self.brought[0] += brought;
+        self.brought[1] += if is_again { brought } else { 0 };
+        if self.brought[0] > MOST_BROUGHT {
+            let rule = format!("all shapes of type \"gltf\" together must bring at most {MOST_BROUGHT} {what}");
+            return Err(Problem::of("file", rule));
+        }
+        if self.brought[1] > MOST_AGAIN {
+            let rule = format!("shapes that name a glTF file again together must bring at most {MOST_AGAIN} {what}");
             return Err(Problem::of("file", rule));
         }
         let prefix = self.prefix(&gltf.file);
