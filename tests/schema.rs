@@ -502,7 +502,14 @@ fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
     match (fits(scene), told(scene, folder)) {
         (false, Ok(())) => Some(format!("the schema alone refuses {scene}")),
         // To JSON 1.0 is a whole number.
-        (true, Err(message)) if message.contains(".0 must be") && message.contains("whole number") => None,
+        (true, Err(message))
+            if message.contains(".0 must be ")
+                && ["whole number", "a name or a number"]
+                    .iter()
+                    .any(|rule| message.contains(rule)) =>
+        {
+            None
+        }
         // What the keys of a camera's path must have then.
         (true, Err(message)) if message.contains(": camera.") && message.ends_with(": is missing") => {
             let has_path = scene["camera"].get("path").is_some();
