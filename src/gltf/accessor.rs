@@ -211,8 +211,9 @@ impl Document {
             let rule = format!("its elements have {} numbers; here they must have {N}", layout.count());
             return Err(Fault::key(format!("{key}.type"), rule));
         }
+        let elements = self.elements(&key, accessor, layout)?;
         self.may_read(&key, accessor, 4 * N)?;
-        let mut vectors = match self.elements(&key, accessor, layout)? {
+        let mut vectors = match elements {
             Some(elements) => elements.vectors(),
             None => vec![[0.0; N]; accessor.count.0 as usize],
         };
@@ -240,8 +241,9 @@ impl Document {
         if layout.count() != 1 {
             return Err(Fault::key(format!("{key}.type"), "indices must be SCALAR"));
         }
+        let elements = self.elements(&key, accessor, layout)?;
         self.may_read(&key, accessor, size_of::<u32>())?;
-        let mut indices = match self.elements(&key, accessor, layout)? {
+        let mut indices = match elements {
             Some(elements) => elements.whole(),
             None => vec![0; accessor.count.0 as usize],
         };

@@ -252,7 +252,7 @@ mod tests {
             assert_eq!(plain(&error), told, "{error}");
         }
         for (value, told) in [
-            (json!([1, 2, 3]), "3 must be text"),
+            (json!([1, 2, 3]), "1 must be text"),
             (json!([]), "a list of 0 must be an object"),
             (json!("x"), "\"x\" must be an object"),
             (json!({}), "\"name\" must be there"),

@@ -11,6 +11,9 @@ use serde_json::{Value, json};
 use super::everything::everything;
 use crate::sources::path as project;
 
+/// How values are written, if they can be.
+pub type Written = fn(&Value) -> Option<Vec<u8>>;
+
 /// A kind of file, and how the program meets one.
 pub struct Kind {
     /// What it is called, which the file's name ends with.
@@ -18,7 +21,7 @@ pub struct Kind {
     /// A sound one.
     pub bytes: Vec<u8>,
     /// The same as values, where it has some, and how they are written.
-    pub values: Option<(Value, fn(&Value) -> Option<Vec<u8>>)>,
+    pub values: Option<(Value, Written)>,
     /// The exit codes beside 0 that a changed one may have.
     pub codes: &'static [i32],
     pub how: How,

@@ -303,11 +303,11 @@ fov = 45
             ),
             (
                 "up = [0,-.5,0]",
-                "8:10: camera.up: -.5 must have a digit before its point, as -0.5 has",
+                "8:9: camera.up: -.5 must have a digit before its point, as -0.5 has",
             ),
             ("up = [1,05,0]", "8:9: camera.up: 05 must not begin with 0"),
             ("up = [1,,0]", "8:9: camera.up: extra comma in array, expected value"),
-            ("a\u{1b}[31m=1", "8:2: a\\u{1b}[31m=1 must be KEY = VALUE"),
+            ("a\u{1b}[31m=1", "8:3: a\\u{1b}[31m=1 must be KEY = VALUE"),
             (
                 "up = [\n  0, # none\n  .1, 1]",
                 "10:3: camera.up: .1 must have a digit before its point, as 0.1 has",
