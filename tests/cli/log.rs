@@ -201,6 +201,14 @@ fn a_signal_is_an_error_with_its_exit_code() {
 }
 
 #[test]
+fn lines_for_an_engine_are_not_json() {
+    let place = Place::new();
+    let (code, lines) = log(&place, &["render", "small.toml", "--progress", "openjd"]);
+    let rule = "--progress: openjd is lines of text, and --log-format json leaves none";
+    assert_eq!((code, &lines[0]["message"]), (2, &rule.into()));
+}
+
+#[test]
 #[cfg(unix)]
 fn a_stream_that_takes_nothing_ends_no_render() {
     let place = Place::new();

@@ -85,6 +85,10 @@ impl<'a> Job<'a> {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
             pool.build_global().context("threads")?; // before anything else is done in parallel
         }
+        if args.shown_progress() == progress::Mode::Openjd && log::is_json() {
+            let rule = "openjd is lines of text, and --log-format json leaves none";
+            return Err(Usage(format!("--progress: {rule}")).into());
+        }
         let frames = args.frames().into_iter();
         let frames = frames.map(|frame| Ok((frame, args.outputs(frame)?)));
         let frames: Vec<(Frame, Outputs)> = frames.collect::<anyhow::Result<_>>()?;
