@@ -237,8 +237,8 @@ fn windows_of_exr_files_are_refused_by_their_headers() {
     let window = b"dataWindow\0box2i\0\x10\0\0\0";
     let found = sound.windows(window.len()).position(|bytes| bytes == window);
     let corners = found.expect("a window") + window.len();
-    let scene = "camera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 40 }\n\
-                 [textures.t]\ntype = 'image'\nfile = 'a.exr'\n[materials.m]\ntype = 'diffuse'\ncolor = 't'\n\
+    let scene = "image = { width = 8, height = 6 }\ncamera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 40 }\n\
+                 [textures.t]\ntype = 'image'\nfile = 'a.exr'\n[materials.m]\ntype = 'diffuse'\ncolor = { texture = 't' }\n\
                  [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
     fs::write(folder.path().join("s.toml"), scene).unwrap();
     for (number, value, code, rule) in [
