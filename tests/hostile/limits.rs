@@ -238,7 +238,7 @@ fn windows_of_exr_files_are_refused_by_their_headers() {
     let found = sound.windows(window.len()).position(|bytes| bytes == window);
     let corners = found.expect("a window") + window.len();
     let scene = "image = { width = 8, height = 6 }\ncamera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 40 }\n\
-                 [textures.t]\ntype = 'image'\nfile = 'a.exr'\n[materials.m]\ntype = 'diffuse'\ncolor = { texture = 't' }\n\
+                 [textures.t]\ntype = 'image'\nfile = 'a.exr'\n[materials.m]\ntype = 'phong'\ncolor = { texture = 't' }\n\
                  [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
     fs::write(folder.path().join("s.toml"), scene).unwrap();
     for (number, value, code, rule) in [
