@@ -205,7 +205,9 @@ fn picture(plan: &Plan, outputs: Outputs, stop: &mut Option<Stop>, start: Instan
     }
     let took = took?;
     let total = start.elapsed().as_secs_f64();
-    info!(render = took.time.as_secs_f64(), seconds = total, "picture written");
+    if !log::is_json() {
+        info!(render = took.time.as_secs_f64(), seconds = total, "picture written"); // else its figures tell it
+    }
     let (least, all) = (took.least_samples, plan.scene.pixel_samples);
     if least < all {
         plan.said.again(
