@@ -39,15 +39,60 @@ pub fn exit_code(signal: i32) -> u8 {
 /// Notes the first signal that asks the program to end; the second one ends it at once. A signal that was ignored when the
 /// program started stays so: that is how `nohup` and shells keep theirs from background jobs.
 pub fn stop() -> io::Result<Stop> {
+    stop_with(None)
+}
+
+/// The same, where SIGTERM has another exit code.
+fn stop_with(terminated: Option<u8>) -> io::Result<Stop> {
     let stop = Stop::default();
     for signal in [SIGINT, SIGTERM, HANG_UP] {
         if !is_ignored(signal) {
-            flag::register_conditional_shutdown(signal, exit_code(signal).into(), Arc::clone(&stop.asked))?;
+            let code = terminated.filter(|_| signal == SIGTERM).unwrap_or(exit_code(signal));
+            flag::register_conditional_shutdown(signal, code.into(), Arc::clone(&stop.asked))?;
             flag::register(signal, Arc::clone(&stop.asked))?;
             flag::register_usize(signal, Arc::clone(&stop.signal), signal.unsigned_abs() as usize)?;
         }
     }
     Ok(stop)
+}
+
+/// The signals of a program that heeds them from some moment on, and is ended by them before.
+pub struct Signals {
+    /// The exit code after SIGTERM, if it is not its own.
+    terminated: Option<u8>,
+    /// Whether SIGTERM still ends the program with that code.
+    ends: Arc<AtomicBool>,
+    stop: Option<Stop>,
+}
+
+impl Signals {
+    /// Signals that are not heeded yet.
+    pub fn unheeded(terminated: Option<u8>) -> io::Result<Signals> {
+        let ends = Arc::new(AtomicBool::new(true));
+        if let Some(code) = terminated.filter(|_| !is_ignored(SIGTERM)) {
+            flag::register_conditional_shutdown(SIGTERM, code.into(), Arc::clone(&ends))?;
+        }
+        Ok(Signals {
+            terminated,
+            ends,
+            stop: None,
+        })
+    }
+
+    /// What they ask for, if they are heeded.
+    pub fn heeded(&self) -> Option<&Stop> {
+        self.stop.as_ref()
+    }
+
+    /// Heeds them from now on.
+    pub fn heed(&mut self) -> io::Result<&Stop> {
+        let stop = match self.stop.take() {
+            Some(stop) => stop,
+            None => stop_with(self.terminated)?,
+        };
+        self.ends.store(false, Ordering::Relaxed);
+        Ok(self.stop.insert(stop))
+    }
 }
 
 #[cfg(unix)]

@@ -92,10 +92,15 @@ pub(super) fn decode(
         return decode_png(bytes, fits);
     }
     if format == ImageFormat::OpenExr
-        && let Some(image) = gray_exr(bytes, |header| {
-            check(header, &fits)?;
-            weigh(bytes, (header.width, header.height), 3 * size_of::<f32>() as u64)
-        })?
+        && let Some(image) = gray_exr(
+            bytes,
+            // What is stored may be more than what is shown.
+            |size, bytes_of_pixel| sides(size).and_then(|()| weigh(bytes, size, bytes_of_pixel)),
+            |header| {
+                check(header, &fits)?;
+                weigh(bytes, (header.width, header.height), 3 * size_of::<f32>() as u64)
+            },
+        )?
     {
         return Ok(image);
     }
@@ -126,10 +131,15 @@ fn weigh(file: &[u8], (width, height): (u32, u32), bytes_of_texel: u64) -> Resul
     }
 }
 
-fn check(header: Header, fits: impl Fn(Header) -> Result<(), String>) -> Result<(), Refused> {
-    if header.width > LONGEST_SIDE || header.height > LONGEST_SIDE {
-        return Err(LimitErrorKind::DimensionError.into_error().into());
+fn sides((width, height): (u32, u32)) -> Result<(), Refused> {
+    match width.max(height) <= LONGEST_SIDE {
+        true => Ok(()),
+        false => Err(LimitErrorKind::DimensionError.into_error().into()),
     }
+}
+
+fn check(header: Header, fits: impl Fn(Header) -> Result<(), String>) -> Result<(), Refused> {
+    sides((header.width, header.height))?;
     fits(header).map_err(Refused::Rule)
 }
 

@@ -13,14 +13,20 @@ use super::decode::{Channels, Header, Refused};
 /// What a file of colours has.
 const COLORS: [&str; 3] = ["R", "G", "B"];
 
-/// The image, if the file has one layer with one channel, and perhaps an opacity `A`, which is ignored. `check` is asked
-/// before anything but the header is read.
+/// The image, if the file has one layer with one channel, and perhaps an opacity `A`, which is ignored. Before anything but the
+/// header is read `check_layer` is asked of each layer that the file has, with its sides and the bytes of a pixel, and `check` of the image.
 pub(super) fn gray_exr(
     bytes: &[u8],
+    check_layer: impl Fn((u32, u32), u64) -> Result<(), Refused>,
     check: impl Fn(Header) -> Result<(), Refused>,
 ) -> Result<Option<DynamicImage>, Refused> {
     let damaged = |error: Error| ImageError::Decoding(DecodingError::new(ImageFormat::OpenExr.into(), error));
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
+    let side = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
+    let size = |header: &exr::meta::header::Header| (side(header.layer_size.width()), side(header.layer_size.height()));
+    for header in &meta.headers {
+        check_layer(size(header), header.channels.bytes_per_pixel as u64)?;
+    }
     let names = |header: &exr::meta::header::Header| -> Vec<String> {
         (header.channels.list.iter())
             .map(|channel| channel.name.to_string())
@@ -50,11 +56,10 @@ pub(super) fn gray_exr(
     if header.deep {
         return Err(refused());
     }
-    let size = header.layer_size;
-    let side = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
+    let (width, height) = size(header);
     check(Header {
-        width: side(size.width()),
-        height: side(size.height()),
+        width,
+        height,
         is_deep: true,
     })?;
     let image = exr::prelude::read()

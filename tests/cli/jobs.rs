@@ -189,6 +189,8 @@ fn a_second_writer_waits_and_goes_on() {
     let second = start(&place, &[&options[..], &["-o", "second.exr"]].concat());
     std::thread::sleep(Duration::from_millis(300));
     assert!(!place.path("second.exr").exists());
+    #[cfg(target_os = "linux")]
+    a_farm_ends_one_that_waits(&place, &options);
     first.kill().expect("a kill");
     first.wait().expect("an end");
     let ran = ended(second);
@@ -203,6 +205,25 @@ fn a_second_writer_waits_and_goes_on() {
     assert!(place.read("third.exr") == expected);
     let stats: serde_json::Value = serde_json::from_slice(&place.read("stats.json")).expect("JSON");
     assert_eq!(stats["share_rendered"], 0.0);
+}
+
+/// SIGTERM asks for another try of a render that has not begun, too.
+#[cfg(target_os = "linux")]
+fn a_farm_ends_one_that_waits(place: &Place, options: &[&str]) {
+    let waiting = start(place, &[options, &["-o", "third.exr", "--requeue-exit", "75"]].concat());
+    let id = waiting.id().to_string();
+    let heeds = || {
+        let status = std::fs::read_to_string(format!("/proc/{id}/status")).expect("a process");
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        let caught = u64::from_str_radix(caught.expect("signals").trim(), 16).expect("a number");
+        caught >> (libc::SIGTERM - 1) & 1 == 1
+    };
+    while !heeds() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let told = std::process::Command::new("kill").args(["-TERM", &id]).status();
+    assert!(told.expect("kill").success());
+    assert_eq!(ended(waiting).code, 75);
 }
 
 /// What is written after a checkpoint that is there, under other options, or is none.

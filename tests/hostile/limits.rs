@@ -227,6 +227,39 @@ fn images_that_grow_a_thousandfold_are_told() {
     assert!(ran.code == 1 && ran.said.contains("must take at most"), "{}", ran.said);
 }
 
+/// What an EXR file stores may be more than what it shows.
+#[test]
+fn windows_of_exr_files_are_refused_by_their_headers() {
+    let folder = tempfile::tempdir().unwrap();
+    let sound = folder.path().join("sound.exr");
+    image::Rgb32FImage::new(8, 6).save(&sound).unwrap();
+    let sound = fs::read(sound).unwrap();
+    let window = b"dataWindow\0box2i\0\x10\0\0\0";
+    let found = sound.windows(window.len()).position(|bytes| bytes == window);
+    let corners = found.expect("a window") + window.len();
+    let scene = "image = { width = 8, height = 6 }\ncamera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 40 }\n\
+                 [textures.t]\ntype = 'image'\nfile = 'a.exr'\n[materials.m]\ntype = 'diffuse'\ncolor = { texture = 't' }\n\
+                 [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
+    fs::write(folder.path().join("s.toml"), scene).unwrap();
+    for (number, value, code, rule) in [
+        (0, 0, 0, ""),
+        (0, -(1 << 28), 3, "must have at most 16384 texels along a side"),
+        (2, 1 << 28, 3, "must have at most 16384 texels along a side"),
+    ] {
+        let mut file = sound.clone();
+        let at = corners + 4 * number;
+        file[at..at + 4].copy_from_slice(&i32::to_le_bytes(value));
+        fs::write(folder.path().join("a.exr"), file).unwrap();
+        let ran = super::render(folder.path(), "s.toml");
+        assert!(
+            ran.code == code && ran.said.contains(rule),
+            "{value}: {} {}",
+            ran.code,
+            ran.said
+        );
+    }
+}
+
 #[test]
 fn files_that_would_wait_or_never_end_are_none() {
     let folder = tempfile::tempdir().unwrap();

@@ -24,17 +24,18 @@ use self::work::Took;
 use super::frames::Frame;
 use super::log::{self, Level};
 use super::outputs::Outputs;
-use super::signal::Stop;
+use super::signal::{Signals, Stop};
 use super::stats::Stats;
-use super::{Interrupted, Usage, facts_of, plain, progress, signal};
+use super::{Interrupted, Usage, facts_of, plain, progress};
 
 pub use args::{Args, parse_duration, parse_size};
 pub use trial::Trial;
 
 pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
+    let mut signals = Signals::unheeded(args.requeue_exit).context("signal handler")?;
     let mut job = Job::new(&args)?;
     info!(seconds = start.elapsed().as_secs_f64(), "scene read");
-    let (mut stop, mut start, mut skipped) = (None, start, 0);
+    let (mut start, mut skipped) = (start, 0);
     let count = job.frames.len();
     for (frame, outputs) in std::mem::take(&mut job.frames) {
         let is_there = args.skip_existing && outputs.are_there();
@@ -54,7 +55,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
             let told = format!("{name} is of another scene or other options, and is rendered anew");
             job.said.again(Level::Note, &told);
         }
-        picture(&plan, outputs, &mut stop, start)?;
+        picture(&plan, outputs, &mut signals, start)?;
         start = Instant::now();
     }
     if skipped > 0 {
@@ -172,8 +173,8 @@ fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame
 }
 
 /// Renders one picture, or a part of one. Signals are heeded from the first one on, and end all.
-fn picture(plan: &Plan, outputs: Outputs, stop: &mut Option<Stop>, start: Instant) -> anyhow::Result<()> {
-    let before = stop.clone();
+fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant) -> anyhow::Result<()> {
+    let before = signals.heeded().cloned();
     let mut checkpoint = plan.open_checkpoint(before.as_ref())?;
     let mut nowhere = Nowhere;
     let keeper: &mut dyn Keeper = match &mut checkpoint {
@@ -182,10 +183,7 @@ fn picture(plan: &Plan, outputs: Outputs, stop: &mut Option<Stop>, start: Instan
     };
     let names: Vec<String> = outputs.files().map(|(_, name, _)| name.to_owned()).collect();
     let outputs = outputs.begin().map_err(RenderError::Output)?;
-    let stop = match stop {
-        Some(stop) => stop,
-        None => stop.insert(signal::stop().context("signal handler")?),
-    };
+    let stop = signals.heed().context("signal handler")?;
     if let Some(signal) = stop.signal() {
         return Err(Interrupted(signal).into());
     }
