@@ -3,7 +3,8 @@
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
-use clap::CommandFactory as _;
+use clap::builder::PossibleValuesParser;
+use clap::{Arg, Command, CommandFactory as _, ValueHint};
 use clap_complete::Shell;
 
 #[derive(Debug, clap::Args)]
@@ -15,6 +16,35 @@ pub struct Args {
 
 pub fn run(args: &Args) -> ExitCode {
     let mut text = Vec::new();
-    clap_complete::generate(args.shell, &mut super::Cli::command(), "wgray", &mut text);
+    clap_complete::generate(args.shell, &mut command(), "wgray", &mut text);
     super::ended(io::stdout().lock().write_all(&text), ExitCode::SUCCESS)
+}
+
+/// The command line, with more of what may be offered than the options themselves take or refuse.
+fn command() -> Command {
+    let all = below(super::Cli::command());
+    let names: Vec<String> = all
+        .get_subcommands()
+        .flat_map(|command| std::iter::once(command).chain(command.get_subcommands()))
+        .map(|command| command.get_name().to_owned())
+        .collect();
+    all.mut_subcommand("man", |man| {
+        man.mut_arg("command", |arg| arg.value_parser(PossibleValuesParser::new(names)))
+    })
+}
+
+/// The arguments of a command and of those below it.
+fn below(command: Command) -> Command {
+    command.mut_args(offered).mut_subcommands(below)
+}
+
+/// Files are offered for paths alone, and for a device the words that are no adapter's name.
+fn offered(arg: Arg) -> Arg {
+    if arg.get_id() == "device" {
+        return arg.value_parser(PossibleValuesParser::new(["auto", "gpu", "cpu"]));
+    }
+    match arg.get_value_hint() {
+        ValueHint::Unknown => arg.value_hint(ValueHint::Other),
+        _ => arg,
+    }
 }

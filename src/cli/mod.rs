@@ -34,6 +34,7 @@ use serde_json::Value;
 use wgray::compare::Unreadable;
 use wgray::error::{Error, RenderError, ShaderError, ShaderErrors};
 use wgray::scene::{Overrides, Problem, Scene, SceneError};
+use wgray::visible::visible;
 
 use self::log::{Facts, Level};
 
@@ -108,7 +109,7 @@ pub fn main() -> ExitCode {
     let start = Instant::now();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(told) => return explain(&told),
+        Err(told) => return explain(&shown(told)),
     };
     log::choose(cli.log_format);
     log::catch_panics();
@@ -152,6 +153,33 @@ pub fn main() -> ExitCode {
         }
     }
 }
+
+/// What is wrong with the command line, with the words of it that cannot be shown, or are long, as messages show them.
+fn shown(mut told: clap::Error) -> clap::Error {
+    use clap::error::{ContextKind, ContextValue};
+    for kind in [
+        ContextKind::InvalidArg,
+        ContextKind::InvalidSubcommand,
+        ContextKind::InvalidValue,
+    ] {
+        let Some(ContextValue::String(word)) = told.get(kind) else {
+            continue;
+        };
+        let shown = visible(word);
+        let shown = match shown.chars().count() {
+            0..=LONGEST_WORD => shown.into_owned(),
+            _ => shown.chars().take(LONGEST_WORD).chain("...".chars()).collect(),
+        };
+        if shown != *word {
+            told.insert(kind, ContextValue::String(shown));
+            told.remove(ContextKind::Suggested); // which has the word as it is
+        }
+    }
+    told
+}
+
+/// The longest word of a command line in a message, in characters.
+const LONGEST_WORD: usize = 200;
 
 /// Prints the help or the version, or what is wrong with the command line.
 fn explain(told: &clap::Error) -> ExitCode {

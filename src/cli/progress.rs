@@ -96,7 +96,8 @@ impl Progress {
     /// A line.
     fn tell(&self, share: f64) {
         let seconds = self.start.elapsed().as_secs_f64();
-        let line = format!("{}{:3.0} % done after {seconds:.1} s", self.label, share * 100.0);
+        let width = if log::is_json() { 0 } else { 3 }; // so that lines below each other are easy to read
+        let line = format!("{}{:width$.0} % done after {seconds:.1} s", self.label, share * 100.0);
         let mut facts = facts_of([("share", share.into()), ("seconds", seconds.into())]);
         facts.extend(self.frame.map(|frame| ("frame".to_owned(), frame.into())));
         log::tell(Level::Progress, &line, facts);

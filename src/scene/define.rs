@@ -72,6 +72,13 @@ fn unreadable(text: &str) -> Problem {
     Problem::new(format!("{} {rule}", cut(text)))
 }
 
+/// The most steps of a path: tables and lists of a file are no deeper in each other.
+const LONGEST_PATH: usize = 80;
+
+fn too_deep(text: &str) -> Problem {
+    Problem::new(format!("{} must have at most {LONGEST_PATH} steps", cut(text)))
+}
+
 /// The path at the start of a text, and what is behind it: nothing, or what begins with `=`.
 fn read_key(text: &str) -> Result<(KeyPath, &str), Problem> {
     let mut path = Vec::new();
@@ -113,6 +120,7 @@ fn read_key(text: &str) -> Result<(KeyPath, &str), Problem> {
         }
     }
     match between && !path.is_empty() {
+        true if path.len() > LONGEST_PATH => Err(too_deep(text)),
         true => Ok((KeyPath(path), rest)),
         false => Err(unreadable(text)),
     }
@@ -550,6 +558,19 @@ radius = 0.5
             assert_eq!(Define::new("key", text).unwrap(), parsed);
         }
         assert!(Define::new("a=b", "1").is_err());
+    }
+
+    #[test]
+    fn a_path_is_no_deeper_than_a_file() {
+        let path = |steps: usize| format!("{}=1", vec!["a"; steps].join("."));
+        assert!(path(LONGEST_PATH).parse::<Define>().is_ok());
+        for steps in [LONGEST_PATH + 1, 100_000] {
+            let told = path(steps).parse::<Define>().unwrap_err().to_string();
+            assert!(told.ends_with(".a=1 must have at most 80 steps"), "{told}");
+            assert!(told.len() < 100, "{told}");
+        }
+        let numbers = format!("a{}=1", "[0]".repeat(LONGEST_PATH));
+        assert!(numbers.parse::<Define>().is_err());
     }
 
     #[test]

@@ -347,6 +347,11 @@ fn what_is_not_for_farms_is_refused() {
             "error: --tile: is not for farms, whose tasks have their own\n",
         ),
         (
+            &["small.toml", "-o", "x.png", "--resume"],
+            2,
+            "error: --resume: is not for farms, whose tasks have their own\n",
+        ),
+        (
             &["small.toml", "-o", "x.png", "--quiet"],
             2,
             "error: --quiet: is not for farms",

@@ -23,7 +23,7 @@ fn things_are_counted() {
     assert_eq!(small["shapes"]["count"], 2);
     assert_eq!(
         small["shapes"]["by_type"],
-        serde_json::json!({ "ellipsoid": 1, "plane": 1 })
+        serde_json::json!({ "sphere": 1, "plane": 1 })
     );
     assert_eq!(
         small["bounds"],
@@ -66,6 +66,25 @@ fn things_are_counted() {
     assert!(
         shapes["triangles"].as_u64() > shapes["mesh_triangles"].as_u64(),
         "a mesh is there twice: {shapes}"
+    );
+    assert_eq!(
+        shapes["triangles"], shapes["placed_mesh_triangles"],
+        "there are no others: {shapes}"
+    );
+    // Four triangles, five rectangles, an ellipsoid and a light.
+    let box_of_all = info(&place, &[&project_scene("cornell.toml"), "--device", "cpu"]);
+    let shapes = &box_of_all["shapes"];
+    assert_eq!(
+        ["triangles", "mesh_triangles", "placed_mesh_triangles", "primitives"].map(|key| shapes[key].as_u64()),
+        [Some(4), Some(0), Some(0), Some(11)]
+    );
+    assert_eq!(shapes["by_type"]["ellipsoid"], 1);
+    let ran = place.run(&["info", &project_scene("cornell.toml"), "--device", "cpu"]);
+    assert!(
+        ran.stdout
+            .contains("primitives  11: rectangles of lights among them, 1\n"),
+        "{}",
+        ran.stdout
     );
     assert_eq!(tube["textures"][0]["type"], "checker");
     assert!(

@@ -48,6 +48,12 @@ fn a_render_tells_how_far_it_is_and_what_it_took() {
     let (last, progress) = lines.split_last().expect("lines");
     assert!(!progress.is_empty() && progress.len() <= 11, "{progress:?}");
     let shares: Vec<f64> = progress.iter().map(|line| line["share"].as_f64().unwrap()).collect();
+    let begins = |line: &Value| {
+        line["message"]
+            .as_str()
+            .is_some_and(|text| text.starts_with(|c: char| c.is_ascii_digit()))
+    };
+    assert!(progress.iter().all(begins), "{progress:?}");
     assert!(shares.is_sorted() && shares.last() == Some(&1.0), "{shares:?}");
     assert!(progress.iter().all(|line| line["level"] == "progress"), "{progress:?}");
     assert_eq!(
@@ -67,6 +73,12 @@ fn a_render_tells_how_far_it_is_and_what_it_took() {
         .find(|line| line["message"] == "scene read")
         .expect("an event");
     assert!(read["seconds"].as_f64() > Some(0.0), "{read}");
+    let written = |line: &&Value| {
+        ["picture written", "render done"]
+            .iter()
+            .any(|name| line["message"] == **name)
+    };
+    assert_eq!(lines.iter().filter(written).count(), 1, "{lines:?}");
     let (code, lines) = log(&place, &["render", "small.toml", "-o", "a.png", "--quiet"]);
     assert_eq!((code, lines.len()), (0, 0));
     let (_, lines) = log(&place, &["render", "small.toml", "-o", "#.png", "--frames", "1-2"]);

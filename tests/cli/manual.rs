@@ -126,6 +126,17 @@ fn bash_completes_commands_options_names_and_files() {
         offered(&place, &["wgray", "render", "a.toml", "--integrator", "p"]),
         ["phong", "path"]
     );
+    assert_eq!(offered(&place, &["wgray", "man", "che"]), ["check"]);
+    assert_eq!(offered(&place, &["wgray", "man", "farm", "slu"]), ["slurm"]);
+    for command in ["render", "info"] {
+        let devices = offered(&place, &["wgray", command, "a.toml", "--device", ""]);
+        assert_eq!(devices, ["auto", "gpu", "cpu"], "{command}");
+    }
+    assert_eq!(
+        offered(&place, &["wgray", "render", "a.toml", "--spp", "sm"]),
+        ["sm"],
+        "no file"
+    );
     let files = |option: &str| {
         let mut files = offered(&place, &["wgray", "render", "a.toml", option, "sma"]);
         files.sort();

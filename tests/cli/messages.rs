@@ -308,3 +308,37 @@ fn what_is_odd_about_a_mesh_is_told_once() {
         assert_eq!(ran.stderr.matches("degenerate").count(), 1, "{}", ran.stderr);
     }
 }
+
+#[test]
+fn words_of_a_bad_command_line_are_shown_and_short() {
+    let place = Place::new();
+    for (arguments, told) in [
+        (
+            &["render", "small.toml", "--size", "\u{1b}[31m\nx"][..],
+            "error: invalid value '\\u{1b}[31m\\nx' for '--size <WxH>': must be ",
+        ),
+        (
+            &["render", "--b\u{202e}ad"],
+            "error: unexpected argument '--b\\u{202e}ad' found\n",
+        ),
+        (&["pa\rint"], "error: unrecognized subcommand 'pa\\rint'\n"),
+    ] {
+        let ran = place.run(arguments);
+        assert_eq!((ran.code, ran.stdout.as_str()), (2, ""), "{arguments:?}");
+        assert!(ran.stderr.starts_with(told), "{arguments:?}: {}", ran.stderr);
+    }
+    // What is plain has its advice.
+    let ran = place.run(&["rendr"]);
+    assert!(ran.stderr.contains("'render'"), "{}", ran.stderr);
+    let long = "a.".repeat(30_000);
+    for arguments in [
+        &["render", "small.toml", "-D", &long][..],
+        &["render", "small.toml", "-D", &format!("{long}a=1")],
+        &["render", &format!("--{long}")],
+        &[&long],
+    ] {
+        let ran = place.run(arguments);
+        assert_eq!(ran.code, 2, "{}", ran.stderr);
+        assert!(ran.stderr.len() < 1000, "{}", ran.stderr);
+    }
+}

@@ -3,8 +3,9 @@
 
 use std::ffi::OsString;
 
+use clap::builder::Resettable;
 use clap::parser::ValueSource;
-use clap::{ArgMatches, Args, Command, FromArgMatches};
+use clap::{ArgMatches, Args, Command, FromArgMatches, Id};
 
 use crate::cli::picture_options::PictureOptions;
 use crate::cli::render;
@@ -104,7 +105,10 @@ impl Args for Rendering {
         let command = render::Args::augment_args(command);
         OF_TASKS
             .into_iter()
-            .fold(command, |command, id| command.mut_arg(id, |arg| arg.hide(true)))
+            // What such an option needs is not asked for: it is refused by itself.
+            .fold(command, |command, id| {
+                command.mut_arg(id, |arg| arg.hide(true).requires(Resettable::<Id>::Reset))
+            })
     }
 
     fn augment_args_for_update(command: Command) -> Command {

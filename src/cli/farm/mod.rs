@@ -285,13 +285,22 @@ fn size(work: &mut Work, own: &Own, job: &mut Job, start: Instant) -> anyhow::Re
         "This is by a trial{of} on {device}; a picture by itself takes {}.",
         seconds(fixed + trial.rendering)
     ));
-    if all < 2.0 * fixed {
-        let told = format!(
-            "--task-time: of {} each task needs {} to begin; tasks are longer, so that it is half of them at most",
-            seconds(all),
-            seconds(fixed)
-        );
-        log::say(Level::Warning, &told);
+    let (of, begins) = (seconds(all), seconds(fixed));
+    let told = if trial.rendering > rendering * f64::from(rows) {
+        Some(format!("a part is a row at least, and takes longer than {of}"))
+    } else if all < 2.0 * fixed && work.tiles == 1 {
+        Some(format!(
+            "of {of} each task needs {begins} to begin; the picture is one task"
+        ))
+    } else if all < 2.0 * fixed {
+        Some(format!(
+            "of {of} each task needs {begins} to begin; tasks are longer, so that it is half of them at most"
+        ))
+    } else {
+        None
+    };
+    if let Some(told) = told {
+        log::say(Level::Warning, &format!("--task-time: {told}"));
     }
     Ok(())
 }

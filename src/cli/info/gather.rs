@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
+use glam::DVec3;
 use serde::Serialize;
 use wgray::device::Foreseen;
 use wgray::film::Region;
@@ -93,12 +94,14 @@ impl Kinds {
 pub struct Shapes {
     #[serde(flatten)]
     pub kinds: Kinds,
-    /// Different meshes, and their triangles, each counted once.
+    /// Different meshes.
     pub meshes: u64,
+    /// Their triangles, each counted once, and as often as its mesh is there.
     pub mesh_triangles: u64,
-    /// The triangles that there are, those of a mesh as often as it is there.
+    pub placed_mesh_triangles: u64,
+    /// All triangles that there are: these, and those of triangles and tetrahedra.
     pub triangles: u64,
-    /// What trees of boxes are over, or what is looked through one by one.
+    /// What rays are tested with besides meshes: shapes, four triangles of a tetrahedron, and rectangles that are lights.
     pub primitives: u64,
 }
 
@@ -229,17 +232,17 @@ fn seen(camera: &Camera, path: Option<&CameraPath>) -> Seen {
 
 fn shapes(scene: &Scene, packed: &Packed) -> Shapes {
     let mut known = HashSet::new();
-    let (mut mesh_triangles, mut triangles) = (0, 0);
+    let (mut mesh_triangles, mut placed_mesh_triangles, mut others) = (0, 0, 0);
     for shape in &scene.shapes {
         match &shape.geometry {
             Geometry::Mesh { mesh, .. } => {
                 let count = mesh.triangles.len() as u64;
-                triangles += count;
+                placed_mesh_triangles += count;
                 if known.insert(Arc::as_ptr(mesh)) {
                     mesh_triangles += count;
                 }
             }
-            Geometry::Triangles(all) => triangles += all.len() as u64,
+            Geometry::Triangles(all) => others += all.len() as u64,
             _ => {}
         }
     }
@@ -247,7 +250,8 @@ fn shapes(scene: &Scene, packed: &Packed) -> Shapes {
         kinds: Kinds::of(scene.shapes.iter().map(|shape| form(&shape.geometry))),
         meshes: known.len() as u64,
         mesh_triangles,
-        triangles,
+        placed_mesh_triangles,
+        triangles: placed_mesh_triangles + others,
         primitives: packed.primitives.len() as u64,
     }
 }
@@ -256,12 +260,18 @@ fn form(geometry: &Geometry) -> &'static str {
     match geometry {
         Geometry::Rectangle(_) => "rectangle",
         Geometry::Disk(_) => "disk",
+        Geometry::Ellipsoid { axes, .. } if is_sphere(axes) => "sphere",
         Geometry::Ellipsoid { .. } => "ellipsoid",
         Geometry::Triangles(all) if all.len() == 1 => "triangle",
         Geometry::Triangles(_) => "tetrahedron",
         Geometry::Mesh { .. } => "mesh",
         Geometry::Plane { .. } => "plane",
     }
+}
+
+/// Whether half axes are those that a sphere has, along x, y and z.
+fn is_sphere(axes: &[DVec3; 3]) -> bool {
+    *axes == [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * axes[0].x)
 }
 
 fn reflection(reflection: &Reflection) -> &'static str {

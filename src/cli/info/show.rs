@@ -51,11 +51,23 @@ pub fn table(info: &Info) -> String {
             "meshes",
             &format!(
                 "{meshes} different, of {triangles} triangles; {} with all their copies",
-                shapes.triangles
+                shapes.placed_mesh_triangles
             ),
         );
     }
-    row("primitives", &shapes.primitives.to_string());
+    let lit = info.lights.kinds.by_type.get("rectangle");
+    let more = [
+        lit.map(|count| format!("rectangles of lights among them, {count}")),
+        (shapes.meshes > 0).then(|| "meshes not".to_owned()),
+    ];
+    let more: Vec<String> = more.into_iter().flatten().collect();
+    row(
+        "primitives",
+        &match more.is_empty() {
+            true => shapes.primitives.to_string(),
+            false => format!("{}: {}", shapes.primitives, more.join("; ")),
+        },
+    );
     row("materials", &kinds(&info.materials));
     row("textures", &textures(&info.textures));
     let lights = &info.lights;

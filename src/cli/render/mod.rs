@@ -203,7 +203,9 @@ fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant)
     }
     let took = took?;
     let total = start.elapsed().as_secs_f64();
-    info!(render = took.time.as_secs_f64(), seconds = total, "picture written");
+    if !log::is_json() {
+        info!(render = took.time.as_secs_f64(), seconds = total, "picture written"); // else its figures tell it
+    }
     let (least, all) = (took.least_samples, plan.scene.pixel_samples);
     if least < all {
         plan.said.again(

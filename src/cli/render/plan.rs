@@ -122,7 +122,7 @@ impl<'a> Plan<'a> {
             resume: self.resume,
             interval: self.checkpoint_interval,
             wait: Box::new(move || asked().is_none() && self.deadline.is_none_or(|end| Instant::now() < end)),
-            tell: Box::new(|what| self.said.again(Level::Warning, &what.to_string())),
+            tell: Box::new(|what| self.said.again(Level::Warning, what)),
         };
         let identity = Identity::of(&self.scene, self.region(), self.options.exact_rounding);
         match Checkpoint::open(opening, identity, self.scene.form()) {

@@ -13,6 +13,7 @@ pub struct CameraPathDescription {
     #[serde(default)]
     pub interpolation: Interpolation,
     /// At which frame it is where, in the order of their frames.
+    #[schemars(length(min = 1))]
     pub keys: Vec<CameraKeyDescription>,
 }
 
@@ -42,6 +43,7 @@ pub enum Interpolation {
 /// camera's own.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("minProperties" = 2))] // something beside the frame
 pub struct CameraKeyDescription {
     /// Which frame; it may be a fraction.
     #[schemars(with = "FrameNumber")]

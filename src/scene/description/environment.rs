@@ -10,6 +10,7 @@ use crate::scene::schema::kinds::{Degrees, Elevation, EnvironmentScale, Rgb, Tur
 /// What surrounds the scene, for `integrator = "path"`: one of `color`, `file` and `name`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["color"] }, { "required": ["file"] }, { "required": ["name"] }]))]
 pub struct EnvironmentDescription {
     /// Radiance from everywhere; linear RGB.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -17,6 +18,7 @@ pub struct EnvironmentDescription {
     pub color: Option<DVec3>,
     /// An equirectangular image, relative to the scene file's folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
     pub file: Option<String>,
     /// One of the program's own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -25,7 +27,8 @@ pub struct EnvironmentDescription {
     #[serde(default = "one")]
     #[schemars(with = "EnvironmentScale")]
     pub scale: f64,
-    /// How it is turned.
+    /// How it is turned: by degrees about the z axis, counter-clockwise as seen from above, or as a mesh is, each angle from -360 to 360
+    /// degrees. If absent, not at all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<EnvironmentRotation>,
     /// Whether the camera sees it.
@@ -37,15 +40,15 @@ pub struct EnvironmentDescription {
     pub background: Option<DVec3>,
     /// How high the sun of `"sky"` stands, in degrees.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<Elevation>")]
+    #[schemars(with = "Option<Elevation>", extend("default" = 40))]
     pub sun_elevation: Option<f64>,
     /// Where the sun of `"sky"` stands: degrees from +x towards +y.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<Degrees>")]
+    #[schemars(with = "Option<Degrees>", extend("default" = 0))]
     pub sun_azimuth: Option<f64>,
     /// How hazy `"sky"` is: light that air and haze take from a ray, relative to clean air.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<Turbidity>")]
+    #[schemars(with = "Option<Turbidity>", extend("default" = 2))]
     pub turbidity: Option<f64>,
 }
 

@@ -13,8 +13,10 @@ use crate::scene::schema::kinds::{Matrix, Place, Point, Seconds};
 /// A glTF file: its meshes with their materials and textures, and its lights.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("not" = { "required": ["matrix"], "anyOf": [{ "required": ["scale"] }, { "required": ["rotate"] }, { "required": ["translate"] }] }))]
 pub struct GltfDescription {
     /// The file, relative to the scene file's folder.
+    #[schemars(length(min = 1))]
     pub file: String,
     /// Which of its scenes; absent, the one that the file names, else the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -37,15 +39,17 @@ pub struct GltfDescription {
     pub materials: BTreeMap<String, String>,
     /// Added to its coordinates, after all else.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<Point>")]
+    #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
-    /// How it is turned, after it was scaled.
+    /// How it is turned, after it was scaled: by three angles about x, y and z, or by one about an axis, each from -360 to 360 degrees. If
+    /// absent, not at all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
-    /// Factors of its coordinates.
+    /// Factors of its coordinates, one or three, each from 1e-6 to 1e6 or negative.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// The rows of an affine map, in place of the three.
+    /// The rows of an affine map, in place of `scale`, `rotate` and `translate`. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,

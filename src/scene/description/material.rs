@@ -58,11 +58,11 @@ impl MaterialDescription {
 pub struct PhongDescription {
     /// Short for the three factors.
     pub color: Option<ColorDescription>,
-    /// Factor of the ambient light.
+    /// Factor of the ambient light: linear red, green and blue, or a texture. If absent, `color`.
     pub ambient: Option<ColorDescription>,
-    /// Factor of the diffuse term.
+    /// Factor of the diffuse term: linear red, green and blue, or a texture. If absent, `color`.
     pub diffuse: Option<ColorDescription>,
-    /// Factor of the specular term.
+    /// Factor of the specular term: linear red, green and blue, or a texture. If absent, `color`.
     pub specular: Option<ColorDescription>,
     /// Exponent of the specular term.
     #[serde(default = "sixteen")]

@@ -14,6 +14,7 @@ use crate::scene::schema::kinds::{Angles, Degrees, Factor, Factor3, Matrix, Poin
 #[serde(deny_unknown_fields)]
 pub struct MeshFileDescription {
     /// The file, relative to the scene file's folder.
+    #[schemars(length(min = 1))]
     pub file: String,
     /// The normals that it is shaded by. If absent, the file's if it has any, else flat ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -37,8 +38,10 @@ impl MeshFileDescription {
 /// A mesh.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("not" = { "required": ["matrix"], "anyOf": [{ "required": ["scale"] }, { "required": ["rotate"] }, { "required": ["translate"] }] }))]
 pub struct MeshDescription {
     /// The file, relative to the scene file's folder.
+    #[schemars(length(min = 1))]
     pub file: String,
     /// The normals that it is shaded by. If absent, the file's if it has any, else flat ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -54,15 +57,17 @@ pub struct MeshDescription {
     pub materials: BTreeMap<String, String>,
     /// Added to its coordinates, after all else.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<Point>")]
+    #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
-    /// How it is turned, after it was scaled.
+    /// How it is turned, after it was scaled: by three angles about x, y and z, or by one about an axis, each from -360 to 360 degrees. If
+    /// absent, not at all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
-    /// Factors of its coordinates.
+    /// Factors of its coordinates, one or three, each from 1e-6 to 1e6 or negative.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// The rows of an affine map, in place of the three.
+    /// The rows of an affine map, in place of `scale`, `rotate` and `translate`. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,
@@ -88,6 +93,7 @@ impl MeshDescription {
 /// A mesh of `[meshes.NAME]`, at a place of its own.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("not" = { "required": ["matrix"], "anyOf": [{ "required": ["scale"] }, { "required": ["rotate"] }, { "required": ["translate"] }] }))]
 pub struct InstanceDescription {
     /// The mesh's name.
     pub mesh: String,
@@ -99,15 +105,17 @@ pub struct InstanceDescription {
     pub materials: BTreeMap<String, String>,
     /// Added to its coordinates, after all else.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<Point>")]
+    #[schemars(with = "Option<Point>", extend("default" = [0, 0, 0]))]
     pub translate: Option<DVec3>,
-    /// How it is turned, after it was scaled.
+    /// How it is turned, after it was scaled: by three angles about x, y and z, or by one about an axis, each from -360 to 360 degrees. If
+    /// absent, not at all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<Rotation>,
-    /// Factors of its coordinates.
+    /// Factors of its coordinates, one or three, each from 1e-6 to 1e6 or negative.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("default" = 1))]
     pub scale: Option<Scale>,
-    /// The rows of an affine map, in place of the three.
+    /// The rows of an affine map, in place of `scale`, `rotate` and `translate`. None if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Matrix>")]
     pub matrix: Option<Vec<[f64; 4]>>,

@@ -187,7 +187,8 @@ pub struct PixelFilterDescription {
     /// Its form.
     #[serde(rename = "type")]
     pub kind: PixelFilterKind,
-    /// How far it reaches, in pixels; absent, what is usual for its form.
+    /// How far it reaches, in pixels. If absent, what is usual for its form: 0.5 for `"box"`, 1 for `"triangle"`, 1.5 for `"gaussian"` and
+    /// `"blackman_harris"`, 2 for `"mitchell"`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<FilterRadius>")]
     pub radius: Option<f64>,

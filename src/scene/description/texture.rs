@@ -288,6 +288,7 @@ impl LinesDescription {
 #[serde(deny_unknown_fields)]
 pub struct ImageTextureDescription {
     /// Its path, relative to the scene file.
+    #[schemars(length(min = 1))]
     pub file: String,
     /// What its values mean; sRGB if absent, but EXR and HDR files are linear.
     pub encoding: Option<Encoding>,
