@@ -275,7 +275,7 @@ file = "ball.obj"
 normals = "smooth"
 up = "y"
 material = "all"
-materials = { group = "gold" }
+materials = { first = "gold" }
 translate = [0, 0, 1]
 rotate = [0, 20, 0]
 scale = 0.5
@@ -286,7 +286,7 @@ up = "z"
 [[instances]]
 mesh = "cube"
 material = "gold"
-materials = { group = "gold" }
+materials = { first = "gold" }
 translate = [0, 0, 1]
 rotate = { axis = [0, 0, 1], degrees = 20 }
 scale = [1, -1, 2]

@@ -44,7 +44,7 @@ fn offered(arg: Arg) -> Arg {
         return arg.value_parser(PossibleValuesParser::new(["auto", "gpu", "cpu"]));
     }
     match arg.get_value_hint() {
-        ValueHint::Unknown => arg.value_hint(ValueHint::Other),
+        ValueHint::Unknown if arg.get_possible_values().is_empty() => arg.value_hint(ValueHint::Other),
         _ => arg,
     }
 }

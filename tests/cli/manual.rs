@@ -134,7 +134,7 @@ fn bash_completes_commands_options_names_and_files() {
     }
     assert_eq!(
         offered(&place, &["wgray", "render", "a.toml", "--spp", "sm"]),
-        ["sm"],
+        ["compopt -o nospace", "sm"],
         "no file"
     );
     let files = |option: &str| {
