@@ -65,7 +65,7 @@ enum Command {
         doc = "Validates scene files, and the shaders for them, without a device"
     )]
     #[cfg_attr(not(feature = "gpu"), doc = "Validates scene files")]
-    Check(check::Args),
+    Check(Box<check::Args>),
     /// Tells what is in a scene, what it takes, and what would render it
     Info(Box<info::Args>),
     /// Joins parts of a picture, which render --tile has written, to the picture
