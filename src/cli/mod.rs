@@ -91,7 +91,7 @@ enum Command {
     Man(man::Args),
     /// Shows a scene on a web page, and shows it anew whenever the scene file or a shader is saved
     #[cfg(feature = "dev")]
-    Dev(dev::Args),
+    Dev(Box<dev::Args>),
 }
 
 /// The work was ended by a signal.
@@ -138,7 +138,7 @@ pub fn main() -> ExitCode {
         Command::Completions(args) => Ok(completions::run(&args)),
         Command::Man(args) => man::run(&args),
         #[cfg(feature = "dev")]
-        Command::Dev(args) => dev::run(args),
+        Command::Dev(args) => dev::run(*args),
     };
     match result {
         Ok(code) => code,
