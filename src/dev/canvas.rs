@@ -8,7 +8,7 @@ use crate::backend::Backend;
 use crate::cpu::Cpu;
 use crate::error::RenderError;
 use crate::film::{Film, Region};
-use crate::gpu::Gpu;
+use crate::gpu::{Call, Gpu, Live};
 use crate::image::{Aov, Pixels};
 use crate::job::{Cut, Order, Steps};
 use crate::pack::{Camera, FirstHit, Packed};
@@ -102,6 +102,21 @@ impl Canvas {
             self.restart(scene.camera, view)?;
         }
         Ok(same_kernel)
+    }
+
+    /// What the kernel has that is not as the files say.
+    pub fn live(&self) -> &Live {
+        self.gpu.live()
+    }
+
+    /// Gives the kernel's sliders their values. The picture must be started again.
+    pub fn set_sliders(&mut self, values: &[[u32; 4]]) -> Result<(), RenderError> {
+        self.gpu.set_sliders(values)
+    }
+
+    /// The calls that have ended since this was asked last.
+    pub fn calls(&mut self) -> Vec<Call> {
+        self.gpu.calls()
     }
 
     /// Starts the picture again, from a camera.
@@ -288,7 +303,10 @@ impl Canvas {
         let size = [gpu.width, gpu.height];
         Ok(match cpu.filter(|_| view == View::Compare) {
             Some(cpu) => (Content::Compare(gpu, cpu), size),
-            None => (Content::Color(gpu), size),
+            None => match self.gpu.live().layer() {
+                Some(layer) => (Content::Layer(gpu, layer.numbers), size),
+                None => (Content::Color(gpu), size),
+            },
         })
     }
 

@@ -7,8 +7,10 @@ use serde::{Deserialize, Serialize};
 use super::build::Built;
 use super::camera::Move;
 use super::diagnostic::Diagnostic;
-use super::picture::View;
+use super::picture::{LayerName, View};
+use super::sliders::SliderState;
 use super::source::Snapshot;
+use crate::gpu::marks::Value;
 
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,10 +40,12 @@ pub enum Report {
     Saved(Result<(), String>),
     /// The last save was taken back, or could not be.
     Unsaved(Result<(), String>),
+    /// The values of sliders were written into the shaders, or could not be.
+    Written(Result<(), String>),
 }
 
 /// What someone who looks asks for.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Command {
     /// To move the camera.
@@ -58,6 +62,21 @@ pub enum Command {
     Gain(f32),
     /// Whether pixels that are no light are marked.
     Marks(bool),
+    /// Another value of a slider of the shaders.
+    Slide {
+        /// The file of its constant.
+        file: String,
+        /// The constant's name.
+        name: String,
+        /// The value.
+        value: Value,
+    },
+    /// The value of the file for a slider, given as file and name.
+    ResetSlider(String, String),
+    /// The values of the files for all.
+    ResetSliders,
+    /// To write the sliders' values into the shaders.
+    WriteSliders,
 }
 
 /// What is known beside the picture; it goes to the page as JSON.
@@ -83,6 +102,12 @@ pub struct State {
     pub can_undo: bool,
     /// What is wrong now.
     pub problems: Vec<Diagnostic>,
+    /// The sliders of the shaders.
+    pub sliders: Vec<SliderState>,
+    /// The layers of the shaders that can be shown.
+    pub layers: Vec<LayerName>,
+    /// The form of links that open an editor, with `{file}`, `{line}` and `{column}`; none if there are no such links.
+    pub editor: Option<String>,
     /// Whether a kernel is being compiled.
     pub compiling: bool,
     /// Seconds that the last one took.

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::faults::{Fault, Faults, faults, mark};
 use crate::film::{Film, mean};
+use crate::gpu::marks::LONGEST_NAME;
 use crate::image::{self, Aov, Pixels, difference};
 use crate::pack::{FirstHit, NOTHING};
 use crate::scene::ViewSettings;
@@ -29,9 +30,63 @@ pub enum View {
     Samples,
     /// Radiance by the GPU, by the CPU, and their difference.
     Compare,
+    /// A variable of the shaders that is marked as a layer.
+    Layer(LayerName),
+}
+
+/// The name of a layer of the shaders.
+#[derive(Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct LayerName {
+    bytes: [u8; LONGEST_NAME],
+    length: u8,
+}
+
+impl LayerName {
+    /// A name; `None` if it is longer than any layer's.
+    pub fn new(name: &str) -> Option<LayerName> {
+        let mut bytes = [0; LONGEST_NAME];
+        bytes.get_mut(..name.len())?.copy_from_slice(name.as_bytes());
+        let length = u8::try_from(name.len()).ok()?;
+        Some(LayerName { bytes, length })
+    }
+
+    /// The name.
+    pub fn as_str(&self) -> &str {
+        let bytes = self.bytes.get(..usize::from(self.length)).unwrap_or_default();
+        std::str::from_utf8(bytes).unwrap_or_default()
+    }
+}
+
+impl std::fmt::Debug for LayerName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.as_str().fmt(f)
+    }
+}
+
+impl TryFrom<String> for LayerName {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<LayerName, String> {
+        LayerName::new(&name).ok_or_else(|| format!("a layer's name must have {LONGEST_NAME} bytes at most"))
+    }
+}
+
+impl From<LayerName> for String {
+    fn from(name: LayerName) -> String {
+        name.as_str().to_string()
+    }
 }
 
 impl View {
+    /// The layer of the shaders that it shows.
+    pub fn layer(self) -> Option<LayerName> {
+        match self {
+            View::Layer(name) => Some(name),
+            _ => None,
+        }
+    }
+
     /// What it shows of the first hits, if it does not show the film.
     pub fn aov(self) -> Option<Aov> {
         match self {
@@ -39,7 +94,7 @@ impl View {
             View::Depth => Some(Aov::Depth),
             View::Uv => Some(Aov::Uv),
             View::Primitive => Some(Aov::Primitive),
-            View::Color | View::Samples | View::Compare => None,
+            View::Color | View::Samples | View::Compare | View::Layer(_) => None,
         }
     }
 }
@@ -94,6 +149,8 @@ pub enum Content {
     Hits(Aov, Vec<FirstHit>),
     /// [`View::Compare`]: GPU and CPU, where both have samples.
     Compare(Pixels, Pixels),
+    /// [`View::Layer`], and how many numbers it has.
+    Layer(Pixels, usize),
 }
 
 /// What is told about a frame beside its pictures.
@@ -185,6 +242,11 @@ impl Frame {
         let light = |pixels: &Pixels| faults(&pixels.colors, look.negative, |color| *color);
         let pictures: Vec<(&'static str, Vec<u8>)> = match &content {
             Content::Color(colors) => vec![marked("picture", display(colors, look.view), light(colors))],
+            // Numbers as they are, of which any may be negative.
+            Content::Layer(values, _) => {
+                let rgb = bytes(&values.colors, |color| Vec3::from(*color));
+                vec![marked("picture", rgb, faults(&values.colors, true, |color| *color))]
+            }
             Content::Samples(counts, total) => {
                 vec![(
                     "picture",
@@ -246,6 +308,10 @@ impl Frame {
                 let color = *pixels.colors.get(i)?;
                 let shown = self.view.rgb8(color).map(|byte| byte.to_string()).join(" ");
                 vec![("linear RGB", numbers(color)), ("shown", shown)]
+            }
+            Content::Layer(values, count) => {
+                let values = values.colors.get(i)?.iter().take(*count);
+                vec![("layer", values.map(|v| format!("{v}")).collect::<Vec<_>>().join("  "))]
             }
             Content::Samples(counts, total) => vec![("samples", format!("{} of {total}", counts.get(i)?))],
             Content::Hits(aov, hits) => self.hit(*aov, hits.get(i)?),

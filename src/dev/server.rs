@@ -17,11 +17,13 @@ use hyper_util::rt::TokioIo;
 use hyper_util::service::TowerToHyperService;
 use serde::{Deserialize, Serialize};
 use tokio::sync::{Semaphore, watch};
+use tokio::time::MissedTickBehavior;
 
 use super::guard::Guard;
 use super::messages::{self, Command};
 use super::picture::Frame;
 use super::session::{Session, Viewers};
+use super::times::{Time, Times};
 
 /// So many may look at once.
 const VIEWERS: usize = 16;
@@ -33,6 +35,8 @@ const REQUEST: Duration = Duration::from_secs(10);
 const LARGEST_MESSAGE: usize = 4096;
 /// A viewer that takes nothing for so long is gone.
 const SEND: Duration = Duration::from_secs(30);
+/// So often a viewer is told where the time goes, while that changes.
+const TIMES: Duration = Duration::from_millis(500);
 /// So often a viewer is asked whether it is there; after three times without a word it is gone.
 const BEAT: Duration = Duration::from_secs(15);
 
@@ -76,6 +80,7 @@ impl Listener {
             guard: self.guard,
             state: session.state.clone(),
             frames: session.frames.clone(),
+            times: session.times.clone(),
             send: Arc::new(session.commands()),
             seats: Arc::new(Semaphore::new(VIEWERS)),
             viewers: session.viewers(),
@@ -113,6 +118,7 @@ struct Shared {
     guard: Guard,
     state: watch::Receiver<Arc<messages::State>>,
     frames: watch::Receiver<Option<Arc<Frame>>>,
+    times: Times,
     send: Arc<dyn Fn(Command) -> Option<u64> + Send + Sync>,
     seats: Arc<Semaphore>,
     viewers: Viewers,
@@ -130,6 +136,9 @@ fn routes(shared: Shared) -> Router {
         )
         .route("/page.js", file(JAVASCRIPT, include_str!("page/page.js")))
         .route("/picture.js", file(JAVASCRIPT, include_str!("page/picture.js")))
+        .route("/shader.js", file(JAVASCRIPT, include_str!("page/shader.js")))
+        .route("/times.js", file(JAVASCRIPT, include_str!("page/times.js")))
+        .route("/editor.js", file(JAVASCRIPT, include_str!("page/editor.js")))
         .route("/socket", get(socket))
         .layer(middleware::from_fn_with_state(shared.clone(), guarded))
         .with_state(shared)
@@ -195,6 +204,8 @@ enum Tell<'a> {
     /// The number of a command that was given; the state says when it has been followed.
     Asked(u64),
     Refused(String),
+    /// Where the time goes.
+    Times(&'a [Time]),
 }
 
 /// Tells one viewer what there is to tell, as fast as it takes it: it gets the newest frame, not every frame.
@@ -203,6 +214,9 @@ async fn view(mut socket: WebSocket, shared: &Shared) -> Option<()> {
     state.mark_changed();
     frames.mark_changed();
     let mut beat = tokio::time::interval(BEAT);
+    let mut clock = tokio::time::interval(TIMES);
+    clock.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut times = Vec::new();
     let mut heard = Instant::now();
     loop {
         let message = tokio::select! {
@@ -229,6 +243,14 @@ async fn view(mut socket: WebSocket, shared: &Shared) -> Option<()> {
                     Message::Ping(_) | Message::Pong(_) => continue,
                 }
             }
+            _ = clock.tick() => {
+                let told = shared.times.told();
+                if told == times {
+                    continue;
+                }
+                times = told;
+                text(&Tell::Times(&times))?
+            }
             _ = beat.tick() => {
                 if heard.elapsed() > 3 * BEAT {
                     return None;
@@ -236,7 +258,12 @@ async fn view(mut socket: WebSocket, shared: &Shared) -> Option<()> {
                 Message::Ping(Vec::new().into())
             }
         };
+        let is_frame = matches!(message, Message::Binary(_));
+        let start = Instant::now();
         tokio::time::timeout(SEND, socket.send(message)).await.ok()?.ok()?;
+        if is_frame {
+            shared.times.part("send", start.elapsed());
+        }
     }
 }
 

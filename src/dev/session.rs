@@ -14,6 +14,7 @@ use super::messages::{Command, Event, Report, State};
 use super::painter::{Painter, Told};
 use super::picture::Frame;
 use super::source::Sources;
+use super::times::Times;
 use super::watch::Watch;
 use crate::error::RenderError;
 use crate::gpu::{Choice, choose};
@@ -28,6 +29,8 @@ pub struct Settings {
     pub out: Option<PathBuf>,
     /// Whether nothing is rendered while nobody looks ([`Session::viewers`]) and there is no `out`.
     pub only_for_viewers: bool,
+    /// The form of links that open an editor; none for no such links.
+    pub editor: Option<String>,
     /// Is told what happens, for the terminal.
     pub report: Box<dyn Fn(Report) + Send>,
 }
@@ -44,6 +47,8 @@ pub struct Session {
     pub state: watch::Receiver<Arc<State>>,
     /// The newest picture, once there is one. A slow reader misses some.
     pub frames: watch::Receiver<Option<Arc<Frame>>>,
+    /// Where the time goes.
+    pub times: Times,
     viewers: Viewers,
     watch: Option<Watch>,
     thread: Option<JoinHandle<()>>,
@@ -103,6 +108,7 @@ impl Session {
             device: choice,
             out,
             only_for_viewers,
+            editor,
             report,
         } = settings;
         std::fs::metadata(&sources.scene).map_err(|error| StartError::NoScene(sources.scene.clone(), error))?;
@@ -116,7 +122,8 @@ impl Session {
             let events = events.clone();
             move |snapshot, noticed| events.send(Event::Files(Box::new(snapshot), noticed)).is_ok()
         })?;
-        let builder = Builder::start(choice, {
+        let times = Times::default();
+        let builder = Builder::start(choice, times.clone(), {
             let events = events.clone();
             move |built| {
                 let _ = events.send(Event::Built(Box::new(built))); // after the session's end nobody wants it
@@ -130,8 +137,9 @@ impl Session {
             report,
             state: state_sender,
             frames: frame_sender,
+            times: times.clone(),
         };
-        let painter = Painter::new(sources, device, builder, out, wanted_by, told);
+        let painter = Painter::new(sources, device, builder, (out, editor), wanted_by, told);
         let thread = std::thread::Builder::new()
             .name("render".to_string())
             .spawn(move || run(painter, inbox))?;
@@ -144,6 +152,7 @@ impl Session {
             asked: Arc::default(),
             state,
             frames,
+            times,
             watch: Some(watch),
             thread: Some(thread),
         })
@@ -267,6 +276,7 @@ mod tests {
             device: Choice::Auto,
             out: None,
             only_for_viewers: false,
+            editor: None,
             report: Box::new(move |report| drop(told.send(report))),
         })
         .unwrap();
@@ -321,6 +331,7 @@ mod tests {
             device: Choice::Auto,
             out: None,
             only_for_viewers: false,
+            editor: None,
             report: Box::new(|_| ()),
         };
         let error = Session::start(settings).err().unwrap().to_string();

@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::SystemTime;
+use std::time::{Duration, Instant, SystemTime};
 
 use super::diagnostic::Diagnostic;
+use super::picture::LayerName;
 use crate::gpu::compose::{self, Shaders};
 use crate::pack::{Packed, Specialization, pack};
 use crate::scene::{CameraDescription, Description, Integrator, Overrides, Scene, is_gltf};
@@ -33,12 +34,14 @@ pub struct Loaded {
     pub packed: Packed,
 }
 
-/// What a kernel is compiled for: its constants, the integrator, and whether sampling is adaptive.
-pub type Constants = (Specialization, Integrator, bool);
+/// What a kernel is compiled for: its constants, the integrator, whether sampling is adaptive, and the layer that takes the
+/// place of light.
+pub type Constants = (Specialization, Integrator, bool, Option<LayerName>);
 
-/// What a scene's kernel is compiled for.
-pub fn constants(packed: &Packed) -> Constants {
-    (packed.specialization, packed.integrator, packed.adaptive)
+/// What a scene's kernel is compiled for. A layer's samples are not adaptive: what they say of light's errors is nothing.
+pub fn constants(packed: &Packed, layer: Option<LayerName>) -> Constants {
+    let adaptive = packed.adaptive && layer.is_none();
+    (packed.specialization, packed.integrator, adaptive, layer)
 }
 
 /// What the files say at one moment.
@@ -48,6 +51,8 @@ pub struct Snapshot {
     pub scene: Result<Arc<Loaded>, Diagnostic>,
     /// The shaders, or what is wrong with them.
     pub shaders: Result<Arc<Shaders>, Diagnostic>,
+    /// How long it took to read the files, and to pack the scene.
+    pub took: [Duration; 2],
     /// The scene file and the files that the scene uses, and their state: what decides whether to read again.
     pub files: Vec<(PathBuf, Stamp)>,
 }
@@ -71,6 +76,7 @@ impl Sources {
 
     /// Reads what has changed since a snapshot; `None` if nothing has.
     pub fn reread(&self, last: &Snapshot) -> Option<Snapshot> {
+        let start = Instant::now();
         let shaders = match (self.read_shaders(), &last.shaders) {
             (Ok(new), Ok(old)) if new == *old => Ok(old.clone()), // the same pointer, which later stages compare
             (shaders, _) => shaders,
@@ -85,6 +91,7 @@ impl Sources {
             (true, true) => None,
             (true, false) => Some(Snapshot {
                 shaders,
+                took: [start.elapsed(), Duration::ZERO],
                 ..last.clone()
             }),
             (false, _) => {
@@ -112,6 +119,7 @@ impl Sources {
     }
 
     fn read_scene(&self, shaders: Result<Arc<Shaders>, Diagnostic>) -> Snapshot {
+        let start = Instant::now();
         // The stamps are taken first: a file that changes while it is read is read again.
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
         let mut text = String::new();
@@ -132,17 +140,25 @@ impl Sources {
                 files.push((path, stamp));
             }
         }
+        let mut took = [start.elapsed(), Duration::ZERO];
         let scene = scene
             .map_err(|error| Diagnostic::scene(&error, &text))
             .map(|(scene, described)| {
+                let start = Instant::now();
                 let packed = pack(&scene).without_layers(); // no view shows them
+                took[1] = start.elapsed();
                 Arc::new(Loaded {
                     camera: described.camera,
                     scene,
                     packed,
                 })
             });
-        Snapshot { scene, shaders, files }
+        Snapshot {
+            scene,
+            shaders,
+            took,
+            files,
+        }
     }
 
     /// The files that a scene names.

@@ -11,4 +11,6 @@ mod reload;
 mod responsive;
 mod running;
 mod server;
+mod shader_layers;
+mod shader_sliders;
 mod views;

@@ -181,6 +181,7 @@ impl Running {
             device: Choice::Auto,
             only_for_viewers: out.is_some(), // a file needs the picture as a viewer does
             out,
+            editor: None,
             report: Box::new(|_| ()),
         };
         Running {

@@ -6,9 +6,9 @@ use super::Painter;
 use crate::dev::build::guarded;
 use crate::dev::camera::{Move, moved};
 use crate::dev::messages::{Command, Notice, Report};
-use crate::dev::picture::View;
+use crate::dev::picture::{LayerName, View};
 use crate::dev::save::save_camera;
-use crate::dev::source::Loaded;
+use crate::dev::source::{Constants, Loaded, constants};
 use crate::pack::{Camera, Packed, pack_camera};
 
 impl Painter {
@@ -23,7 +23,10 @@ impl Painter {
             Command::SaveCamera => self.save_camera(),
             Command::UndoSave => self.undo_save(),
             Command::View(view) => {
-                self.view = view;
+                let old = std::mem::replace(&mut self.view, view);
+                self.keep_view();
+                let other_layer = self.view.layer() != old.layer();
+                let view = self.seen();
                 if let Some(running) = &mut self.running {
                     running.halted = false;
                     match guarded(|| running.canvas.change_view(view)) {
@@ -34,6 +37,9 @@ impl Painter {
                         self.show();
                     }
                 }
+                if other_layer {
+                    self.settle((Instant::now(), false)); // it takes a kernel of its own
+                }
             }
             Command::Gain(gain) => {
                 self.gain = gain.clamp(1.0, 1e9);
@@ -41,6 +47,10 @@ impl Painter {
                     self.show();
                 }
             }
+            Command::Slide { file, name, value } => self.slide(&file, &name, value),
+            Command::ResetSlider(file, name) => self.reset_sliders(Some((&file, &name))),
+            Command::ResetSliders => self.reset_sliders(None),
+            Command::WriteSliders => self.write_sliders(),
             Command::Marks(marks) => {
                 self.marks = marks;
                 if self.running.is_some() {
@@ -61,7 +71,7 @@ impl Painter {
     }
 
     fn camera_moved(&mut self) {
-        self.camera_waits = true;
+        self.restart_waits = true;
         if let Some(running) = &mut self.running {
             running.halted = false;
         }
@@ -95,7 +105,7 @@ impl Painter {
         (self.report)(Report::Unsaved(result));
     }
 
-    fn notice(&mut self, result: &Result<(), String>, good: String) {
+    pub(super) fn notice(&mut self, result: &Result<(), String>, good: String) {
         let number = self.state.notice.as_ref().map_or(0, |notice| notice.number) + 1;
         let (text, bad) = match result {
             Ok(()) => (good, false),
@@ -113,10 +123,19 @@ impl Painter {
         })
     }
 
-    /// A scene with the camera that is looked through.
+    /// What a scene's kernel is compiled for, to show what is asked for.
+    pub(super) fn constants(&self, loaded: &Loaded) -> Constants {
+        constants(
+            &loaded.packed,
+            self.layer().and_then(|layer| LayerName::new(&layer.name)),
+        )
+    }
+
+    /// A scene with the camera that is looked through, sampled as what is asked for needs it.
     pub(super) fn packed(&self, loaded: &Loaded) -> Packed {
         Packed {
             camera: self.packed_camera(loaded),
+            adaptive: self.constants(loaded).2,
             ..loaded.packed.clone()
         }
     }

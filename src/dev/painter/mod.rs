@@ -2,6 +2,7 @@
 
 mod commands;
 mod kernels;
+mod shader;
 mod show;
 
 use std::path::PathBuf;
@@ -18,7 +19,9 @@ use super::canvas::Canvas;
 use super::messages::{Event, Report, State};
 use super::picture::{Frame, View};
 use super::save::Saved;
-use super::source::{Constants, Loaded, Snapshot, Sources, Stamp, constants};
+use super::sliders::Sliders;
+use super::source::{Constants, Loaded, Snapshot, Sources, Stamp};
+use super::times::Times;
 use crate::gpu::Device;
 use crate::gpu::compose::Shaders;
 use crate::scene::CameraDescription;
@@ -46,7 +49,7 @@ pub struct Painter {
 
     /// The last scene that was right.
     loaded: Option<Arc<Loaded>>,
-    /// The newest shaders that could be read.
+    /// The newest shaders that could be read, with the values of sliders that are compiled in.
     shaders: Option<Arc<Shaders>>,
     /// The last shaders that made a picture.
     good: Option<Arc<Shaders>>,
@@ -56,6 +59,8 @@ pub struct Painter {
     cut: Option<(Arc<Shaders>, Constants)>,
     device: Option<Device>,
     running: Option<Running>,
+    /// The kernel that ran before, where that was for a layer and this is not, or the other way.
+    parked: Option<Running>,
     pending: Option<Pending>,
     requests: u64,
     failures: u32,
@@ -63,13 +68,15 @@ pub struct Painter {
 
     /// The camera, where it is not the file's.
     camera: Option<CameraDescription>,
-    /// Whether it moved since the picture was begun.
-    camera_waits: bool,
+    sliders: Sliders,
+    /// Whether the camera or a slider moved since the picture was begun.
+    restart_waits: bool,
     /// The last save of a camera, while it can be taken back.
     saved: Option<Saved>,
     /// Whether it was, and the file has not been read again.
     taken_back: bool,
     view: View,
+    times: Times,
     gain: f32,
     marks: bool,
     /// The sizes that were told last, asked for and shown, of a picture that is too large.
@@ -99,6 +106,8 @@ struct Running {
     halted: bool,
     shaders: Arc<Shaders>,
     constants: Constants,
+    /// The values of its sliders.
+    sliders: Vec<[u32; 4]>,
 }
 
 struct Pending {
@@ -115,6 +124,8 @@ pub struct Told {
     pub state: watch::Sender<Arc<State>>,
     /// Those who are sent the picture.
     pub frames: watch::Sender<Option<Arc<Frame>>>,
+    /// Where the time goes.
+    pub times: Times,
 }
 
 impl Painter {
@@ -123,7 +134,7 @@ impl Painter {
         sources: Sources,
         device: Device,
         builder: Builder,
-        out: Option<PathBuf>,
+        (out, editor): (Option<PathBuf>, Option<String>),
         looking: Option<Arc<AtomicUsize>>,
         told: Told,
     ) -> Painter {
@@ -131,12 +142,14 @@ impl Painter {
             report,
             state: state_sender,
             frames: frame_sender,
+            times,
         } = told;
         let state = State {
             scene: sources.scene.display().to_string(),
             shaders: sources.shaders.as_ref().map(|folder| folder.display().to_string()),
             device: format!("{}, {}", device.info.name, device.info.driver),
             gain: GAIN,
+            editor,
             ..State::default()
         };
         Painter {
@@ -156,15 +169,18 @@ impl Painter {
             cut: None,
             device: Some(device),
             running: None,
+            parked: None,
             pending: None,
             requests: 0,
             failures: 0,
             problems: Problems::default(),
             camera: None,
-            camera_waits: false,
+            sliders: Sliders::default(),
+            restart_waits: false,
             saved: None,
             taken_back: false,
             view: View::default(),
+            times,
             gain: GAIN,
             marks: true,
             smaller: None,
@@ -201,6 +217,11 @@ impl Painter {
     }
 
     fn take_files(&mut self, snapshot: Snapshot, noticed: Instant) {
+        for (part, took) in ["read files", "pack"].into_iter().zip(snapshot.took) {
+            if !took.is_zero() {
+                self.times.part(part, took);
+            }
+        }
         if let Some((_, Stamp::Content(content))) = snapshot.files.first()
             && self.saved.as_ref().is_some_and(|saved| !saved.is(content))
         {
@@ -232,15 +253,14 @@ impl Painter {
         match snapshot.shaders {
             Ok(shaders) => {
                 self.problems.files = None;
-                let good = self.good.as_ref();
-                self.refused
-                    .retain(|(known, _)| *known == shaders || Some(known) == good);
-                self.shaders = Some(shaders);
+                self.read_shaders(shaders);
             }
             Err(problem) => self.problems.files = Some(problem),
         }
         self.failures = 0;
+        self.keep_view();
         self.settle((noticed, true));
+        self.upload_sliders((noticed, true));
         // What is rendered may be the same; if it is not, its first picture comes by itself.
         let picture = self.running.as_ref().filter(|running| !running.canvas.is_new());
         if shown_otherwise && self.pending.is_none() && picture.is_some() {
@@ -253,7 +273,7 @@ impl Painter {
     /// it the last good ones.
     fn wanted(&self) -> Option<(Arc<Loaded>, Arc<Shaders>)> {
         let (loaded, newest) = (self.loaded.clone()?, self.shaders.clone()?);
-        let constants = constants(&loaded.packed);
+        let constants = self.constants(&loaded);
         let mut candidates = [Some(newest), self.good.clone()].into_iter().flatten();
         let shaders = candidates.find(|shaders| !self.refused.contains(&(shaders.clone(), constants)))?;
         Some((loaded, shaders))
@@ -265,11 +285,15 @@ impl Painter {
         if self.shaders.as_ref() == Some(&shaders) {
             self.problems.shader.clear();
         }
-        let constants = constants(&loaded.packed);
+        let constants = self.constants(&loaded);
         let fits = |known: &Arc<Shaders>, of| *known == shaders && constants == of;
         let running = self.running.as_ref();
-        if running.is_some_and(|running| fits(&running.shaders, running.constants)) {
+        let fitting = running.is_some_and(|running| fits(&running.shaders, running.constants));
+        if fitting || self.take_parked(&shaders, &constants) {
             self.pending = None;
+            if !fitting {
+                self.show_parked(since);
+            }
             self.draw_scene(since);
         } else if !(self.pending.as_ref()).is_some_and(|pending| fits(&pending.shaders, pending.constants)) {
             self.since.get_or_insert(since);
@@ -278,7 +302,7 @@ impl Painter {
     }
 
     fn request(&mut self, loaded: &Loaded, shaders: Arc<Shaders>) {
-        let constants = constants(&loaded.packed);
+        let constants = self.constants(&loaded);
         // A running kernel that fits the scene stays if the new one is wrong; else the last good shaders are compiled.
         let running = self.running.as_ref();
         let stays = running.is_some_and(|running| running.constants == constants);
@@ -289,6 +313,7 @@ impl Painter {
             device: self.device.clone(),
             packed: self.packed(loaded),
             shaders: shaders.clone(),
+            layer: self.layer().cloned(),
             fallback,
         });
         self.pending = Some(Pending {
@@ -302,15 +327,16 @@ impl Painter {
     fn draw_scene(&mut self, since: (Instant, bool)) {
         let Some(loaded) = self.loaded.clone() else { return };
         let packed = self.packed(&loaded);
-        let (Some(running), view) = (&mut self.running, self.view) else {
-            return;
-        };
+        let (view, times) = (self.seen(), self.times.clone());
+        let Some(running) = &mut self.running else { return };
         if running.canvas.shows(&packed) {
-            self.since = None;
+            if !self.restart_waits {
+                self.since = None;
+            }
             return;
         }
         running.halted = false;
-        match guarded(|| running.canvas.update(&packed, view)) {
+        match guarded(|| times.of("upload", || running.canvas.update(&packed, view))) {
             Ok(true) => self.begun(since),
             Ok(false) => {} // it fits, so this cannot be
             Err(error) => self.fail(&error),
@@ -319,7 +345,7 @@ impl Painter {
 
     /// A picture has been begun, by the camera as it is now.
     fn begun(&mut self, since: (Instant, bool)) {
-        self.camera_waits = false;
+        self.restart_waits = false;
         self.tell_size();
         self.changed(since);
     }
@@ -343,27 +369,35 @@ impl Painter {
             .as_ref()
             .filter(|running| !running.halted)
             .is_some_and(|running| {
-                let more = !running.canvas.is_done(self.view);
+                let more = !running.canvas.is_done(self.seen());
                 // While a kernel is compiled the processor is left to the compiler, but for the camera.
-                self.camera_waits || (more && (self.pending.is_none() || running.canvas.is_new()))
+                self.restart_waits || (more && (self.pending.is_none() || running.canvas.is_new()))
             })
     }
 
     /// Does one call's worth of work.
     pub fn work(&mut self) {
-        let (view, waits) = (self.view, self.camera_waits);
+        let (view, waits) = (self.seen(), self.restart_waits);
         let Some(loaded) = self.loaded.clone() else { return };
         let camera = self.packed_camera(&loaded);
         let Some(running) = &mut self.running else { return };
         // A camera that never rests must not keep the first picture from being finished.
         if waits && (!running.canvas.is_new() || running.canvas.is_done(view)) {
-            match guarded(|| running.canvas.restart(camera, view)) {
+            let sliders = self.sliders.values(running.canvas.live().sliders());
+            let restarted = guarded(|| {
+                running.canvas.set_sliders(&sliders)?;
+                running.canvas.restart(camera, view)
+            });
+            running.sliders = sliders;
+            match restarted {
                 Ok(()) => self.begun((Instant::now(), false)),
                 Err(error) => self.fail(&error),
             }
             return;
         }
-        match guarded(|| running.canvas.step(view)) {
+        let stepped = guarded(|| self.times.of("render", || running.canvas.step(view)));
+        running.canvas.calls().iter().for_each(|call| self.times.call(call));
+        match stepped {
             Ok(show) => {
                 let due = self.last_frame.elapsed() > BETWEEN_FRAMES.max(10 * self.frame_cost);
                 if show || (due && !running.canvas.is_new()) {

@@ -18,6 +18,8 @@ pub struct Problems {
     pub scene: Option<Diagnostic>,
     pub files: Option<Diagnostic>,
     pub shader: Vec<Diagnostic>,
+    /// Marks of shaders that cannot be followed.
+    pub marks: Vec<Diagnostic>,
     /// The picture cannot be rendered whole.
     pub cut: Option<Diagnostic>,
     pub device: Option<Diagnostic>,
@@ -27,7 +29,7 @@ pub struct Problems {
 impl Problems {
     fn all(&self) -> impl Iterator<Item = &Diagnostic> {
         let others = [&self.cut, &self.scene, &self.device, &self.out].into_iter().flatten();
-        self.files.iter().chain(&self.shader).chain(others)
+        self.files.iter().chain(&self.shader).chain(&self.marks).chain(others)
     }
 }
 
@@ -35,16 +37,16 @@ impl Painter {
     pub(super) fn is_done(&self) -> bool {
         self.running
             .as_ref()
-            .is_some_and(|running| running.canvas.is_done(self.view))
+            .is_some_and(|running| running.canvas.is_done(self.seen()))
     }
 
     /// Shows the picture as it is now.
     pub(super) fn show(&mut self) {
-        let (view, done) = (self.view, self.is_done());
+        let (view, done) = (self.seen(), self.is_done());
         let Some(running) = &mut self.running else { return };
         let canvas = &mut running.canvas;
         let start = Instant::now();
-        let (content, sent) = match guarded(|| canvas.content(view)) {
+        let (content, sent) = match guarded(|| self.times.of("read back", || canvas.content(view))) {
             Ok(content) => content,
             Err(error) => return self.fail(&error),
         };
@@ -87,7 +89,8 @@ impl Painter {
             negative: bins.into_iter().any(|bin| bin.z < 0.0),
             view: settings,
         };
-        let frame = Frame::new(header, content, names.unwrap_or_default(), look);
+        let make = || Frame::new(header, content, names.unwrap_or_default(), look);
+        let frame = self.times.of("make PNG", make);
         self.frame_sender.send_replace(Some(Arc::new(frame)));
         self.last_frame = Instant::now();
         self.frame_cost = start.elapsed();
@@ -156,11 +159,15 @@ impl Painter {
         self.state.camera = camera.map(text).unwrap_or_default();
         self.state.camera_moved = self.camera.is_some();
         (self.state.heard, self.state.frame) = (self.heard, self.frames);
-        self.state.busy = self.camera_waits || self.pending.is_some() || (self.running.is_some() && !self.is_done());
+        self.state.busy = self.restart_waits || self.pending.is_some() || (self.running.is_some() && !self.is_done());
         self.state.can_undo = self.saved.is_some();
         self.state.problems = problems;
         self.state.compiling = self.pending.is_some();
         (self.state.view, self.state.gain, self.state.marks) = (self.view, self.gain, self.marks);
+        self.state.sliders = self
+            .sliders
+            .told(self.loaded.as_ref().map(|loaded| loaded.packed.integrator));
+        self.state.layers = self.layers();
         if **self.state_sender.borrow() != self.state {
             self.state_sender.send_replace(Arc::new(self.state.clone()));
         }

@@ -1,0 +1,163 @@
+//! Sliders and layers of shaders: what the page asks for, and what the kernels have.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::{Painter, Running};
+use crate::dev::build::guarded;
+use crate::dev::diagnostic::Diagnostic;
+use crate::dev::messages::Report;
+use crate::dev::picture::{LayerName, View};
+use crate::dev::source::Constants;
+use crate::gpu::compose::Shaders;
+use crate::gpu::marks::{Layer, Value};
+
+impl Painter {
+    /// Takes the shaders as the files have them now.
+    pub(super) fn read_shaders(&mut self, shaders: Arc<Shaders>) {
+        self.sliders.read(shaders.clone());
+        let folder = self.sources.shaders.as_deref();
+        let mistakes = self.sliders.marks().mistakes.iter();
+        self.problems.marks = mistakes
+            .map(|error| Diagnostic::shader(error, &shaders, folder))
+            .collect();
+        self.take_shaders();
+    }
+
+    /// The shaders to be compiled are those of the files, with the values of sliders that need it.
+    /// Returns whether they are others than before.
+    pub(super) fn take_shaders(&mut self) -> bool {
+        let Some(shaders) = self.sliders.shaders() else {
+            return false;
+        };
+        if self.shaders.as_ref().is_some_and(|known| Arc::ptr_eq(known, &shaders)) {
+            return false;
+        }
+        let good = self.good.as_ref();
+        self.refused
+            .retain(|(known, _)| *known == shaders || Some(known) == good);
+        self.shaders = Some(shaders);
+        true
+    }
+
+    pub(super) fn slide(&mut self, file: &str, name: &str, value: Value) {
+        match self.sliders.slide(file, name, value) {
+            Ok(true) => self.slid(),
+            Ok(false) => {}
+            Err(error) => self.notice(&Err(error), String::new()),
+        }
+    }
+
+    pub(super) fn reset_sliders(&mut self, one: Option<(&str, &str)>) {
+        if self.sliders.reset(one) {
+            self.slid();
+        }
+    }
+
+    /// Sliders stand elsewhere: the running kernel gets their values, or another one is compiled.
+    fn slid(&mut self) {
+        if self.take_shaders() {
+            self.settle((Instant::now(), false));
+        }
+        self.upload_sliders((Instant::now(), false));
+    }
+
+    /// Sees to it that the running kernel has the values of its sliders, with the next picture.
+    pub(super) fn upload_sliders(&mut self, since: (Instant, bool)) {
+        let Some(running) = &mut self.running else { return };
+        if self.sliders.values(running.canvas.live().sliders()) != running.sliders {
+            running.halted = false;
+            self.restart_waits = true;
+            self.since.get_or_insert(since);
+        }
+    }
+
+    /// Writes the values into the shaders' files.
+    pub(super) fn write_sliders(&mut self) {
+        let result = match &self.sources.shaders {
+            None => Err("the shaders in the program cannot be changed: --shaders must name a folder".to_string()),
+            Some(_) if !self.sliders.are_moved() => Err("every slider stands where its file says".to_string()),
+            Some(folder) => self.sliders.write(folder),
+        };
+        let told = result.map(|saved| saved.len());
+        let count = told.as_ref().copied().unwrap_or_default();
+        let files = if count == 1 { "file" } else { "files" };
+        let result = told.map(drop);
+        self.notice(&result, format!("sliders written into {count} {files} of shaders"));
+        (self.report)(Report::Written(result));
+    }
+
+    /// The layer that is asked for, if the shaders have it.
+    pub(super) fn layer(&self) -> Option<&Layer> {
+        let (View::Layer(name), Some(loaded)) = (self.view, &self.loaded) else {
+            return None;
+        };
+        self.sliders
+            .layers(loaded.packed.integrator)
+            .find(|layer| layer.name == name.as_str())
+    }
+
+    /// The names of the layers that can be shown.
+    pub(super) fn layers(&self) -> Vec<LayerName> {
+        let Some(loaded) = &self.loaded else { return Vec::new() };
+        let layers = self.sliders.layers(loaded.packed.integrator);
+        let mut names: Vec<LayerName> = layers.filter_map(|layer| LayerName::new(&layer.name)).collect();
+        names.dedup();
+        names
+    }
+
+    /// A view that the shaders do not have is colour's.
+    pub(super) fn keep_view(&mut self) {
+        if let (View::Layer(name), Some(_), None) = (self.view, &self.loaded, self.layer()) {
+            self.view = View::Color;
+            let there = self.layers();
+            let there = match there.is_empty() {
+                true => "there is none".to_string(),
+                false => format!(
+                    "there are {}",
+                    there.iter().map(LayerName::as_str).collect::<Vec<_>>().join(", ")
+                ),
+            };
+            let told = format!("the shaders have no layer `{}`: {there}", name.as_str());
+            self.notice(&Err(told), String::new());
+        }
+    }
+
+    /// What the running kernel can show: what is asked for, unless another kernel is compiled for that.
+    pub(super) fn seen(&self) -> View {
+        let shown = self.running.as_ref().and_then(|running| running.constants.3);
+        match (self.view, shown) {
+            (View::Layer(asked), Some(shown)) if asked == shown => self.view,
+            (_, Some(shown)) => View::Layer(shown),
+            (View::Layer(_), None) => View::Color,
+            (view, None) => view,
+        }
+    }
+
+    /// Goes back to the kernel that ran before, if that is what is wanted: a layer's, or that of light.
+    pub(super) fn take_parked(&mut self, shaders: &Arc<Shaders>, constants: &Constants) -> bool {
+        let fits = |parked: &Running| parked.shaders == *shaders && parked.constants == *constants;
+        let found = self.parked.as_ref().is_some_and(fits);
+        if found {
+            std::mem::swap(&mut self.running, &mut self.parked);
+        }
+        found
+    }
+
+    /// The kernel that runs is shown from now on, with what it has.
+    pub(super) fn show_parked(&mut self, since: (Instant, bool)) {
+        let view = self.seen();
+        let Some(running) = &mut self.running else { return };
+        running.halted = false;
+        match guarded(|| running.canvas.change_view(view)) {
+            Ok(()) => {
+                self.changed(since);
+                self.upload_sliders(since);
+                if self.is_done() {
+                    self.show();
+                }
+            }
+            Err(error) => self.fail(&error),
+        }
+    }
+}
