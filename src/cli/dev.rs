@@ -272,8 +272,8 @@ impl Terminal {
             ),
             Report::Saved(Ok(())) => self.line(GREEN, "camera saved into the scene file"),
             Report::Saved(Err(error)) => self.line(RED, &format!("camera not saved: {error}")),
-            Report::Written(Ok(())) => self.line(GREEN, "sliders written into the shaders"),
-            Report::Written(Err(error)) => self.line(RED, &format!("sliders not written: {error}")),
+            Report::Written(what, Ok(())) => self.line(GREEN, what),
+            Report::Written(what, Err(error)) => self.line(RED, &format!("not {what}: {error}")),
             Report::Unsaved(Ok(())) => self.line(GREEN, "camera's save taken back"),
             Report::Unsaved(Err(error)) => self.line(RED, &format!("camera's save not taken back: {error}")),
         }

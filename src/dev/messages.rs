@@ -40,8 +40,8 @@ pub enum Report {
     Saved(Result<(), String>),
     /// The last save was taken back, or could not be.
     Unsaved(Result<(), String>),
-    /// The values of sliders were written into the shaders, or could not be.
-    Written(Result<(), String>),
+    /// The values of sliders were written into the shaders, or that was taken back, as is said here; or why not.
+    Written(&'static str, Result<(), String>),
 }
 
 /// What someone who looks asks for.
@@ -77,6 +77,8 @@ pub enum Command {
     ResetSliders,
     /// To write the sliders' values into the shaders.
     WriteSliders,
+    /// To take that back.
+    UndoSliders,
 }
 
 /// What is known beside the picture; it goes to the page as JSON.
@@ -104,6 +106,8 @@ pub struct State {
     pub problems: Vec<Diagnostic>,
     /// The sliders of the shaders.
     pub sliders: Vec<SliderState>,
+    /// Whether the last writing of their values can be taken back.
+    pub sliders_undo: bool,
     /// The layers of the shaders that can be shown.
     pub layers: Vec<LayerName>,
     /// The form of links that open an editor, with `{file}`, `{line}` and `{column}`; none if there are no such links.

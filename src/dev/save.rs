@@ -35,7 +35,7 @@ impl Saved {
         let now = fs::read(&self.path).map_err(|error| format!("{place}: {error}"))?;
         if !self.is(&now) {
             return Err(format!(
-                "{place}: has been changed since it was saved, and stays as it is"
+                "{place}: has been changed since the camera was saved, and stays as it is"
             ));
         }
         replace(&self.path, self.before.as_bytes()).map_err(|error| format!("{place}: cannot be written: {error}"))
@@ -62,20 +62,6 @@ pub fn save_camera(path: &Path, camera: &CameraDescription) -> Result<Option<Sav
         return Ok(None);
     }
     replace(&path, after.as_bytes()).map_err(|error| format!("{place}: cannot be written: {error}"))?;
-    Ok(Some(Saved { path, before, after }))
-}
-
-/// Gives a file another text, in one step; `None` if it has it already.
-///
-/// # Errors
-///
-/// What to tell the user: the file cannot be written.
-pub fn replace_text(path: &Path, before: String, after: String) -> Result<Option<Saved>, String> {
-    if after == before {
-        return Ok(None);
-    }
-    replace(path, after.as_bytes()).map_err(|error| format!("{}: cannot be written: {error}", path.display()))?;
-    let path = path.to_owned();
     Ok(Some(Saved { path, before, after }))
 }
 

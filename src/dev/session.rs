@@ -138,8 +138,9 @@ impl Session {
             state: state_sender,
             frames: frame_sender,
             times: times.clone(),
+            editor,
         };
-        let painter = Painter::new(sources, device, builder, (out, editor), wanted_by, told);
+        let painter = Painter::new(sources, device, builder, out, wanted_by, told);
         let thread = std::thread::Builder::new()
             .name("render".to_string())
             .spawn(move || run(painter, inbox))?;

@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf, absolute};
 use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::save::{Saved, replace_text};
+use super::save::replace;
 use crate::gpu::compose::{KERNELS, Shaders};
 use crate::gpu::marks::{Kind, Layer, Marks, Slider, Value, edited};
 use crate::gpu::{with_edits, without_values};
@@ -18,6 +18,8 @@ use crate::scene::Integrator;
 pub struct SliderState {
     /// Its file in the folder of shaders.
     pub file: String,
+    /// The whole path of that, for an editor; none for the shaders in the program.
+    pub path: Option<String>,
     /// The constant's name.
     pub name: String,
     /// Its line, counted from 1.
@@ -55,6 +57,22 @@ pub struct Sliders {
     given: Option<Arc<Shaders>>,
     /// The constants that the running kernel reads from a buffer, once there is one.
     live: Option<BTreeSet<Key>>,
+    /// The files as they were written last.
+    written: Vec<Written>,
+}
+
+/// A file that sliders were written into.
+struct Written {
+    path: PathBuf,
+    before: String,
+    after: String,
+}
+
+impl Written {
+    fn put(&self, text: &str) -> Result<(), String> {
+        let told = |error| format!("{}: cannot be written: {error}", self.path.display());
+        replace(&self.path, text.as_bytes()).map_err(told)
+    }
 }
 
 fn key(slider: &Slider) -> Key {
@@ -153,41 +171,82 @@ impl Sliders {
         live.iter().map(value).collect()
     }
 
-    /// Writes the values into the files of a folder: of each the number alone. What is written counts as the file's.
+    /// Writes the values into the files of a folder: of each the number alone. Returns how many files were written.
     ///
     /// # Errors
     ///
     /// What to tell the user. Files before the one that fails have been written.
-    pub fn write(&mut self, folder: &Path) -> Result<Vec<Saved>, String> {
+    pub fn write(&mut self, folder: &Path) -> Result<usize, String> {
         let files: BTreeSet<&String> = self.moved.keys().map(|(file, _)| file).collect();
-        let mut saved = Vec::new();
+        let mut new = Vec::new();
         for file in files {
             let path = folder.join(file);
-            let place = path.display().to_string();
+            let failed = |error| format!("{}: {error}", path.display());
             // A link stays one: what it leads to is replaced.
-            let path = fs::canonicalize(&path).map_err(|error| format!("{place}: {error}"))?;
-            let text = fs::read_to_string(&path).map_err(|error| format!("{place}: {error}"))?;
-            let there = Marks::of_file(file, &text).sliders;
+            let target = fs::canonicalize(&path).map_err(failed)?;
+            let before = fs::read_to_string(&target).map_err(failed)?;
+            let there = Marks::of_file(file, &before).sliders;
             let mut edits = Vec::new();
             for ((_, name), value) in self.moved.iter().filter(|((known, _), _)| known == file) {
                 let slider = there.iter().find(|slider| slider.name == *name);
-                let slider = slider.ok_or_else(|| format!("{place}: `{name}` is no slider any more"))?;
-                edits.extend(slider.edits(&text, *value));
+                let slider = slider.ok_or_else(|| format!("{}: `{name}` is no slider any more", path.display()))?;
+                edits.extend(slider.edits(&before, *value));
             }
-            saved.extend(replace_text(&path, text.clone(), edited(&text, edits))?);
+            let after = edited(&before, edits);
+            new.push(Written {
+                path: target,
+                before,
+                after,
+            });
         }
-        Ok(saved)
+        self.written.clear();
+        for file in new {
+            file.put(&file.after)?;
+            self.written.push(file);
+        }
+        Ok(self.written.len())
+    }
+
+    /// Gives the files the texts that they had before the last [`Sliders::write`]. Returns how many there were.
+    ///
+    /// # Errors
+    ///
+    /// What to tell the user: a file has been changed since, or cannot be read or written.
+    pub fn take_back(&mut self) -> Result<usize, String> {
+        let written = std::mem::take(&mut self.written);
+        for file in &written {
+            let place = file.path.display();
+            let now = fs::read(&file.path).map_err(|error| format!("{place}: {error}"))?;
+            if now != file.after.as_bytes() {
+                return Err(format!(
+                    "{place}: has been changed since the sliders were written, and stays as it is"
+                ));
+            }
+        }
+        for file in &written {
+            file.put(&file.before)?;
+        }
+        Ok(written.len())
+    }
+
+    /// Whether anything was written that can be taken back.
+    pub fn can_take_back(&self) -> bool {
+        !self.written.is_empty()
     }
 
     /// What the page is told.
-    pub fn told(&self, integrator: Option<Integrator>) -> Vec<SliderState> {
+    pub fn told(&self, folder: Option<&Path>, integrator: Option<Integrator>) -> Vec<SliderState> {
         let short = |slider: &Slider, value: Value| match value {
             Value::Number(x) => Value::Number(slider.short(x)),
             Value::Color(c) => Value::Color(c.map(|x| slider.short(x))),
             Value::Bool(_) => value,
         };
+        let folder = folder.and_then(|folder| absolute(folder).ok());
         let told = |slider: &Slider| SliderState {
             file: slider.file.clone(),
+            path: folder
+                .as_ref()
+                .map(|folder| folder.join(&slider.file).display().to_string()),
             name: slider.name.clone(),
             line: slider.line,
             kind: slider.kind,
@@ -278,7 +337,7 @@ mod tests {
         assert!(second.text("phong.wgsl").contains("n: u32 = 5u; // slider"));
         assert!(sliders.reset(Some(("phong.wgsl", "n"))));
         assert_eq!(sliders.shaders().unwrap(), first);
-        let told = sliders.told(Some(Integrator::Phong));
+        let told = sliders.told(None, Some(Integrator::Phong));
         let recompile: Vec<_> = told
             .iter()
             .map(|slider| (slider.name.as_str(), slider.recompiles, slider.used))
@@ -324,14 +383,17 @@ mod tests {
         fs::write(&file, &text).unwrap();
         sliders.slide("phong.wgsl", "a", Value::Number(0.1)).unwrap();
         sliders.slide("phong.wgsl", "n", Value::Number(4.0)).unwrap();
-        let saved = sliders.write(folder.path()).unwrap();
+        assert_eq!(sliders.write(folder.path()), Ok(1));
         assert_eq!(
             fs::read_to_string(&file).unwrap(),
             text.replace("0.5", "0.1").replace("3u", "4u")
         );
-        saved[0].undo().unwrap();
+        assert_eq!(sliders.take_back(), Ok(1));
         assert_eq!(fs::read_to_string(&file).unwrap(), text);
+        assert!(!sliders.can_take_back());
+        assert_eq!(sliders.write(folder.path()), Ok(1));
         fs::write(&file, "// nothing").unwrap();
+        assert!(sliders.take_back().unwrap_err().contains("has been changed since"));
         assert!(sliders.write(folder.path()).unwrap_err().contains("no slider any more"));
         assert_eq!(fs::read_to_string(&file).unwrap(), "// nothing");
     }

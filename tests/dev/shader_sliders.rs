@@ -64,6 +64,7 @@ fn a_slider_shows_what_an_edit_would_without_the_compiler() {
     let told = slider(&running, "tint");
     let wanted = SliderState {
         file: FILE.to_string(),
+        path: Some(files.path(KERNEL).display().to_string()),
         name: "tint".to_string(),
         line: files
             .read(KERNEL)
@@ -126,6 +127,17 @@ fn a_slider_shows_what_an_edit_would_without_the_compiler() {
         (running.revision(), running.state().compile_seconds),
         (revision, compiled)
     );
+    // The writing is taken back, and made again.
+    running.session.send(Command::UndoSliders);
+    running.wait("the old value", |running| {
+        (slider(running, "tint").file_value == Value::Number(0.5)).then_some(())
+    });
+    assert_eq!(files.read(KERNEL), text);
+    assert!(!running.state().sliders_undo);
+    wait_for(&running, &first);
+    slide(&running, "tint", Value::Number(0.2));
+    running.session.send(Command::WriteSliders);
+    running.wait_rendered(&files);
     // The file's number counts when it is edited, and takes no compiler either.
     slide(&running, "tint", Value::Number(0.9));
     files.edit(KERNEL, "f32 = 0.2", "f32 = 0.75");

@@ -51,6 +51,7 @@ impl Painter {
             Command::ResetSlider(file, name) => self.reset_sliders(Some((&file, &name))),
             Command::ResetSliders => self.reset_sliders(None),
             Command::WriteSliders => self.write_sliders(),
+            Command::UndoSliders => self.take_back_sliders(),
             Command::Marks(marks) => {
                 self.marks = marks;
                 if self.running.is_some() {
@@ -71,7 +72,7 @@ impl Painter {
     }
 
     fn camera_moved(&mut self) {
-        self.restart_waits = true;
+        self.camera_waits = true;
         if let Some(running) = &mut self.running {
             running.halted = false;
         }

@@ -70,7 +70,7 @@ pub struct Painter {
     camera: Option<CameraDescription>,
     sliders: Sliders,
     /// Whether the camera or a slider moved since the picture was begun.
-    restart_waits: bool,
+    camera_waits: bool,
     /// The last save of a camera, while it can be taken back.
     saved: Option<Saved>,
     /// Whether it was, and the file has not been read again.
@@ -126,6 +126,8 @@ pub struct Told {
     pub frames: watch::Sender<Option<Arc<Frame>>>,
     /// Where the time goes.
     pub times: Times,
+    /// The form of links that open an editor.
+    pub editor: Option<String>,
 }
 
 impl Painter {
@@ -134,7 +136,7 @@ impl Painter {
         sources: Sources,
         device: Device,
         builder: Builder,
-        (out, editor): (Option<PathBuf>, Option<String>),
+        out: Option<PathBuf>,
         looking: Option<Arc<AtomicUsize>>,
         told: Told,
     ) -> Painter {
@@ -143,6 +145,7 @@ impl Painter {
             state: state_sender,
             frames: frame_sender,
             times,
+            editor,
         } = told;
         let state = State {
             scene: sources.scene.display().to_string(),
@@ -176,7 +179,7 @@ impl Painter {
             problems: Problems::default(),
             camera: None,
             sliders: Sliders::default(),
-            restart_waits: false,
+            camera_waits: false,
             saved: None,
             taken_back: false,
             view: View::default(),
@@ -330,7 +333,7 @@ impl Painter {
         let (view, times) = (self.seen(), self.times.clone());
         let Some(running) = &mut self.running else { return };
         if running.canvas.shows(&packed) {
-            if !self.restart_waits {
+            if !self.camera_waits {
                 self.since = None;
             }
             return;
@@ -345,7 +348,7 @@ impl Painter {
 
     /// A picture has been begun, by the camera as it is now.
     fn begun(&mut self, since: (Instant, bool)) {
-        self.restart_waits = false;
+        self.camera_waits = false;
         self.tell_size();
         self.changed(since);
     }
@@ -371,13 +374,13 @@ impl Painter {
             .is_some_and(|running| {
                 let more = !running.canvas.is_done(self.seen());
                 // While a kernel is compiled the processor is left to the compiler, but for the camera.
-                self.restart_waits || (more && (self.pending.is_none() || running.canvas.is_new()))
+                self.camera_waits || (more && (self.pending.is_none() || running.canvas.is_new()))
             })
     }
 
     /// Does one call's worth of work.
     pub fn work(&mut self) {
-        let (view, waits) = (self.seen(), self.restart_waits);
+        let (view, waits) = (self.seen(), self.camera_waits);
         let Some(loaded) = self.loaded.clone() else { return };
         let camera = self.packed_camera(&loaded);
         let Some(running) = &mut self.running else { return };

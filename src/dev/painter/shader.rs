@@ -67,7 +67,7 @@ impl Painter {
         let Some(running) = &mut self.running else { return };
         if self.sliders.values(running.canvas.live().sliders()) != running.sliders {
             running.halted = false;
-            self.restart_waits = true;
+            self.camera_waits = true;
             self.since.get_or_insert(since);
         }
     }
@@ -79,12 +79,23 @@ impl Painter {
             Some(_) if !self.sliders.are_moved() => Err("every slider stands where its file says".to_string()),
             Some(folder) => self.sliders.write(folder),
         };
-        let told = result.map(|saved| saved.len());
-        let count = told.as_ref().copied().unwrap_or_default();
-        let files = if count == 1 { "file" } else { "files" };
-        let result = told.map(drop);
-        self.notice(&result, format!("sliders written into {count} {files} of shaders"));
-        (self.report)(Report::Written(result));
+        self.tell_written(result, "sliders written into the shaders");
+    }
+
+    /// Takes back what was written into them last.
+    pub(super) fn take_back_sliders(&mut self) {
+        if self.sliders.can_take_back() {
+            let result = self.sliders.take_back();
+            self.tell_written(result, "shaders as they were before the sliders were written");
+        }
+    }
+
+    fn tell_written(&mut self, result: Result<usize, String>, what: &'static str) {
+        let files = |count: &usize| format!("{what}: {count} {}", if *count == 1 { "file" } else { "files" });
+        let told = result.as_ref().map(files).unwrap_or_default();
+        let result = result.map(drop);
+        self.notice(&result, told);
+        (self.report)(Report::Written(what, result));
     }
 
     /// The layer that is asked for, if the shaders have it.

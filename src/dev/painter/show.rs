@@ -159,14 +159,14 @@ impl Painter {
         self.state.camera = camera.map(text).unwrap_or_default();
         self.state.camera_moved = self.camera.is_some();
         (self.state.heard, self.state.frame) = (self.heard, self.frames);
-        self.state.busy = self.restart_waits || self.pending.is_some() || (self.running.is_some() && !self.is_done());
+        self.state.busy = self.camera_waits || self.pending.is_some() || (self.running.is_some() && !self.is_done());
         self.state.can_undo = self.saved.is_some();
         self.state.problems = problems;
         self.state.compiling = self.pending.is_some();
         (self.state.view, self.state.gain, self.state.marks) = (self.view, self.gain, self.marks);
-        self.state.sliders = self
-            .sliders
-            .told(self.loaded.as_ref().map(|loaded| loaded.packed.integrator));
+        let integrator = self.loaded.as_ref().map(|loaded| loaded.packed.integrator);
+        self.state.sliders = self.sliders.told(self.sources.shaders.as_deref(), integrator);
+        self.state.sliders_undo = self.sliders.can_take_back();
         self.state.layers = self.layers();
         if **self.state_sender.borrow() != self.state {
             self.state_sender.send_replace(Arc::new(self.state.clone()));
