@@ -13,6 +13,7 @@ use super::build::Builder;
 use super::messages::{Command, Event, Report, State};
 use super::painter::{Painter, Told};
 use super::picture::Frame;
+use super::reference::Reference;
 use super::source::Sources;
 use super::watch::Watch;
 use crate::error::RenderError;
@@ -130,6 +131,7 @@ impl Session {
             report,
             state: state_sender,
             frames: frame_sender,
+            events: events.clone(),
         };
         let painter = Painter::new(sources, device, builder, out, wanted_by, told);
         let thread = std::thread::Builder::new()
@@ -154,6 +156,12 @@ impl Session {
         let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
         *asked += 1;
         let _ = self.events.send(Event::Command(command)); // the thread lives as long as this
+    }
+
+    /// A way to give pictures to compare with from other threads, without ever waiting: whether there is room for it.
+    pub fn references(&self) -> impl Fn(Reference) -> bool + Send + Sync + 'static {
+        let events = self.events.clone();
+        move |reference| events.try_send(Event::Reference(reference)).is_ok()
     }
 
     /// Counts those who look.
