@@ -58,7 +58,7 @@ export function setUpCompare(picture, onKey, showNotice) {
       document.querySelector(`input[name=against][value=${state.view.compare}]`).checked = true;
     }
     element("gain").value = state.gain;
-    picture.gain = state.gain;
+    if (picture.gain !== state.gain) picture.setGain(state.gain);
   });
 
   onFrame(({ differing, done, view }) => {

@@ -72,6 +72,12 @@ export class Picture {
     return this.layout === "flicker" && this.swapped ? second : first;
   }
 
+  // What the difference is multiplied by.
+  setGain(gain) {
+    this.gain = gain;
+    this.arrange(this.layout);
+  }
+
   wipe(share) {
     this.wiped = share;
     this.#schedule();
