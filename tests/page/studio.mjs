@@ -112,8 +112,18 @@ export class Studio {
   // The picture that `wgray render` makes of the scene, as the bytes of a PNG file.
   render() {
     const out = this.path("rendered.png");
-    execFileSync(PROGRAM, ["render", this.path("scene.toml"), "--output", out, "--quiet"], { stdio: "pipe" });
+    this.renderTo(out);
     return [...fs.readFileSync(out)];
+  }
+
+  // Renders the scene into a file.
+  renderTo(file, more = []) {
+    execFileSync(PROGRAM, ["render", this.path("scene.toml"), "--output", file, "--quiet", ...more], { stdio: "pipe" });
+  }
+
+  // Whether two pictures are the same to the bit; if not, this throws.
+  diff(a, b) {
+    execFileSync(PROGRAM, ["diff", a, b], { stdio: "pipe" });
   }
 
   // Starts the program; resolves once it says where the page is.
