@@ -4,17 +4,20 @@
 //! files ── watch ──> Snapshot ──> painter ──> builder (compiles)
 //!                                    │  ^─────────┘
 //!                       Canvas (renders, call by call)
-//!                                    └──> State, Frame ──> server ──> page
+//!                                    └──> State, Frame, Seen ──> server ──> page
 //! ```
 
 mod build;
 mod camera;
 mod canvas;
 mod diagnostic;
+mod edit;
 mod faults;
 mod guard;
+mod history;
 mod measure;
 mod messages;
+mod object;
 mod painter;
 mod picture;
 mod save;
@@ -27,7 +30,8 @@ pub use camera::Move;
 pub use diagnostic::Diagnostic;
 pub use faults::Faults;
 pub use measure::{Measured, measure};
-pub use messages::{Command, Notice, Report, State};
+pub use messages::{Command, Notice, Report, Set, State};
+pub use object::{Group, Listed, Object, Seen};
 pub use picture::{Content, Frame, Header, View};
 pub use server::Listener;
 pub use session::{Session, Settings, StartError, Viewer, Viewers};

@@ -8,6 +8,7 @@ use crate::dev::build::guarded;
 use crate::dev::camera::text;
 use crate::dev::diagnostic::Diagnostic;
 use crate::dev::messages::Report;
+use crate::dev::object::Seen;
 use crate::dev::picture::{Content, Frame, Header, Look, Names, View, png_of};
 use crate::dev::save::replace;
 use crate::scene::ViewSettings;
@@ -140,8 +141,23 @@ impl Painter {
         }
     }
 
+    /// Tells what questions about the scene are answered from, where it has changed.
+    fn tell_seen(&self) {
+        let Some(loaded) = &self.loaded else { return };
+        let camera = self.packed_camera(loaded);
+        let is_known = |seen: &Arc<Seen>| Arc::ptr_eq(&seen.loaded, loaded) && seen.camera == camera;
+        if !self.seen_sender.borrow().as_ref().is_some_and(is_known) {
+            self.seen_sender.send_replace(Some(Arc::new(Seen {
+                loaded: Arc::clone(loaded),
+                camera,
+                sources: self.sources.clone(),
+            })));
+        }
+    }
+
     /// Tells everybody the state, where it has changed.
     pub(super) fn tell(&mut self) {
+        self.tell_seen();
         let camera = self
             .camera
             .as_ref()
@@ -157,7 +173,8 @@ impl Painter {
         self.state.camera_moved = self.camera.is_some();
         (self.state.heard, self.state.frame) = (self.heard, self.frames);
         self.state.busy = self.camera_waits || self.pending.is_some() || (self.running.is_some() && !self.is_done());
-        self.state.can_undo = self.saved.is_some();
+        [self.state.undo, self.state.redo] =
+            [false, true].map(|again| self.history.last(again).map(|step| step.what.clone()));
         self.state.problems = problems;
         self.state.compiling = self.pending.is_some();
         (self.state.view, self.state.gain, self.state.marks) = (self.view, self.gain, self.marks);
