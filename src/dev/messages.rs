@@ -1,14 +1,18 @@
 //! What reaches the thread that renders, and what it tells those who look.
 
+use std::num::NonZeroU32;
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
 use super::build::Built;
-use super::camera::Move;
+use super::camera::{Move, Viewpoint};
 use super::diagnostic::Diagnostic;
+use super::look::Choice;
 use super::picture::View;
+use super::reference::{Apart, Reference};
 use super::source::Snapshot;
+use crate::scene::ViewTransform;
 
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,8 +61,18 @@ pub struct Set {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Command {
+    /// A hand takes hold of the camera: the moves that follow are one step of its history.
+    Grab,
     /// To move the camera.
     Move(Move),
+    /// To put the camera elsewhere.
+    Viewpoint(Viewpoint),
+    /// To see the whole of the object at a pixel of the whole picture, or of all that there is.
+    Frame(Option<[u32; 2]>),
+    /// To take the last step of the camera back.
+    Back,
+    /// To make the step again that was taken back.
+    Forth,
     /// The scene file's camera.
     ResetCamera,
     /// To write the camera into the scene file.
@@ -75,6 +89,47 @@ pub enum Command {
     Gain(f32),
     /// Whether pixels that are no light are marked.
     Marks(bool),
+    /// How light is shown.
+    Look(Choice),
+    /// Whether nothing but first pictures is rendered.
+    Pause(bool),
+    /// To render the picture anew.
+    Restart,
+    /// The most samples of a pixel; all of the scene's if absent.
+    Samples(Option<NonZeroU32>),
+    /// Pixels of the picture along each side of one that is shown.
+    Preview(Preview),
+    /// To keep the picture as the reference.
+    Keep,
+}
+
+/// How coarse the picture is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(try_from = "u32", into = "u32")]
+pub struct Preview(u32);
+
+impl Preview {
+    /// Pixels of the picture along each side of one that is shown, one at least.
+    pub fn scale(self) -> u32 {
+        self.0.max(1)
+    }
+}
+
+impl From<Preview> for u32 {
+    fn from(preview: Preview) -> u32 {
+        preview.scale()
+    }
+}
+
+impl TryFrom<u32> for Preview {
+    type Error = String;
+
+    fn try_from(scale: u32) -> Result<Preview, String> {
+        match (1..=64).contains(&scale) {
+            true => Ok(Preview(scale)),
+            false => Err(format!("preview: {scale} must be from 1 to 64")),
+        }
+    }
 }
 
 /// What is known beside the picture; it goes to the page as JSON.
@@ -94,6 +149,8 @@ pub struct State {
     pub marks: bool,
     /// The camera, as the section of a scene file.
     pub camera: String,
+    /// The same for whoever keeps it.
+    pub viewpoint: Option<Viewpoint>,
     /// Whether it is not that of the file.
     pub camera_moved: bool,
     /// Counts the scenes that were right.
@@ -102,6 +159,24 @@ pub struct State {
     pub undo: Option<String>,
     /// What was taken back last, and can be written again.
     pub redo: Option<String>,
+    /// Whether the camera's last step can be taken back, and one be made again.
+    pub steps: [bool; 2],
+    /// How light is shown, as it was chosen.
+    pub look: Choice,
+    /// How the scene has it: exposure in stops, and the transform.
+    pub scene_look: (f64, ViewTransform),
+    /// Whether nothing but first pictures is rendered.
+    pub paused: bool,
+    /// The most samples of a pixel, and those of the scene.
+    pub samples: (Option<NonZeroU32>, u32),
+    /// How coarse the picture is shown.
+    pub preview: Preview,
+    /// What there is to compare with, beside the CPU: whether a picture before the last change, and the reference's name.
+    pub comparable: (bool, Option<String>),
+    /// Why there is nothing to compare with, where that was asked for.
+    pub no_comparison: Option<String>,
+    /// How far the two pictures of a comparison are apart.
+    pub apart: Option<Apart>,
     /// What is wrong now.
     pub problems: Vec<Diagnostic>,
     /// Whether a kernel is being compiled.
@@ -139,6 +214,10 @@ pub enum Event {
     Built(Box<Built>),
     /// Someone asks for something.
     Command(Command),
+    /// Someone gave a picture to compare with.
+    Reference(Reference),
+    /// Two pictures were measured.
+    Measured(Apart),
     /// Someone came who looks.
     Viewers,
     /// A driver loses its device.

@@ -1,4 +1,4 @@
-//! The page and what it is told: a small server of a few files and one WebSocket.
+//! The page and what it is told: a small server of its files, the picture as a file, and one WebSocket.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
@@ -6,22 +6,25 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use axum::Router;
+use axum::body::Bytes;
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
-use axum::extract::{Request, State};
-use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::extract::{DefaultBodyLimit, Path as UrlPath, Request, State};
+use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
-use axum::routing::get;
+use axum::routing::{get, post};
 use hyper::server::conn::http1;
 use hyper_util::rt::TokioIo;
 use hyper_util::service::TowerToHyperService;
 use serde::{Deserialize, Serialize};
 use tokio::sync::{Semaphore, watch};
 
+use super::download::{exr_file, png_file};
 use super::guard::Guard;
 use super::messages::{self, Command};
 use super::object::{Listed, Object, Seen};
 use super::picture::Frame;
+use super::reference::Reference;
 use super::session::{Session, Viewers};
 
 /// So many may look at once.
@@ -32,6 +35,10 @@ const REQUESTS: usize = 64;
 const REQUEST: Duration = Duration::from_secs(10);
 /// The largest message of a viewer, in bytes: a command is far smaller.
 const LARGEST_MESSAGE: usize = 4096;
+/// The largest file to compare with, in bytes.
+const LARGEST_FILE: usize = 256 << 20;
+/// The longest name of one, in characters.
+const LONGEST_NAME: usize = 80;
 /// A viewer that takes nothing for so long is gone.
 const SEND: Duration = Duration::from_secs(30);
 /// So often a viewer is asked whether it is there; after three times without a word it is gone.
@@ -79,6 +86,7 @@ impl Listener {
             frames: session.frames.clone(),
             seen: session.seen.clone(),
             send: Arc::new(session.commands()),
+            give: Arc::new(session.references()),
             seats: Arc::new(Semaphore::new(VIEWERS)),
             viewers: session.viewers(),
         };
@@ -117,32 +125,89 @@ struct Shared {
     frames: watch::Receiver<Option<Arc<Frame>>>,
     seen: watch::Receiver<Option<Arc<Seen>>>,
     send: Arc<dyn Fn(Command) -> Option<u64> + Send + Sync>,
+    give: Arc<dyn Fn(Reference) -> bool + Send + Sync>,
     seats: Arc<Semaphore>,
     viewers: Viewers,
 }
 
+/// The page's modules.
+const MODULES: [(&str, &str); 9] = [
+    ("/camera.js", include_str!("page/camera.js")),
+    ("/compare.js", include_str!("page/compare.js")),
+    ("/object.js", include_str!("page/object.js")),
+    ("/link.js", include_str!("page/link.js")),
+    ("/page.js", include_str!("page/page.js")),
+    ("/picture.js", include_str!("page/picture.js")),
+    ("/probes.js", include_str!("page/probes.js")),
+    ("/render.js", include_str!("page/render.js")),
+    ("/view.js", include_str!("page/view.js")),
+];
+
 fn routes(shared: Shared) -> Router {
-    const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
     let file =
         |kind: &'static str, text: &'static str| get(move || async move { ([(header::CONTENT_TYPE, kind)], text) });
-    Router::new()
+    let modules = MODULES.into_iter().fold(Router::new(), |router, (path, text)| {
+        router.route(path, file("text/javascript; charset=utf-8", text))
+    });
+    modules
         .route("/", file("text/html; charset=utf-8", include_str!("page/index.html")))
         .route(
             "/style.css",
             file("text/css; charset=utf-8", include_str!("page/style.css")),
         )
-        .route("/page.js", file(JAVASCRIPT, include_str!("page/page.js")))
-        .route("/object.js", file(JAVASCRIPT, include_str!("page/object.js")))
-        .route("/picture.js", file(JAVASCRIPT, include_str!("page/picture.js")))
+        .route("/picture.png", get(picture_png))
+        .route("/picture.exr", get(picture_exr))
+        .route(
+            "/reference/{name}",
+            post(reference).layer(DefaultBodyLimit::max(LARGEST_FILE)),
+        )
         .route("/socket", get(socket))
         .layer(middleware::from_fn_with_state(shared.clone(), guarded))
         .with_state(shared)
 }
 
+/// The picture that is shown, as a file of a kind.
+async fn picture(shared: Shared, kind: &'static str, make: fn(&Frame) -> io::Result<Vec<u8>>) -> Response {
+    let frame = shared.frames.borrow().clone();
+    let Some(frame) = frame.filter(|frame| frame.header.sent == frame.header.finest) else {
+        return (StatusCode::CONFLICT, "there is no whole picture yet").into_response();
+    };
+    match tokio::task::spawn_blocking(move || make(&frame)).await {
+        Ok(Ok(file)) => ([(header::CONTENT_TYPE, kind)], file).into_response(),
+        Ok(Err(error)) => (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()).into_response(),
+        Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()).into_response(),
+    }
+}
+
+async fn picture_png(State(shared): State<Shared>) -> Response {
+    picture(shared, "image/png", |frame| Ok(png_file(frame))).await
+}
+
+async fn picture_exr(State(shared): State<Shared>) -> Response {
+    picture(shared, "image/x-exr", exr_file).await
+}
+
+/// Takes a file to compare with. It comes from the viewer's machine: nothing of this one is read.
+async fn reference(State(shared): State<Shared>, UrlPath(name): UrlPath<String>, body: Bytes) -> Response {
+    let frame = shared.frames.borrow().clone();
+    let view = frame.map(|frame| frame.look.view).unwrap_or_default();
+    let name: String = name.chars().filter(|c| !c.is_control()).take(LONGEST_NAME).collect();
+    let work = move || Reference::decode(name, body.to_vec(), view);
+    match tokio::task::spawn_blocking(work).await {
+        Ok(Ok(reference)) => match (shared.give)(reference) {
+            true => StatusCode::NO_CONTENT.into_response(),
+            false => (StatusCode::SERVICE_UNAVAILABLE, "busy: the file was dropped").into_response(),
+        },
+        Ok(Err(error)) => (StatusCode::UNPROCESSABLE_ENTITY, error).into_response(),
+        Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()).into_response(),
+    }
+}
+
 /// Refuses what comes from elsewhere, and tells the browser to load nothing from there.
 async fn guarded(State(shared): State<Shared>, request: Request, next: Next) -> Response {
-    let socket = request.uri().path() == "/socket";
-    let mut response = match shared.guard.check(request.headers(), socket) {
+    // What changes anything must come from the page itself.
+    let acts = request.uri().path() == "/socket" || request.method() != Method::GET;
+    let mut response = match shared.guard.check(request.headers(), acts) {
         Ok(()) => next.run(request).await,
         Err(why) => (StatusCode::FORBIDDEN, why).into_response(),
     };

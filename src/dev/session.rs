@@ -14,6 +14,7 @@ use super::messages::{Command, Event, Report, State};
 use super::object::Seen;
 use super::painter::{Painter, Told};
 use super::picture::Frame;
+use super::reference::Reference;
 use super::source::Sources;
 use super::watch::Watch;
 use crate::error::RenderError;
@@ -136,6 +137,7 @@ impl Session {
             state: state_sender,
             frames: frame_sender,
             seen: scene_sender,
+            events: events.clone(),
         };
         let painter = Painter::new(sources, device, builder, (out, wanted_by), writes, told);
         let thread = std::thread::Builder::new()
@@ -161,6 +163,12 @@ impl Session {
         let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
         *asked += 1;
         let _ = self.events.send(Event::Command(command)); // the thread lives as long as this
+    }
+
+    /// A way to give pictures to compare with from other threads, without ever waiting: whether there is room for it.
+    pub fn references(&self) -> impl Fn(Reference) -> bool + Send + Sync + 'static {
+        let events = self.events.clone();
+        move |reference| events.try_send(Event::Reference(reference)).is_ok()
     }
 
     /// Counts those who look.

@@ -4,6 +4,7 @@
 //! [`Description::validate`] alone). Nothing behind a `Scene` checks again.
 
 mod around;
+mod bounds;
 mod camera_path;
 mod course;
 mod decode;
@@ -41,6 +42,7 @@ use crate::gltf::Imported;
 use crate::mesh::Mesh;
 
 pub use around::Background;
+pub use bounds::Bounds;
 pub use camera_path::CameraPath;
 #[cfg(feature = "dev")]
 pub(crate) use course::is_course;

@@ -4,7 +4,7 @@ use std::fs;
 
 use wgray::backend::Backend as _;
 use wgray::cpu::Cpu;
-use wgray::dev::{Command, Content, Move, View};
+use wgray::dev::{Against, Command, Content, Move, View};
 use wgray::film::Region;
 
 use super::running::{Files, KERNEL, RADIANCE, Running, SCENE, SETTLED};
@@ -132,7 +132,7 @@ fn the_cpu_agrees_until_a_shader_is_changed() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
-    running.session.send(Command::View(View::Compare));
+    running.session.send(Command::View(View::Compare(Against::Cpu)));
     let compared = |running: &Running| {
         running
             .frame()

@@ -1,10 +1,11 @@
 //! What those who look ask for: the camera and the view.
 
+use std::num::NonZeroU32;
 use std::time::Instant;
 
 use super::Painter;
 use crate::dev::build::guarded;
-use crate::dev::camera::{Move, moved};
+use crate::dev::canvas::Limits;
 use crate::dev::messages::{Command, Notice};
 use crate::dev::picture::View;
 use crate::dev::source::Loaded;
@@ -13,12 +14,13 @@ use crate::pack::{Camera, Packed, pack_camera};
 impl Painter {
     pub(super) fn take_command(&mut self, command: Command) {
         match command {
+            Command::Grab => self.walk.end_step(),
             Command::Move(by) => self.move_camera(by),
-            Command::ResetCamera => {
-                if self.camera.take().is_some() {
-                    self.camera_moved();
-                }
-            }
+            Command::Viewpoint(viewpoint) => self.place_camera(viewpoint),
+            Command::Frame(pixel) => self.frame(pixel),
+            Command::Back => self.retrace(false),
+            Command::Forth => self.retrace(true),
+            Command::ResetCamera => self.reset_camera(),
             Command::SaveCamera => self.save_camera(),
             Command::Set(set) => self.set(&set),
             Command::UndoWrite => self.turn(false),
@@ -38,35 +40,55 @@ impl Painter {
             }
             Command::Gain(gain) => {
                 self.gain = gain.clamp(1.0, 1e9);
-                if self.view == View::Compare && self.running.is_some() {
+                if matches!(self.view, View::Compare(_)) {
                     self.show();
                 }
             }
             Command::Marks(marks) => {
                 self.marks = marks;
-                if self.running.is_some() {
+                self.show();
+            }
+            Command::Look(choice) => match choice.checked() {
+                Ok(look) => {
+                    self.look = look;
                     self.show();
                 }
+                Err(error) => self.notice(&Err(error), String::new()),
+            },
+            Command::Pause(paused) => self.paused = paused,
+            Command::Restart => {
+                self.camera_waits = true; // it is begun again from where the camera is
+                if let Some(running) = &mut self.running {
+                    running.halted = false;
+                }
             }
+            Command::Samples(most) => {
+                let samples = most.map_or(u32::MAX, NonZeroU32::get);
+                self.limit(Limits { samples, ..self.limits });
+            }
+            Command::Preview(preview) => {
+                let scale = preview.scale();
+                self.limit(Limits { scale, ..self.limits });
+            }
+            Command::Keep => self.keep(),
         }
     }
 
-    fn move_camera(&mut self, by: Move) {
-        let Some(loaded) = &self.loaded else { return };
-        let old = self.camera.as_ref().unwrap_or(&loaded.camera);
-        let new = moved(old, by);
-        if new != *old {
-            self.camera = (new != loaded.camera).then_some(new);
-            self.camera_moved();
+    /// Renders more or less of the picture from now on.
+    fn limit(&mut self, limits: Limits) {
+        if limits == self.limits {
+            return;
         }
-    }
-
-    fn camera_moved(&mut self) {
-        self.camera_waits = true;
-        if let Some(running) = &mut self.running {
-            running.halted = false;
+        self.limits = limits;
+        let view = self.view;
+        let Some(running) = &mut self.running else { return };
+        match guarded(|| running.canvas.set_limits(limits, view)) {
+            Ok(()) => self.begun((Instant::now(), false)),
+            Err(error) => return self.fail(&error),
         }
-        self.since.get_or_insert((Instant::now(), false));
+        if self.is_done() {
+            self.show();
+        }
     }
 
     pub(super) fn notice(&mut self, result: &Result<(), String>, good: String) {

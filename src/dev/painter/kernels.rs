@@ -68,11 +68,11 @@ impl Painter {
         let info = &gpu.device().info;
         self.state.device = format!("{}, {}", info.name, info.driver);
         self.device = Some(gpu.device().clone());
-        let (packed, view) = (self.packed(&loaded), self.view);
+        let (packed, view, limits) = (self.packed(&loaded), self.view, self.limits);
         self.stop_running();
         let canvas = guarded(|| {
             gpu.update(&packed)?; // the scene may have changed since it was uploaded
-            Canvas::new(gpu, packed, view)
+            Canvas::new(gpu, packed, view, limits)
         });
         match canvas {
             Ok(canvas) => {

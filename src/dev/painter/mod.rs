@@ -1,23 +1,29 @@
 //! What a session does with what happens: decides what is rendered, compiled, shown and told.
 
 mod commands;
+mod comparison;
 mod kernels;
 mod show;
+mod walk;
 mod writing;
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
+use self::comparison::Comparison;
 use self::show::Problems;
+use self::walk::Walk;
 use super::build::{Builder, Request, guarded};
 use super::camera::merged;
-use super::canvas::Canvas;
+use super::canvas::{Canvas, Limits};
 use super::diagnostic::Diagnostic;
 use super::history::History;
+use super::look::Choice;
 use super::messages::{Event, Report, State};
 use super::object::Seen;
 use super::picture::{Frame, View};
@@ -79,6 +85,14 @@ pub struct Painter {
     view: View,
     gain: f32,
     marks: bool,
+    look: Choice,
+    limits: Limits,
+    /// Whether nothing but first pictures is rendered.
+    paused: bool,
+    walk: Walk,
+    comparison: Comparison,
+    /// What happens elsewhere on behalf of this.
+    events: SyncSender<Event>,
     /// The sizes that were told last, asked for and shown, of a picture that is too large.
     smaller: Option<([u32; 2], [u32; 2])>,
 
@@ -124,6 +138,8 @@ pub struct Told {
     pub frames: watch::Sender<Option<Arc<Frame>>>,
     /// Those who ask about the scene.
     pub seen: watch::Sender<Option<Arc<Seen>>>,
+    /// The session's own inbox.
+    pub events: SyncSender<Event>,
 }
 
 impl Painter {
@@ -141,6 +157,7 @@ impl Painter {
             state: state_sender,
             frames: frame_sender,
             seen: seen_sender,
+            events,
         } = told;
         let state = State {
             scene: sources.scene.display().to_string(),
@@ -179,6 +196,12 @@ impl Painter {
             view: View::default(),
             gain: GAIN,
             marks: true,
+            look: Choice::default(),
+            limits: Limits::default(),
+            paused: false,
+            walk: Walk::default(),
+            comparison: Comparison::default(),
+            events,
             smaller: None,
             heard: 0,
             frames: 0,
@@ -201,6 +224,8 @@ impl Painter {
                 self.take_command(command);
                 self.heard += 1;
             }
+            Event::Reference(reference) => self.take_reference(reference),
+            Event::Measured(apart) => self.take_measured(apart),
             Event::Viewers => {
                 // Nobody has waited for the picture until now.
                 self.since = self.since.map(|(_, saved)| (Instant::now(), saved));
@@ -229,6 +254,9 @@ impl Painter {
         match snapshot.shaders {
             Ok(shaders) => {
                 self.problems.files = None;
+                if self.shaders.as_ref().is_some_and(|old| *old != shaders) {
+                    self.keep_before();
+                }
                 let good = self.good.as_ref();
                 self.refused
                     .retain(|(known, _)| *known == shaders || Some(known) == good);
@@ -250,6 +278,7 @@ impl Painter {
                     self.camera = merged(camera, &old.camera, &loaded.camera);
                 }
                 if self.loaded.as_ref().is_some_and(|old| old.packed != loaded.packed) {
+                    self.keep_before();
                     let cut = self.cut.take();
                     self.refused.retain(|known| Some(known) != cut.as_ref());
                 }
@@ -374,8 +403,9 @@ impl Painter {
             .filter(|running| !running.halted)
             .is_some_and(|running| {
                 let more = !running.canvas.is_done(self.view);
+                let first = running.canvas.is_new();
                 // While a kernel is compiled the processor is left to the compiler, but for the camera.
-                self.camera_waits || (more && (self.pending.is_none() || running.canvas.is_new()))
+                self.camera_waits || (more && (first || (self.pending.is_none() && !self.paused)))
             })
     }
 
