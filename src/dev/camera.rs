@@ -84,9 +84,7 @@ pub fn placed(camera: &CameraDescription, viewpoint: Viewpoint) -> Result<Camera
 
 /// A camera that sees the whole of a ball from where it looks now, and turns around its middle.
 pub fn framed(camera: &CameraDescription, center: DVec3, radius: f64) -> CameraDescription {
-    let View {
-        position, look_at, ..
-    } = view(camera);
+    let View { position, look_at, .. } = view(camera);
     let back = (position - look_at).normalize_or_zero();
     let radius = radius.max(f64::MIN_POSITIVE);
     let mut viewpoint = Viewpoint::of(camera);
@@ -427,7 +425,11 @@ mod tests {
             for file in [perspective(), orthographic()] {
                 let new = framed(&file, center, radius);
                 let (old, seen) = (view(&file), view(&new));
-                assert!(seen.look_at.abs_diff_eq(center, 1e-3 * radius.max(1e-3)), "{radius}: {}", seen.look_at);
+                assert!(
+                    seen.look_at.abs_diff_eq(center, 1e-3 * radius.max(1e-3)),
+                    "{radius}: {}",
+                    seen.look_at
+                );
                 let (a, b) = (old.look_at - old.position, seen.look_at - seen.position);
                 assert!(a.angle_between(b) < 1e-2, "{radius}: it looks another way");
                 match new {

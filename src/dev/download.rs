@@ -30,9 +30,9 @@ pub fn exr_file(frame: &Frame) -> io::Result<Vec<u8>> {
     let [width, height] = frame.header.sent;
     let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = match &frame.content {
         Content::Color(pixels) | Content::Compare(pixels, _) => colors(pixels),
-        Content::Samples(counts, _) => {
-            [AnyChannel::new("sample_count.N", FlatSamples::U32(counts.clone()))].into_iter().collect()
-        }
+        Content::Samples(counts, _) => [AnyChannel::new("sample_count.N", FlatSamples::U32(counts.clone()))]
+            .into_iter()
+            .collect(),
         Content::Hits(aov, hits) => aov
             .channels()
             .iter()
@@ -64,7 +64,10 @@ pub fn exr_file(frame: &Frame) -> io::Result<Vec<u8>> {
 
 fn colors(pixels: &Pixels) -> SmallVec<[AnyChannel<FlatSamples>; 4]> {
     let channel = |(name, i): (&'static str, usize)| {
-        AnyChannel::new(name, FlatSamples::F32(pixels.colors.iter().map(|color| color[i]).collect()))
+        AnyChannel::new(
+            name,
+            FlatSamples::F32(pixels.colors.iter().map(|color| color[i]).collect()),
+        )
     };
     [("R", 0), ("G", 1), ("B", 2)].into_iter().map(channel).collect()
 }

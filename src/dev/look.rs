@@ -118,10 +118,18 @@ mod tests {
         for (i, wanted) in legend.iter().enumerate() {
             let stops = first + (last - first) * i as f32 / 16.0;
             let shown = look(0.0).shown(grey(stops));
-            assert!(shown.iter().zip(wanted).all(|(a, b)| a.abs_diff(*b) <= 2), "{stops}: {shown:?} {wanted:?}");
+            assert!(
+                shown.iter().zip(wanted).all(|(a, b)| a.abs_diff(*b) <= 2),
+                "{stops}: {shown:?} {wanted:?}"
+            );
             assert_eq!(look(3.0).shown(grey(stops - 3.0)), look(0.0).shown(grey(stops)));
         }
-        for (light, wanted) in [(0.0, legend[0]), (-1.0, legend[0]), (f32::NAN, legend[0]), (f32::INFINITY, legend[16])] {
+        for (light, wanted) in [
+            (0.0, legend[0]),
+            (-1.0, legend[0]),
+            (f32::NAN, legend[0]),
+            (f32::INFINITY, legend[16]),
+        ] {
             assert_eq!(look(0.0).shown([light; 3]), wanted, "{light}");
         }
         assert_ne!(look(0.0).shown(grey(0.0)), look(0.0).shown(grey(-3.0)));
@@ -138,7 +146,13 @@ mod tests {
             exposure: Some(-1.0),
             ..Choice::default()
         };
-        assert_eq!(chosen.over(scene), ViewSettings { exposure: -1.0, ..scene });
+        assert_eq!(
+            chosen.over(scene),
+            ViewSettings {
+                exposure: -1.0,
+                ..scene
+            }
+        );
         for stops in [100.5, -101.0, f64::NAN, f64::INFINITY] {
             let exposure = Some(stops);
             assert!(Choice { exposure, ..chosen }.checked().is_err(), "{stops}");

@@ -38,14 +38,27 @@ pub enum Report {
     Note(String),
     /// The picture is larger than what can be shown: the size asked for, and the size of what is shown.
     Smaller([u32; 2], [u32; 2]),
-    /// The camera was written into the scene file, or could not be.
-    Saved(Result<(), String>),
-    /// The last save was taken back, or could not be.
-    Unsaved(Result<(), String>),
+    /// Something was written into the scene file, the camera or a value; or why it could not be.
+    Wrote(String, Result<(), String>),
+    /// What was written last was taken back, or what was taken back last was made again; or why not.
+    Turned(String, Result<(), String>),
+}
+
+/// A value for a key of the scene file.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Set {
+    /// The way to it: `materials.red.color`.
+    pub path: String,
+    /// The value; null takes the key out of the file.
+    pub value: serde_json::Value,
+    /// Changes of the same key with the same number are one step of undo.
+    #[serde(default)]
+    pub gesture: Option<u64>,
 }
 
 /// What someone who looks asks for.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Command {
     /// A hand takes hold of the camera: the moves that follow are one step of its history.
@@ -64,8 +77,12 @@ pub enum Command {
     ResetCamera,
     /// To write the camera into the scene file.
     SaveCamera,
-    /// To take the last save back.
-    UndoSave,
+    /// To write a value into the scene file.
+    Set(Set),
+    /// To take back what was written into the scene file last.
+    UndoWrite,
+    /// To write again what was taken back last.
+    RedoWrite,
     /// Another view.
     View(View),
     /// The factor of the difference of [`View::Compare`].
@@ -136,10 +153,14 @@ pub struct State {
     pub viewpoint: Option<Viewpoint>,
     /// Whether it is not that of the file.
     pub camera_moved: bool,
+    /// Counts the scenes that were right.
+    pub scenes: u64,
+    /// What was written into the scene file last, and can be taken back: `camera`, `materials.red.color`.
+    pub undo: Option<String>,
+    /// What was taken back last, and can be written again.
+    pub redo: Option<String>,
     /// Whether the camera's last step can be taken back, and one be made again.
     pub steps: [bool; 2],
-    /// Whether a save of it can be taken back.
-    pub can_undo: bool,
     /// How light is shown, as it was chosen.
     pub look: Choice,
     /// How the scene has it: exposure in stops, and the transform.
@@ -177,6 +198,8 @@ pub struct State {
 pub struct Notice {
     /// Counts them.
     pub number: u64,
+    /// Which command it answers, counted as [`State::heard`] does.
+    pub command: u64,
     /// What is said.
     pub text: String,
     /// Whether it is bad.
@@ -185,8 +208,8 @@ pub struct Notice {
 
 /// What reaches the thread that renders.
 pub enum Event {
-    /// The files have changed; noticed at that time.
-    Files(Box<Snapshot>, Instant),
+    /// The files have changed; noticed at that time, when so many writes of this session were known.
+    Files(Box<Snapshot>, Instant, u64),
     /// A kernel has been compiled.
     Built(Box<Built>),
     /// Someone asks for something.

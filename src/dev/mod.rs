@@ -4,7 +4,7 @@
 //! files ── watch ──> Snapshot ──> painter ──> builder (compiles)
 //!                                    │  ^─────────┘
 //!                       Canvas (renders, call by call)
-//!                                    └──> State, Frame ──> server ──> page
+//!                                    └──> State, Frame, Seen ──> server ──> page
 //! ```
 
 mod build;
@@ -12,12 +12,15 @@ mod camera;
 mod canvas;
 mod diagnostic;
 mod download;
+mod edit;
 mod faults;
 mod guard;
 mod histogram;
+mod history;
 mod look;
 mod measure;
 mod messages;
+mod object;
 mod painter;
 mod picture;
 mod reference;
@@ -30,10 +33,11 @@ mod watch;
 pub use camera::{Move, Viewpoint};
 pub use diagnostic::Diagnostic;
 pub use faults::Faults;
-pub use measure::{Measured, measure};
 pub use histogram::Histogram;
 pub use look::{Choice, Legend, Look};
-pub use messages::{Command, Notice, Preview, Report, State};
+pub use measure::{Measured, measure};
+pub use messages::{Command, Notice, Preview, Report, Set, State};
+pub use object::{Group, Listed, Object, Seen};
 pub use picture::{Against, Content, Frame, Header, View};
 pub use reference::{Apart, Reference};
 pub use server::Listener;

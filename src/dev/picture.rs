@@ -231,7 +231,11 @@ impl Frame {
                     Aov::Barycentric => [hit.barycentric.x, hit.barycentric.y, 0.0],
                     _ => [0.0; 3],
                 };
-                vec![marked("picture", content.plain_bytes(header.sent), faults(hits, true, values))]
+                vec![marked(
+                    "picture",
+                    content.plain_bytes(header.sent),
+                    faults(hits, true, values),
+                )]
             }
             Content::Compare(first, second) => {
                 header.differing = difference(first, second, 0.0).map(|found| (found.unequal, found.largest));
@@ -247,7 +251,11 @@ impl Frame {
             Content::Color(pixels) | Content::Compare(pixels, _) => Some(Histogram::of(&pixels.colors)),
             Content::Samples(..) | Content::Hits(..) => None,
         };
-        header.legend = header.histogram.as_ref().filter(|_| look.false_color).map(|_| Legend::of(look.view.exposure));
+        header.legend = header
+            .histogram
+            .as_ref()
+            .filter(|_| look.false_color)
+            .map(|_| Legend::of(look.view.exposure));
         let (parts, pictures): (Vec<_>, Vec<_>) = pictures
             .into_par_iter()
             .map(|(name, rgb)| {

@@ -165,7 +165,10 @@ mod tests {
         };
         assert_eq!(reference.at([4, 4], [4, 4]).unwrap(), *reference.pixels);
         let half = reference.at([4, 4], [2, 2]).unwrap();
-        assert_eq!(half.colors.iter().map(|color| color[0]).collect::<Vec<_>>(), [0.0, 2.0, 8.0, 10.0]);
+        assert_eq!(
+            half.colors.iter().map(|color| color[0]).collect::<Vec<_>>(),
+            [0.0, 2.0, 8.0, 10.0]
+        );
         assert!(reference.at([4, 5], [4, 5]).is_none());
     }
 

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use axum::Router;
-use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::body::Bytes;
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::extract::{DefaultBodyLimit, Path as UrlPath, Request, State};
 use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::{self, Next};
@@ -22,6 +22,7 @@ use tokio::sync::{Semaphore, watch};
 use super::download::{exr_file, png_file};
 use super::guard::Guard;
 use super::messages::{self, Command};
+use super::object::{Listed, Object, Seen};
 use super::picture::Frame;
 use super::reference::Reference;
 use super::session::{Session, Viewers};
@@ -83,6 +84,7 @@ impl Listener {
             guard: self.guard,
             state: session.state.clone(),
             frames: session.frames.clone(),
+            seen: session.seen.clone(),
             send: Arc::new(session.commands()),
             give: Arc::new(session.references()),
             seats: Arc::new(Semaphore::new(VIEWERS)),
@@ -121,6 +123,7 @@ struct Shared {
     guard: Guard,
     state: watch::Receiver<Arc<messages::State>>,
     frames: watch::Receiver<Option<Arc<Frame>>>,
+    seen: watch::Receiver<Option<Arc<Seen>>>,
     send: Arc<dyn Fn(Command) -> Option<u64> + Send + Sync>,
     give: Arc<dyn Fn(Reference) -> bool + Send + Sync>,
     seats: Arc<Semaphore>,
@@ -128,9 +131,10 @@ struct Shared {
 }
 
 /// The page's modules.
-const MODULES: [(&str, &str); 8] = [
+const MODULES: [(&str, &str); 9] = [
     ("/camera.js", include_str!("page/camera.js")),
     ("/compare.js", include_str!("page/compare.js")),
+    ("/object.js", include_str!("page/object.js")),
     ("/link.js", include_str!("page/link.js")),
     ("/page.js", include_str!("page/page.js")),
     ("/picture.js", include_str!("page/picture.js")),
@@ -153,7 +157,10 @@ fn routes(shared: Shared) -> Router {
         )
         .route("/picture.png", get(picture_png))
         .route("/picture.exr", get(picture_exr))
-        .route("/reference/{name}", post(reference).layer(DefaultBodyLimit::max(LARGEST_FILE)))
+        .route(
+            "/reference/{name}",
+            post(reference).layer(DefaultBodyLimit::max(LARGEST_FILE)),
+        )
         .route("/socket", get(socket))
         .layer(middleware::from_fn_with_state(shared.clone(), guarded))
         .with_state(shared)
@@ -240,8 +247,22 @@ async fn socket(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Resp
 enum Ask {
     /// What is known of a pixel?
     Pixel([u32; 2]),
+    /// What is at a pixel?
+    Object([u32; 2]),
+    /// What is said of the object of this name?
+    Inspect(Inspect),
+    /// Which objects have this in their names?
+    Objects(String),
     #[serde(untagged)]
     Command(Command),
+}
+
+/// An object by its name.
+#[derive(Deserialize)]
+struct Inspect {
+    name: String,
+    #[serde(default)]
+    material: Option<String>,
 }
 
 /// What a viewer is told, beside frames.
@@ -254,6 +275,8 @@ enum Tell<'a> {
         y: u32,
         values: Vec<(&'static str, String)>,
     },
+    Object(Box<Object>),
+    Objects(Listed),
     /// The number of a command that was given; the state says when it has been followed.
     Asked(u64),
     Refused(String),
@@ -283,7 +306,7 @@ async fn view(mut socket: WebSocket, shared: &Shared) -> Option<()> {
             message = socket.recv() => {
                 heard = Instant::now();
                 match message?.ok()? {
-                    Message::Text(asked) => match answer(&asked, shared) {
+                    Message::Text(asked) => match answer(&asked, shared).await {
                         Some(answer) => text(&answer)?,
                         None => continue,
                     },
@@ -302,12 +325,27 @@ async fn view(mut socket: WebSocket, shared: &Shared) -> Option<()> {
     }
 }
 
-fn answer(asked: &str, shared: &Shared) -> Option<Tell<'static>> {
+async fn answer(asked: &str, shared: &Shared) -> Option<Tell<'static>> {
     match serde_json::from_str(asked) {
         Ok(Ask::Pixel([x, y])) => {
             let frame = shared.frames.borrow().clone();
             let values = frame.and_then(|frame| frame.pixel(x, y)).unwrap_or_default();
             Some(Tell::Pixel { x, y, values })
+        }
+        Ok(Ask::Object(pixel)) => {
+            let nothing = move || Object::none("", Some(pixel));
+            let found = of_scene(shared, nothing, move |seen| seen.at(pixel)).await;
+            Some(Tell::Object(Box::new(found)))
+        }
+        Ok(Ask::Inspect(Inspect { name, material })) => {
+            let nothing = || Object::none(&name, None);
+            let wanted = name.clone();
+            let found = of_scene(shared, nothing, move |seen| seen.object(&wanted, material.as_deref())).await;
+            Some(Tell::Object(Box::new(found)))
+        }
+        Ok(Ask::Objects(part)) => {
+            let found = of_scene(shared, Listed::default, move |seen| seen.objects(&part)).await;
+            Some(Tell::Objects(found))
         }
         Ok(Ask::Command(command)) => {
             let dropped = || Tell::Refused("busy: a command was dropped".to_string());
@@ -315,6 +353,18 @@ fn answer(asked: &str, shared: &Shared) -> Option<Tell<'static>> {
         }
         Err(error) => Some(Tell::Refused(format!("not understood: {error}"))),
     }
+}
+
+/// What is found in the scene, on a thread of its own: it may be large. Or what is told where there is none.
+async fn of_scene<T: Send + 'static>(
+    shared: &Shared,
+    nothing: impl Fn() -> T,
+    find: impl FnOnce(&Seen) -> T + Send + 'static,
+) -> T {
+    let seen = shared.seen.borrow().clone();
+    let Some(seen) = seen else { return nothing() };
+    let found = tokio::task::spawn_blocking(move || find(&seen)).await;
+    found.unwrap_or_else(|_| nothing())
 }
 
 fn text(tell: &Tell) -> Option<Message> {

@@ -11,6 +11,7 @@ use tokio::sync::watch;
 
 use super::build::Builder;
 use super::messages::{Command, Event, Report, State};
+use super::object::Seen;
 use super::painter::{Painter, Told};
 use super::picture::Frame;
 use super::reference::Reference;
@@ -45,6 +46,8 @@ pub struct Session {
     pub state: watch::Receiver<Arc<State>>,
     /// The newest picture, once there is one. A slow reader misses some.
     pub frames: watch::Receiver<Option<Arc<Frame>>>,
+    /// The scene and how it is looked at, once there is one.
+    pub seen: watch::Receiver<Option<Arc<Seen>>>,
     viewers: Viewers,
     watch: Option<Watch>,
     thread: Option<JoinHandle<()>>,
@@ -111,11 +114,12 @@ impl Session {
         let snapshot = sources.read();
         let (events, inbox) = sync_channel(WAITING);
         let started = Instant::now();
-        let first = Event::Files(Box::new(snapshot.clone()), started);
+        let first = Event::Files(Box::new(snapshot.clone()), started, 0);
         let _ = events.send(first); // the inbox is here
-        let watch = Watch::start(sources.clone(), snapshot, {
+        let writes = Arc::default();
+        let watch = Watch::start(sources.clone(), snapshot, Arc::clone(&writes), {
             let events = events.clone();
-            move |snapshot, noticed| events.send(Event::Files(Box::new(snapshot), noticed)).is_ok()
+            move |snapshot, noticed, count| events.send(Event::Files(Box::new(snapshot), noticed, count)).is_ok()
         })?;
         let builder = Builder::start(choice, {
             let events = events.clone();
@@ -125,15 +129,17 @@ impl Session {
         })?;
         let (state_sender, state) = watch::channel(Arc::default());
         let (frame_sender, frames) = watch::channel(None);
+        let (scene_sender, seen) = watch::channel(None);
         let looking = Arc::new(AtomicUsize::new(0));
         let wanted_by = (only_for_viewers && out.is_none()).then(|| looking.clone());
         let told = Told {
             report,
             state: state_sender,
             frames: frame_sender,
+            seen: scene_sender,
             events: events.clone(),
         };
-        let painter = Painter::new(sources, device, builder, out, wanted_by, told);
+        let painter = Painter::new(sources, device, builder, (out, wanted_by), writes, told);
         let thread = std::thread::Builder::new()
             .name("render".to_string())
             .spawn(move || run(painter, inbox))?;
@@ -146,6 +152,7 @@ impl Session {
             asked: Arc::default(),
             state,
             frames,
+            seen,
             watch: Some(watch),
             thread: Some(thread),
         })

@@ -12,3 +12,4 @@ mod responsive;
 mod running;
 mod server;
 mod views;
+mod writing;

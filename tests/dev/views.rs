@@ -58,15 +58,15 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
     std::thread::sleep(SETTLED);
     assert_eq!(running.revision(), revision, "nothing was rendered again");
     // The save is taken back: the file's text is what it was, and the view stays.
-    assert!(running.state().can_undo);
-    running.session.send(Command::UndoSave);
+    assert_eq!(running.state().undo.as_deref(), Some("camera"));
+    running.session.send(Command::UndoWrite);
     running.wait("the file to be as it was", |running| {
-        (running.state().camera_moved && !running.state().can_undo).then_some(())
+        (running.state().camera_moved && running.state().undo.is_none()).then_some(())
     });
     assert_eq!(files.read("scene.toml"), SCENE);
     std::thread::sleep(SETTLED);
     assert_eq!((running.colors(), running.state().camera_moved), (shown, true));
-    running.session.send(Command::UndoSave);
+    running.session.send(Command::UndoWrite);
     running.session.send(Command::SaveCamera);
     running.wait("the camera to be the file's", |running| {
         (!running.state().camera_moved).then_some(())

@@ -184,7 +184,9 @@ impl Info {
                 seed: scene.render.seed,
             },
             camera: seen(&scene.camera, scene.camera_path.as_ref()),
-            bounds: scene.bounds().map(|(low, high)| [low, high].map(|corner| corner.to_array())),
+            bounds: scene
+                .bounds()
+                .map(|(low, high)| [low, high].map(|corner| corner.to_array())),
             shapes: shapes(scene, packed),
             materials: Kinds::of(scene.materials.iter().map(|material| reflection(&material.reflection))),
             textures: scene.textures.iter().map(|texture| textured(&texture.kind)).collect(),

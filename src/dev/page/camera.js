@@ -17,7 +17,7 @@ export function setUpCamera(picture, onKey, showNotice) {
 
   const copy = () => copyCamera(showNotice);
   const actions = {
-    copy, save: () => ask("save_camera"), undo: () => ask("undo_save"), reset: () => ask("reset_camera"), back: () => ask("back"),
+    copy, save: () => ask("save_camera"), undo: () => ask("undo_write"), reset: () => ask("reset_camera"), back: () => ask("back"),
     forth: () => ask("forth"), "frame-all": () => ask({ frame: null }), bookmark: add,
   };
   for (const [id, act] of Object.entries(actions)) element(id).addEventListener("click", act);
@@ -38,7 +38,7 @@ export function setUpCamera(picture, onKey, showNotice) {
       element(id).disabled = !on;
       delete element(id).dataset.off;
     }
-    element("undo").hidden = !state.can_undo;
+    element("undo").hidden = state.undo !== "camera";
     if (state.scene !== scene) {
       scene = state.scene;
       showBookmarks();

@@ -3,6 +3,7 @@
 import { setUpCamera } from "/camera.js";
 import { setUpCompare } from "/compare.js";
 import { connect, element, isHeard, lastState, onFrame, onLink, onRefused, onState } from "/link.js";
+import { select, setUpObject } from "/object.js";
 import { Picture } from "/picture.js";
 import { setUpProbes } from "/probes.js";
 import { setUpRender } from "/render.js";
@@ -22,6 +23,8 @@ setUpCamera(picture, onKey, showNotice);
 setUpCompare(picture, onKey, showNotice);
 setUpProbes(picture, onKey);
 setUpRender(onKey);
+setUpObject();
+picture.clicked = select;
 
 onLink((there) => {
   isLinked = there;

@@ -6,9 +6,8 @@ use std::time::Instant;
 use super::Painter;
 use crate::dev::build::guarded;
 use crate::dev::canvas::Limits;
-use crate::dev::messages::{Command, Notice, Report};
+use crate::dev::messages::{Command, Notice};
 use crate::dev::picture::View;
-use crate::dev::save::save_camera;
 use crate::dev::source::Loaded;
 use crate::pack::{Camera, Packed, pack_camera};
 
@@ -23,7 +22,9 @@ impl Painter {
             Command::Forth => self.retrace(true),
             Command::ResetCamera => self.reset_camera(),
             Command::SaveCamera => self.save_camera(),
-            Command::UndoSave => self.undo_save(),
+            Command::Set(set) => self.set(&set),
+            Command::UndoWrite => self.turn(false),
+            Command::RedoWrite => self.turn(true),
             Command::View(view) => {
                 self.view = view;
                 if let Some(running) = &mut self.running {
@@ -90,40 +91,18 @@ impl Painter {
         }
     }
 
-    fn save_camera(&mut self) {
-        let Some(loaded) = &self.loaded else { return };
-        let camera = self.camera.as_ref().unwrap_or(&loaded.camera);
-        let result = save_camera(&self.sources.scene, camera).map(|saved| {
-            self.saved = saved.or(self.saved.take());
-        });
-        self.notice(&result, format!("camera saved into {}", self.sources.scene.display()));
-        (self.report)(Report::Saved(result));
-    }
-
-    /// Takes the last save back; the camera stays where it is.
-    fn undo_save(&mut self) {
-        let (Some(saved), Some(loaded)) = (self.saved.take(), &self.loaded) else {
-            return;
-        };
-        let result = saved.undo();
-        if result.is_ok() {
-            self.camera.get_or_insert_with(|| loaded.camera.clone());
-            self.taken_back = true;
-        }
-        self.notice(
-            &result,
-            format!("{} is as it was before the save", self.sources.scene.display()),
-        );
-        (self.report)(Report::Unsaved(result));
-    }
-
     pub(super) fn notice(&mut self, result: &Result<(), String>, good: String) {
         let number = self.state.notice.as_ref().map_or(0, |notice| notice.number) + 1;
         let (text, bad) = match result {
             Ok(()) => (good, false),
             Err(error) => (error.clone(), true),
         };
-        self.state.notice = Some(Notice { number, text, bad });
+        self.state.notice = Some(Notice {
+            number,
+            command: self.heard + 1,
+            text,
+            bad,
+        });
     }
 
     /// The camera that is looked through, for a scene.

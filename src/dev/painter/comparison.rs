@@ -69,7 +69,10 @@ impl Painter {
                 });
                 self.notice(&Ok(()), "the picture is kept to compare others with".to_string());
             }
-            None => self.notice(&Err("there is no whole picture of light to keep yet".to_string()), String::new()),
+            None => self.notice(
+                &Err("there is no whole picture of light to keep yet".to_string()),
+                String::new(),
+            ),
         }
     }
 
@@ -83,7 +86,9 @@ impl Painter {
 
     /// Puts what is compared with beside a picture; the names of both.
     pub(super) fn beside(&self, content: Content, whole: [u32; 2]) -> (Content, Option<[String; 2]>) {
-        let View::Compare(against) = self.view else { return (content, None) };
+        let View::Compare(against) = self.view else {
+            return (content, None);
+        };
         let picture = "picture".to_string();
         match (content, self.comparison.with(against)) {
             (Content::Color(pixels), Some(other)) => match other.at(whole, [pixels.width, pixels.height]) {
@@ -140,7 +145,10 @@ impl Painter {
             Some(other) if other.at(whole, [1, 1]).is_none() => {
                 let Pixels { width, height, .. } = *other.pixels;
                 let [w, h] = whole;
-                Some(format!("{}: is {width} x {height}; the picture is {w} x {h}", other.name))
+                Some(format!(
+                    "{}: is {width} x {height}; the picture is {w} x {h}",
+                    other.name
+                ))
             }
             Some(_) => None,
         }

@@ -5,11 +5,12 @@ mod comparison;
 mod kernels;
 mod show;
 mod walk;
+mod writing;
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::SyncSender;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
@@ -20,11 +21,14 @@ use self::walk::Walk;
 use super::build::{Builder, Request, guarded};
 use super::camera::merged;
 use super::canvas::{Canvas, Limits};
+use super::diagnostic::Diagnostic;
+use super::history::History;
 use super::look::Choice;
 use super::messages::{Event, Report, State};
+use super::object::Seen;
 use super::picture::{Frame, View};
-use super::save::Saved;
 use super::source::{Constants, Loaded, Snapshot, Sources, Stamp, constants};
+use super::watch::Writes;
 use crate::gpu::Device;
 use crate::gpu::compose::Shaders;
 use crate::scene::CameraDescription;
@@ -48,6 +52,7 @@ pub struct Painter {
     report: Box<dyn Fn(Report) + Send>,
     state_sender: watch::Sender<Arc<State>>,
     frame_sender: watch::Sender<Option<Arc<Frame>>>,
+    seen_sender: watch::Sender<Option<Arc<Seen>>>,
     state: State,
 
     /// The last scene that was right.
@@ -71,10 +76,12 @@ pub struct Painter {
     camera: Option<CameraDescription>,
     /// Whether it moved since the picture was begun.
     camera_waits: bool,
-    /// The last save of a camera, while it can be taken back.
-    saved: Option<Saved>,
-    /// Whether it was, and the file has not been read again.
-    taken_back: bool,
+    /// What was written into the scene file, while it can be taken back.
+    history: History,
+    /// What the watcher is told of that.
+    writes: Arc<Mutex<Writes>>,
+    /// The files that the scene is made of.
+    files: Vec<(PathBuf, Stamp)>,
     view: View,
     gain: f32,
     marks: bool,
@@ -129,6 +136,8 @@ pub struct Told {
     pub state: watch::Sender<Arc<State>>,
     /// Those who are sent the picture.
     pub frames: watch::Sender<Option<Arc<Frame>>>,
+    /// Those who ask about the scene.
+    pub seen: watch::Sender<Option<Arc<Seen>>>,
     /// The session's own inbox.
     pub events: SyncSender<Event>,
 }
@@ -139,14 +148,15 @@ impl Painter {
         sources: Sources,
         device: Device,
         builder: Builder,
-        out: Option<PathBuf>,
-        looking: Option<Arc<AtomicUsize>>,
+        (out, looking): (Option<PathBuf>, Option<Arc<AtomicUsize>>),
+        writes: Arc<Mutex<Writes>>,
         told: Told,
     ) -> Painter {
         let Told {
             report,
             state: state_sender,
             frames: frame_sender,
+            seen: seen_sender,
             events,
         } = told;
         let state = State {
@@ -165,6 +175,7 @@ impl Painter {
             report,
             state_sender,
             frame_sender,
+            seen_sender,
             state,
             loaded: None,
             shaders: None,
@@ -179,8 +190,9 @@ impl Painter {
             problems: Problems::default(),
             camera: None,
             camera_waits: false,
-            saved: None,
-            taken_back: false,
+            history: History::default(),
+            writes,
+            files: Vec::new(),
             view: View::default(),
             gain: GAIN,
             marks: true,
@@ -206,7 +218,7 @@ impl Painter {
     /// Takes something that happened.
     pub fn take(&mut self, event: Event) {
         match event {
-            Event::Files(snapshot, noticed) => self.take_files(*snapshot, noticed),
+            Event::Files(snapshot, noticed, writes) => self.take_files(*snapshot, noticed, writes),
             Event::Built(built) => self.take_built(*built),
             Event::Command(command) => {
                 self.take_command(command);
@@ -225,35 +237,19 @@ impl Painter {
         self.tell();
     }
 
-    fn take_files(&mut self, snapshot: Snapshot, noticed: Instant) {
-        if let Some((_, Stamp::Content(content))) = snapshot.files.first()
-            && self.saved.as_ref().is_some_and(|saved| !saved.is(content))
+    fn take_files(&mut self, snapshot: Snapshot, noticed: Instant, writes: u64) {
+        // What was read before this session wrote the file last is no news of the scene.
+        let is_new = writes == self.writes.lock().unwrap_or_else(PoisonError::into_inner).count;
+        let known = self.loaded.as_ref().map(|loaded| loaded.text.as_bytes());
+        if let (true, Some((_, Stamp::Content(content)))) = (is_new, snapshot.files.first())
+            && known != Some(content)
         {
-            self.saved = None; // nothing of the save is there to be taken back
+            self.history.forget(); // nothing of what was written is there to be taken back
         }
         let mut shown_otherwise = false;
-        match snapshot.scene {
-            Ok(loaded) => {
-                self.problems.scene = None;
-                // Whoever changes the file's camera wants to see it; what a save has written and is taken back was on screen.
-                if let (Some(camera), Some(old), false) = (&self.camera, &self.loaded, self.taken_back) {
-                    self.camera = merged(camera, &old.camera, &loaded.camera);
-                }
-                self.taken_back = false;
-                if self.loaded.as_ref().is_some_and(|old| old.packed != loaded.packed) {
-                    self.keep_before();
-                    let cut = self.cut.take();
-                    self.refused.retain(|known| Some(known) != cut.as_ref());
-                }
-                let known = self.loaded.as_ref().map_or(&[][..], |old| &old.scene.notes);
-                for note in loaded.scene.notes.iter().filter(|note| !known.contains(note)) {
-                    (self.report)(Report::Note(note.clone()));
-                }
-                let known = self.loaded.as_ref();
-                shown_otherwise = known.is_some_and(|old| old.scene.view != loaded.scene.view);
-                self.loaded = Some(loaded);
-            }
-            Err(problem) => self.problems.scene = Some(problem),
+        if is_new {
+            self.files = snapshot.files;
+            shown_otherwise = self.take_scene(snapshot.scene);
         }
         match snapshot.shaders {
             Ok(shaders) => {
@@ -268,6 +264,40 @@ impl Painter {
             }
             Err(problem) => self.problems.files = Some(problem),
         }
+        self.show_files(noticed, shown_otherwise);
+    }
+
+    /// Takes a scene, or what is wrong with it. Gives whether what is rendered of it is shown otherwise.
+    fn take_scene(&mut self, scene: Result<Arc<Loaded>, Diagnostic>) -> bool {
+        let mut shown_otherwise = false;
+        match scene {
+            Ok(loaded) => {
+                self.problems.scene = None;
+                // Whoever changes the file's camera wants to see it.
+                if let (Some(camera), Some(old)) = (&self.camera, &self.loaded) {
+                    self.camera = merged(camera, &old.camera, &loaded.camera);
+                }
+                if self.loaded.as_ref().is_some_and(|old| old.packed != loaded.packed) {
+                    self.keep_before();
+                    let cut = self.cut.take();
+                    self.refused.retain(|known| Some(known) != cut.as_ref());
+                }
+                let known = self.loaded.as_ref().map_or(&[][..], |old| &old.scene.notes);
+                for note in loaded.scene.notes.iter().filter(|note| !known.contains(note)) {
+                    (self.report)(Report::Note(note.clone()));
+                }
+                let known = self.loaded.as_ref();
+                shown_otherwise = known.is_some_and(|old| old.scene.view != loaded.scene.view);
+                self.loaded = Some(loaded);
+                self.state.scenes += 1;
+            }
+            Err(problem) => self.problems.scene = Some(problem),
+        }
+        shown_otherwise
+    }
+
+    /// Sees to it that what the files say now is shown.
+    fn show_files(&mut self, noticed: Instant, shown_otherwise: bool) {
         self.failures = 0;
         self.settle((noticed, true));
         // What is rendered may be the same; if it is not, its first picture comes by itself.

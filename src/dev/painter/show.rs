@@ -10,6 +10,7 @@ use crate::dev::camera::{Viewpoint, text};
 use crate::dev::diagnostic::Diagnostic;
 use crate::dev::look::Look;
 use crate::dev::messages::{Preview, Report};
+use crate::dev::object::Seen;
 use crate::dev::picture::{Content, Frame, Header, Names, View, png_of};
 use crate::dev::save::replace;
 use crate::scene::ViewSettings;
@@ -150,8 +151,23 @@ impl Painter {
         }
     }
 
+    /// Tells what questions about the scene are answered from, where it has changed.
+    fn tell_seen(&self) {
+        let Some(loaded) = &self.loaded else { return };
+        let camera = self.packed_camera(loaded);
+        let is_known = |seen: &Arc<Seen>| Arc::ptr_eq(&seen.loaded, loaded) && seen.camera == camera;
+        if !self.seen_sender.borrow().as_ref().is_some_and(is_known) {
+            self.seen_sender.send_replace(Some(Arc::new(Seen {
+                loaded: Arc::clone(loaded),
+                camera,
+                sources: self.sources.clone(),
+            })));
+        }
+    }
+
     /// Tells everybody the state, where it has changed.
     pub(super) fn tell(&mut self) {
+        self.tell_seen();
         let camera = self
             .camera
             .as_ref()
@@ -183,7 +199,8 @@ impl Painter {
         let rests = self.paused && !self.running.as_ref().is_some_and(|running| running.canvas.is_new());
         let renders = self.running.is_some() && !self.is_done() && !rests;
         self.state.busy = self.camera_waits || self.pending.is_some() || renders;
-        self.state.can_undo = self.saved.is_some();
+        [self.state.undo, self.state.redo] =
+            [false, true].map(|again| self.history.last(again).map(|step| step.what.clone()));
         self.state.problems = problems;
         self.state.compiling = self.pending.is_some();
         (self.state.view, self.state.gain, self.state.marks) = (self.view, self.gain, self.marks);

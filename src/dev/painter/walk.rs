@@ -52,7 +52,9 @@ impl Walk {
 impl Painter {
     /// The camera that is looked through.
     fn seen_by(&self) -> Option<&CameraDescription> {
-        self.camera.as_ref().or(self.loaded.as_ref().map(|loaded| &loaded.camera))
+        self.camera
+            .as_ref()
+            .or(self.loaded.as_ref().map(|loaded| &loaded.camera))
     }
 
     pub(super) fn move_camera(&mut self, by: Move) {
@@ -69,14 +71,18 @@ impl Painter {
     }
 
     pub(super) fn reset_camera(&mut self) {
-        let (Some(old), Some(loaded)) = (self.camera.clone(), &self.loaded) else { return };
+        let (Some(old), Some(loaded)) = (self.camera.clone(), &self.loaded) else {
+            return;
+        };
         let new = loaded.camera.clone();
         self.step(&old, new);
     }
 
     /// Shows the whole of what is at a pixel; of the whole scene if that has no end, or is nothing.
     pub(super) fn frame(&mut self, pixel: Option<[u32; 2]>) {
-        let (Some(loaded), Some(old)) = (self.loaded.clone(), self.seen_by().cloned()) else { return };
+        let (Some(loaded), Some(old)) = (self.loaded.clone(), self.seen_by().cloned()) else {
+            return;
+        };
         let object = pixel.and_then(|pixel| self.bounds_at(pixel, &loaded.scene));
         match object.or_else(|| loaded.scene.bounds()) {
             Some((low, high)) => {

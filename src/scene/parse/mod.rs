@@ -1,5 +1,7 @@
 //! From the text of a scene file to its [`Description`], and from a key path to its line.
 
+#[cfg(feature = "dev")]
+mod change;
 mod parts;
 mod syntax;
 
@@ -16,8 +18,6 @@ use toml::{Table, Value};
 use self::parts::{Broken, Kind, LARGEST, Parts};
 use super::Integrator;
 use super::course;
-#[cfg(feature = "dev")]
-use super::define::Define;
 use super::define::Defines;
 use super::description::tagged::{ReadError, Tagged};
 use super::description::{
@@ -28,6 +28,8 @@ use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
 use super::limits::{BLADES, DEEPEST, MOST, UV_SETS};
 use super::validate::depths;
 
+#[cfg(feature = "dev")]
+pub(crate) use change::Pieces;
 pub(super) use syntax::{NOT_UTF8, syntax_error};
 
 impl Description {
@@ -39,12 +41,6 @@ impl Description {
     /// Text that is no TOML or JSON, unknown and missing keys, unknown types, and values of the wrong type.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SceneError> {
         Description::parse_with(text, origin, &mut Defines::new(&[]))
-    }
-
-    /// [`Description::parse`], with other values in place of some of the text's, and no trace of them.
-    #[cfg(feature = "dev")]
-    pub(crate) fn parse_defined(text: &str, origin: &str, values: &[Define]) -> Result<Self, SceneError> {
-        Description::parse_with(text, origin, &mut Defines::new(values))
     }
 
     /// The same scene with other values in place of some of its own.
