@@ -19,7 +19,8 @@ use self::parts::{Broken, Kind, LARGEST, Parts};
 use super::Integrator;
 use super::course;
 use super::define::Defines;
-use super::description::tagged::{ReadError, Tagged};
+use super::description::tables::{self, ReadError};
+use super::description::tagged::Tagged;
 use super::description::{
     CameraDescription, CameraKeyDescription, CameraPathDescription, Description, InstanceDescription, LightDescription,
     MaterialDescription, MeshFileDescription, ShapeDescription, TextureDescription,
@@ -342,10 +343,9 @@ fn read<T: DeserializeOwned>(table: Table) -> Result<T, Problem> {
 
 /// Reads a table. What it may say depends on the integrator.
 pub(super) fn read_for<T: DeserializeOwned>(table: Table, integrator: Integrator) -> Result<T, Problem> {
-    let read = |table: Table| serde_path_to_error::deserialize(table);
     // The copy is for the message: reading consumes the values.
-    read(table.clone()).map_err(|error| {
-        let error = with_names(error, &table, |table| read(table).err());
+    tables::read(table.clone()).map_err(|error| {
+        let error = with_names(error, &table, |table| tables::read::<T>(table).err());
         explain(error, table, false, integrator)
     })
 }
