@@ -14,9 +14,9 @@ pub(super) const LONGEST_SIDE: u32 = 16_384;
 /// What a decoder may take beside the image, in bytes: rows, tables, the parts of a compressed file.
 const BESIDE: usize = 64 << 20;
 
-/// What the values of an image may take while it is decoded, in bytes, and how many more for a byte of its file: a small file may be an
+/// What the values of an image may take, in bytes, and how many more for a byte of its file; decoders take as much again beside them. A small file may be an
 /// image of 16,384 x 16,384 zeros.
-const LARGEST: (u64, u64) = (512 << 20, 32);
+const LARGEST: (u64, u64) = (256 << 20, 32);
 
 /// What texels that an EXR file shows and does not store may take, in bytes, beside as many for a byte of the file.
 const BLANK: u64 = 64 << 20;

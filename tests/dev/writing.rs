@@ -91,7 +91,7 @@ fn what_was_written_is_taken_back_and_written_again() {
     let last = files.read("scene.toml");
     assert!(last.contains("shininess = 36\r\n"), "{last}");
     // The camera's save is a step too, and the view stays when it is taken back.
-    running.session.send(Command::Move(Move::Orbit(0.3, 0.1)));
+    follow(&running, Command::Move(Move::Orbit(0.3, 0.1)));
     follow(&running, Command::SaveCamera);
     assert_eq!(running.state().undo.as_deref(), Some("camera"));
     follow(&running, Command::UndoWrite);
