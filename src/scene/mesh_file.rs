@@ -111,7 +111,10 @@ mod tests {
         // So large that all threads read it.
         let many = SMALL.repeat(2000);
         files.iter().for_each(|file| fs::write(file, &many).unwrap());
-        let read = files.par_iter().chain(&files).map(|file| load(file, None).unwrap().triangles.len());
+        let read = files
+            .par_iter()
+            .chain(&files)
+            .map(|file| load(file, None).unwrap().triangles.len());
         assert_eq!(read.sum::<usize>(), 64 * 2000);
     }
 

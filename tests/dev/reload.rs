@@ -24,7 +24,11 @@ fn the_first_picture_is_what_render_makes() {
     let bits = [r, g, b].map(|value| format!("{:08x}", value.to_bits())).join("  ");
     assert_eq!(
         told,
-        [("linear RGB", format!("{r}  {g}  {b}")), ("bits", bits), ("shown", shown)]
+        [
+            ("linear RGB", format!("{r}  {g}  {b}")),
+            ("bits", bits),
+            ("shown", shown)
+        ]
     );
     assert_eq!(frame.pixel(40, 0), None);
 }
