@@ -498,8 +498,6 @@ fn mutated(scene: &Table, place: &[Step]) -> Vec<Table> {
 /// Whether the program and the schema agree on a scene: how, if not.
 fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
     match (fits(scene), told(scene, folder)) {
-        // For a table the program takes a list of its values too, in their order.
-        (false, Ok(())) if scene["render"].get("adaptive").is_some_and(Value::is_array) => None,
         (false, Ok(())) => Some(format!("the schema alone refuses {scene}")),
         // To JSON 1.0 is a whole number.
         (true, Err(message))
@@ -556,6 +554,8 @@ fn nothing_and_too_much_are_refused_by_both() {
     let key = |name: &str| Step::Key(name.to_owned());
     let path = [key("camera"), key("path")];
     let shape = |number| [key("shapes"), Step::Index(number)];
+    let phong = [key("materials"), key("phong")];
+    let turned = [key("instances"), Step::Index(0)];
     let bare = Table::from_iter([("frame".to_owned(), Value::from(3))]);
     for (number, table, name, value) in [
         (0, &path[..], "keys", Value::Array(Vec::new())),
@@ -570,6 +570,28 @@ fn nothing_and_too_much_are_refused_by_both() {
         (0, &[key("instances"), Step::Index(1)], "scale", 1.into()),
         (1, &shape(0), "translate", vec![0, 0, 0].into()),
         (2, &shape(1), "scale", 1.into()),
+        // No list of a table's values stands for the table.
+        (0, &[key("render")], "adaptive", vec![0.01].into()),
+        (
+            0,
+            &[key("render")],
+            "light_samples",
+            Value::Array(vec!["random".into(), 4.into()]),
+        ),
+        (
+            0,
+            &path,
+            "keys",
+            Value::Array(vec![Value::from(vec![1]), Value::from(vec![2])]),
+        ),
+        (0, &phong, "color", vec!["two"].into()),
+        (0, &phong, "normal_map", vec!["five"].into()),
+        (
+            0,
+            &turned,
+            "rotate",
+            Value::Array(vec![vec![0, 0, 1].into(), 20.into()]),
+        ),
     ] {
         let mut scene = Value::Table(EVERY[number].parse().unwrap());
         assert!(fits(scene.as_table().unwrap()), "the control");
@@ -763,6 +785,17 @@ fn every_key_is_described_and_every_number_has_its_ends() {
         assert!(
             !is_number || ends.iter().any(|end| property.get(end).is_some()),
             "{path}: {property}"
+        );
+        // Where a texture may stand in its place, what its numbers may be is told where they are asked for: at the key.
+        let is_texture = |either: &Json| either["properties"].get("texture").is_some();
+        let either = property.get("anyOf").filter(|either| is_texture(&either[1]));
+        let mut plain = either.map_or(&Json::Null, |either| &either[0]);
+        while let Some(items) = plain.get("items") {
+            plain = items;
+        }
+        assert!(
+            plain.get("minimum").is_none() || told.contains(" to "),
+            "{path}: {told:?}"
         );
         assert!(
             property.get("title").is_none() && property.get("format").is_none(),

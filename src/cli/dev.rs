@@ -12,7 +12,7 @@ use wgray::dev::{Diagnostic, Listener, Measured, Report, Session, Settings, Sour
 use wgray::error::RenderError;
 use wgray::gpu::Choice;
 use wgray::image::Output;
-use wgray::scene::{Description, Overrides, Scene, SceneError};
+use wgray::scene::{Define, Description, Overrides, Scene, SceneError};
 
 use super::Usage;
 use super::log::{self, Facts, Level};
@@ -28,7 +28,8 @@ pub struct Args {
     /// Scene file; docs/scene-format.md says what is in it
     scene: PathBuf,
 
-    /// Where the page is. Who can reach this address can look, and can save the camera into the scene file
+    /// Where the page is. Who can reach this address can look, and can change values of the
+    /// scene file
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7878", value_parser = NonEmptyStringValueParser::new())]
     listen: String,
 
@@ -49,6 +50,10 @@ pub struct Args {
     /// Folder that the files named by the scene, such as textures, must lie in, instead of the scene's own
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
+
+    /// Puts a value in place of the scene's: -D render.seed=3
+    #[arg(short = 'D', long, value_name = "KEY=VALUE")]
+    define: Vec<Define>,
 
     /// Picture to write after each reload, once every pixel has a sample and again when all are there
     #[arg(short, long, value_name = "FILE.png")]
@@ -77,6 +82,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         overrides: args.options.over(Overrides {
             size: args.size,
             asset_root: args.asset_root,
+            define: args.define,
             ..Overrides::default()
         }),
         shaders: shaders(args.shaders)?,
@@ -135,8 +141,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Terminal::new().line("", &format!("http://{address}/: the page; Ctrl+C ends"));
     if !address.ip().is_loopback() {
         let told = format!(
-            "{address} is no loopback address: everybody who can reach it can look, and can save the camera \
-             into the scene file"
+            "{address} is no loopback address: everybody who can reach it can look, and can change values \
+             of the scene file"
         );
         log::say(Level::Warning, &told);
     }
@@ -270,12 +276,12 @@ impl Terminal {
                      wgray render makes the whole one"
                 ),
             ),
-            Report::Saved(Ok(())) => self.line(GREEN, "camera saved into the scene file"),
-            Report::Saved(Err(error)) => self.line(RED, &format!("camera not saved: {error}")),
+            Report::Wrote(what, Ok(())) => self.line(GREEN, &format!("{what} saved into the scene file")),
+            Report::Wrote(what, Err(error)) => self.line(RED, &format!("{what} not saved: {error}")),
             Report::Written(what, Ok(())) => self.line(GREEN, what),
             Report::Written(what, Err(error)) => self.line(RED, &format!("not {what}: {error}")),
-            Report::Unsaved(Ok(())) => self.line(GREEN, "camera's save taken back"),
-            Report::Unsaved(Err(error)) => self.line(RED, &format!("camera's save not taken back: {error}")),
+            Report::Turned(what, Ok(())) => self.line(GREEN, what),
+            Report::Turned(what, Err(error)) => self.line(RED, &format!("not {what}: {error}")),
         }
     }
 

@@ -148,6 +148,8 @@ impl Outputs {
 
     /// Refuses what would replace an input or another output.
     pub fn check(&self, inputs: &[PathBuf], checkpoint: Option<&Path>) -> anyhow::Result<()> {
+        // In a folder it has a name that nothing else has.
+        let checkpoint = checkpoint.filter(|path| !path.is_dir());
         let checkpoint = checkpoint.map(find_checkpoint).transpose()?;
         let checkpoint = checkpoint
             .iter()

@@ -8,6 +8,8 @@ mod plain;
 mod show;
 mod ssim;
 
+#[cfg(feature = "dev")]
+pub(crate) use color_map::color;
 pub use flip::{Flip, Map, PIXELS_PER_DEGREE, flip};
 pub use picture::{Channel, Kind, Picture, Plane, Unreadable};
 pub use plain::{COLOR, Difference, Largest, Layer, Place, Values, layer_of, layers};

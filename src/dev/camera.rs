@@ -1,7 +1,7 @@
 //! Moving a camera by hand, and writing it as the text of a scene file.
 
 use glam::{DQuat, DVec3};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::scene::CameraDescription;
 
@@ -15,6 +15,90 @@ pub enum Move {
     Pan(f64, f64),
     /// Towards what it looks at: the logarithm of the factor by which the scene grows.
     Dolly(f64),
+    /// Without turning, what it looks at with it: to the right, upwards and forwards, in distances of what it looks at.
+    Fly(f64, f64, f64),
+    /// Turns where it stands: angles to the right and upwards, in radians.
+    Look(f64, f64),
+}
+
+/// Where a camera stands and what it sees, as a viewer keeps it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+pub struct Viewpoint {
+    /// Where it is.
+    pub position: DVec3,
+    /// What it looks at.
+    pub look_at: DVec3,
+    /// What is up.
+    pub up: DVec3,
+    /// The vertical angle of view in degrees, or the height of an orthographic camera; a panorama has none.
+    pub extent: Option<f64>,
+}
+
+impl Viewpoint {
+    /// That of a camera.
+    pub fn of(camera: &CameraDescription) -> Viewpoint {
+        let View {
+            position, look_at, up, ..
+        } = view(camera);
+        let extent = match camera {
+            CameraDescription::Perspective(c) => Some(c.fov),
+            CameraDescription::Orthographic(c) => Some(c.height),
+            CameraDescription::Panorama(_) => None,
+        };
+        Viewpoint {
+            position,
+            look_at,
+            up,
+            extent,
+        }
+    }
+}
+
+/// A camera of the same kind elsewhere.
+///
+/// # Errors
+///
+/// What is wrong with such a camera.
+pub fn placed(camera: &CameraDescription, viewpoint: Viewpoint) -> Result<CameraDescription, String> {
+    let Viewpoint {
+        position,
+        look_at,
+        up,
+        extent,
+    } = viewpoint;
+    let mut new = camera.clone();
+    match &mut new {
+        CameraDescription::Perspective(c) => {
+            (c.position, c.look_at, c.up, c.fov) = (position, look_at, up, extent.unwrap_or(c.fov));
+        }
+        CameraDescription::Orthographic(c) => {
+            (c.position, c.look_at, c.up, c.height) = (position, look_at, up, extent.unwrap_or(c.height));
+        }
+        CameraDescription::Panorama(c) => (c.position, c.look_at, c.up) = (position, look_at, up),
+    }
+    match new.validate() {
+        Ok(_) => Ok(new),
+        Err(problem) => Err(format!("camera: {problem}")),
+    }
+}
+
+/// A camera that sees the whole of a ball from where it looks now, and turns around its middle.
+pub fn framed(camera: &CameraDescription, center: DVec3, radius: f64) -> CameraDescription {
+    let View { position, look_at, .. } = view(camera);
+    let back = (position - look_at).normalize_or_zero();
+    let radius = radius.max(f64::MIN_POSITIVE);
+    let mut viewpoint = Viewpoint::of(camera);
+    let distance = match camera {
+        // The ball touches the cone of view; a quarter of its size is left around it.
+        CameraDescription::Perspective(c) => 1.25 * radius / (c.fov.to_radians() / 2.0).sin(),
+        CameraDescription::Orthographic(_) => {
+            viewpoint.extent = Some(2.5 * radius);
+            (position - look_at).length().max(2.0 * radius)
+        }
+        CameraDescription::Panorama(_) => 2.0 * radius,
+    };
+    (viewpoint.look_at, viewpoint.position) = (rounded(center, distance), rounded(center + back * distance, distance));
+    placed(camera, viewpoint).unwrap_or_else(|_| camera.clone())
 }
 
 /// The least angle between the view and the vertical, in radians.
@@ -81,6 +165,19 @@ pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
             look_at += shift;
         }
         Move::Dolly(by) => position = look_at + offset * (-by).exp(),
+        Move::Fly(x, y, z) => {
+            let forwards = -offset.normalize();
+            let shift = (right * x + right.cross(forwards) * y + forwards * z) * offset.length();
+            position += shift;
+            look_at += shift;
+        }
+        Move::Look(x, y) => {
+            let forwards = DQuat::from_axis_angle(up, -x) * -offset;
+            let right = DQuat::from_axis_angle(up, -x) * right;
+            let angle = forwards.angle_between(up);
+            let new_angle = (angle - y).clamp(STEEPEST, std::f64::consts::PI - STEEPEST);
+            look_at = position + DQuat::from_axis_angle(right, angle - new_angle) * forwards;
+        }
     }
     let scale = position.distance(look_at);
     match &mut new {
@@ -292,6 +389,74 @@ mod tests {
             panic!()
         };
         assert_eq!(near.height, 1.0);
+    }
+
+    #[test]
+    fn flying_turns_nothing_and_looking_moves_nothing() {
+        for file in [perspective(), orthographic()] {
+            let old = view(&file);
+            let far = old.position.distance(old.look_at);
+            for (x, y, z) in [(0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.5), (-0.1, 0.2, -0.3)] {
+                let new = view(&moved(&file, Move::Fly(x, y, z)));
+                let shift = new.position - old.position;
+                assert!(shift.abs_diff_eq(new.look_at - old.look_at, 1e-3), "{shift}");
+                assert!((shift.length() - far * DVec3::new(x, y, z).length()).abs() < 1e-3 * far);
+                let forwards = (old.look_at - old.position) / far;
+                assert!((shift.dot(forwards) - far * z).abs() < 1e-3 * far);
+                assert!((shift.dot(forwards.cross(old.up).normalize()) - far * x).abs() < 1e-3 * far);
+            }
+            for (x, y) in [(0.3, 0.0), (0.0, 0.2), (0.0, 9.0), (0.0, -9.0), (-0.4, 0.1)] {
+                let new = view(&moved(&file, Move::Look(x, y)));
+                assert_eq!(new.position, old.position);
+                assert!((new.position.distance(new.look_at) - far).abs() < 1e-4 * far);
+            }
+            // To the right is to the right, upwards is upwards.
+            let right = (old.look_at - old.position).cross(old.up).normalize();
+            let new = view(&moved(&file, Move::Look(0.2, 0.1)));
+            assert!((new.look_at - old.look_at).dot(right) > 0.1 * far);
+            assert!((new.look_at - old.look_at).dot(old.up) > 0.05 * far);
+        }
+    }
+
+    #[test]
+    fn what_is_framed_is_seen_whole_in_the_middle() {
+        let center = DVec3::new(10.0, -3.0, 2.0);
+        for radius in [1e-6, 0.5, 1e6] {
+            for file in [perspective(), orthographic()] {
+                let new = framed(&file, center, radius);
+                let (old, seen) = (view(&file), view(&new));
+                assert!(
+                    seen.look_at.abs_diff_eq(center, 1e-3 * radius.max(1e-3)),
+                    "{radius}: {}",
+                    seen.look_at
+                );
+                let (a, b) = (old.look_at - old.position, seen.look_at - seen.position);
+                assert!(a.angle_between(b) < 1e-2, "{radius}: it looks another way");
+                match new {
+                    CameraDescription::Perspective(c) => {
+                        let half = (radius / b.length()).asin().to_degrees();
+                        assert!(2.0 * half < c.fov && 2.0 * half > 0.6 * c.fov, "{radius}: {half}");
+                    }
+                    CameraDescription::Orthographic(c) => assert_eq!(c.height, 2.5 * radius),
+                    CameraDescription::Panorama(_) => unreachable!(),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_viewpoint_is_kept_and_taken_again() {
+        for file in others().into_iter().chain([perspective(), orthographic()]) {
+            let away = moved(&moved(&file, Move::Orbit(0.3, 0.2)), Move::Dolly(0.4));
+            let kept = Viewpoint::of(&away);
+            let json = serde_json::to_string(&kept).unwrap();
+            assert_eq!(placed(&file, serde_json::from_str(&json).unwrap()).unwrap(), away);
+        }
+        let wrong = Viewpoint {
+            look_at: DVec3::new(0.0, -4.0, 1.0),
+            ..Viewpoint::of(&perspective())
+        };
+        assert!(placed(&perspective(), wrong).is_err(), "it looks at itself");
     }
 
     #[test]

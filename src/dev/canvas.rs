@@ -17,8 +17,8 @@ use super::picture::{Content, View, means};
 
 /// What one call aims to take: a save or a move of the camera waits so long.
 const CALL: Duration = Duration::from_millis(30);
-/// What a coarse picture aims to take.
-const COARSE: Duration = Duration::from_millis(60);
+/// What a coarse picture aims to take: with what it takes to show it, 20 in a second.
+const COARSE: Duration = Duration::from_millis(30);
 /// Pixels of a coarse picture as long as nothing is known of the speed.
 const COARSE_PIXELS: f64 = 10_000.0;
 /// The coarsest picture has one pixel for so many along each side.
@@ -49,6 +49,25 @@ pub struct Canvas {
     /// The first rows' hits.
     hits: Vec<FirstHit>,
     shown: bool,
+    limits: Limits,
+}
+
+/// How much of the picture is rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Samples of a pixel at most, one at least.
+    pub samples: u32,
+    /// Pixels of the picture along each side of one that is shown, one at least.
+    pub scale: u32,
+}
+
+impl Default for Limits {
+    fn default() -> Limits {
+        Limits {
+            samples: u32::MAX,
+            scale: 1,
+        }
+    }
 }
 
 /// Which picture the film is of.
@@ -64,7 +83,7 @@ struct Stage {
 
 impl Canvas {
     /// Starts a picture of a scene that is on the device.
-    pub fn new(gpu: Gpu, scene: Packed, view: View) -> Result<Canvas, RenderError> {
+    pub fn new(gpu: Gpu, scene: Packed, view: View, limits: Limits) -> Result<Canvas, RenderError> {
         let camera = scene.camera;
         let stage = Stage {
             scale: 1,
@@ -84,6 +103,7 @@ impl Canvas {
             cpu: Film::new(Region::whole(0, 0)),
             hits: Vec::new(),
             shown: false,
+            limits,
         };
         canvas.restart(camera, view)?;
         Ok(canvas)
@@ -122,14 +142,15 @@ impl Canvas {
     /// Starts the picture again, from a camera.
     pub fn restart(&mut self, camera: Camera, view: View) -> Result<(), RenderError> {
         self.camera = camera;
-        if self.compare != (view == View::Compare) {
+        if self.compare != view.is_by_both() {
             self.steps.forget_pace();
         }
-        self.compare = view == View::Compare;
+        self.compare = view.is_by_both();
         self.under = None;
         self.hits.clear();
         self.shown = false;
-        self.finest = finest(camera.width, camera.height, self.gpu.largest_film());
+        let largest = self.gpu.largest_film();
+        self.finest = finest(camera.width, camera.height, largest, self.limits.scale);
         let scale = if view.aov().is_some() {
             self.finest
         } else {
@@ -143,7 +164,7 @@ impl Canvas {
         self.shown = false;
         let film = view.aov().is_none();
         let nothing_there = self.stage.scale == self.finest && self.steps.samples() == 0;
-        let other_film = self.compare != (view == View::Compare);
+        let other_film = self.compare != view.is_by_both();
         if film && (other_film || nothing_there) {
             self.restart(self.camera, view)
         } else if !film && self.stage.scale > self.finest {
@@ -190,7 +211,20 @@ impl Canvas {
             self.scene.pixel_samples
         };
         self.steps.start(&self.gpu, region, samples);
+        self.steps.stop_at(self.limits.samples);
         Ok(())
+    }
+
+    /// Renders more or less of the picture from now on.
+    pub fn set_limits(&mut self, limits: Limits, view: View) -> Result<(), RenderError> {
+        let (old, fewer) = (self.limits, limits.samples < self.steps.samples());
+        self.limits = limits;
+        if limits.scale != old.scale || (fewer && self.stage.scale == self.finest) {
+            self.restart(self.camera, view) // samples that a pixel has are not taken from it
+        } else {
+            self.steps.stop_at(limits.samples);
+            Ok(())
+        }
     }
 
     fn size_at(&self, scale: u32) -> [u32; 2] {
@@ -301,7 +335,7 @@ impl Canvas {
             None => (self.gpu_pixels()?, self.compare.then(|| self.cpu_pixels())),
         };
         let size = [gpu.width, gpu.height];
-        Ok(match cpu.filter(|_| view == View::Compare) {
+        Ok(match cpu.filter(|_| view.is_by_both()) {
             Some(cpu) => (Content::Compare(gpu, cpu), size),
             None => match self.gpu.live().layer() {
                 Some(layer) => (Content::Layer(gpu, layer.numbers), size),
@@ -338,7 +372,7 @@ impl Canvas {
         } else {
             0
         };
-        (so_far, self.scene.pixel_samples)
+        (so_far, self.scene.pixel_samples.min(self.limits.samples))
     }
 
     /// Samples of pixels per second.
@@ -347,14 +381,14 @@ impl Canvas {
     }
 }
 
-/// The least scale at which a picture can be shown.
-fn finest(width: u32, height: u32, largest_film: u64) -> u32 {
+/// The least scale from `least` on at which a picture can be shown.
+fn finest(width: u32, height: u32, largest_film: u64, least: u32) -> u32 {
     let most = largest_film.min(MOST_PIXELS);
     let fits = |scale: &u32| {
         let (width, height) = (width.div_ceil(*scale), height.div_ceil(*scale));
         Region::whole(width, height).pixels() <= most && width.max(height) <= LONGEST_SIDE
     };
-    (1..).find(fits).unwrap_or(1) // the picture of one pixel fits
+    (least..).find(fits).unwrap_or(1) // the picture of one pixel fits
 }
 
 /// The same work done by both backends.
@@ -427,7 +461,8 @@ mod tests {
             (65_536, 65_536, 1 << 22, 32),
             (1, 1, 1, 1),
         ] {
-            assert_eq!(finest(width, height, film), scale, "{width} x {height}");
+            assert_eq!(finest(width, height, film, 1), scale, "{width} x {height}");
+            assert_eq!(finest(width, height, film, 4), scale.max(4), "{width} x {height}");
         }
     }
 }

@@ -40,7 +40,7 @@ impl Guard {
                 }
             }
             (None, true) => Err("pages from elsewhere are not served"),
-            (None, false) if socket => Err("a WebSocket needs an Origin"),
+            (None, false) if socket => Err("this request needs an Origin"),
             (None, false) => Ok(()),
         }
     }

@@ -4,19 +4,26 @@
 //! files ── watch ──> Snapshot ──> painter ──> builder (compiles)
 //!                                    │  ^─────────┘
 //!                       Canvas (renders, call by call)
-//!                                    └──> State, Frame ──> server ──> page
+//!                                    └──> State, Frame, Seen ──> server ──> page
 //! ```
 
 mod build;
 mod camera;
 mod canvas;
 mod diagnostic;
+mod download;
+mod edit;
 mod faults;
 mod guard;
+mod histogram;
+mod history;
+mod look;
 mod measure;
 mod messages;
+mod object;
 mod painter;
 mod picture;
+mod reference;
 mod save;
 mod server;
 mod session;
@@ -26,12 +33,16 @@ mod times;
 mod watch;
 
 pub use crate::gpu::marks::{Kind, Value};
-pub use camera::Move;
+pub use camera::{Move, Viewpoint};
 pub use diagnostic::Diagnostic;
 pub use faults::Faults;
+pub use histogram::Histogram;
+pub use look::{Choice, Legend, Look};
 pub use measure::{Measured, measure};
-pub use messages::{Command, Notice, Report, State};
-pub use picture::{Content, Frame, Header, LayerName, View};
+pub use messages::{Command, Notice, Preview, Report, Set, State};
+pub use object::{Group, Listed, Object, Seen};
+pub use picture::{Against, Content, Frame, Header, LayerName, View};
+pub use reference::{Apart, Reference};
 pub use server::Listener;
 pub use session::{Session, Settings, StartError, Viewer, Viewers};
 pub use sliders::SliderState;

@@ -5,11 +5,12 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::faults::{Fault, Faults, faults, mark};
+use super::histogram::Histogram;
+use super::look::{Legend, Look};
 use crate::film::{Film, mean};
 use crate::gpu::marks::LONGEST_NAME;
 use crate::image::{self, Aov, Pixels, difference};
 use crate::pack::{FirstHit, NOTHING};
-use crate::scene::ViewSettings;
 
 /// What is shown of the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
@@ -20,16 +21,22 @@ pub enum View {
     Color,
     /// The first hit's normal.
     Normal,
+    /// The normal that it is shaded by.
+    ShadingNormal,
     /// Its distance.
     Depth,
     /// Its texture coordinates.
     Uv,
-    /// Which shape it is on.
+    /// Which shape or triangle it is on.
     Primitive,
+    /// Which shape it is on.
+    Instance,
+    /// Where in its triangle it is.
+    Barycentric,
     /// How many samples a pixel has.
     Samples,
-    /// Radiance by the GPU, by the CPU, and their difference.
-    Compare,
+    /// Radiance, another picture of it, and their difference.
+    Compare(Against),
     /// A variable of the shaders that is marked as a layer.
     Layer(LayerName),
 }
@@ -78,6 +85,18 @@ impl From<LayerName> for String {
     }
 }
 
+/// What radiance is compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Against {
+    /// The same by the CPU.
+    Cpu,
+    /// What it was before the last saved change of the scene or the shaders.
+    Before,
+    /// A picture that was kept, or a file that a viewer gave.
+    Reference,
+}
+
 impl View {
     /// The layer of the shaders that it shows.
     pub fn layer(self) -> Option<LayerName> {
@@ -91,11 +110,19 @@ impl View {
     pub fn aov(self) -> Option<Aov> {
         match self {
             View::Normal => Some(Aov::Normal),
+            View::ShadingNormal => Some(Aov::ShadingNormal),
             View::Depth => Some(Aov::Depth),
             View::Uv => Some(Aov::Uv),
             View::Primitive => Some(Aov::Primitive),
-            View::Color | View::Samples | View::Compare | View::Layer(_) => None,
+            View::Instance => Some(Aov::Instance),
+            View::Barycentric => Some(Aov::Barycentric),
+            View::Color | View::Samples | View::Compare(_) | View::Layer(_) => None,
         }
+    }
+
+    /// Whether the CPU renders what it shows too.
+    pub fn is_by_both(self) -> bool {
+        self == View::Compare(Against::Cpu)
     }
 }
 
@@ -123,14 +150,14 @@ pub fn means(film: &Film, under: Option<&Pixels>, has_samples: &(dyn Fn(u32) -> 
 }
 
 /// From a picture to the same in another size.
-struct Scaled {
-    from: [u32; 2],
-    to: [u32; 2],
+pub(super) struct Scaled {
+    pub from: [u32; 2],
+    pub to: [u32; 2],
 }
 
 impl Scaled {
     /// The index of the pixel that covers pixel (x, y); `None` outside of the picture.
-    fn index(&self, x: u32, y: u32) -> Option<usize> {
+    pub fn index(&self, x: u32, y: u32) -> Option<usize> {
         let scaled = |at: u32, i: usize| {
             (at < self.from[i]).then(|| u64::from(at) * u64::from(self.to[i]) / u64::from(self.from[i]))
         };
@@ -147,10 +174,26 @@ pub enum Content {
     Samples(Vec<u32>, u32),
     /// The views of the first hits.
     Hits(Aov, Vec<FirstHit>),
-    /// [`View::Compare`]: GPU and CPU, where both have samples.
+    /// [`View::Compare`]: the picture, and the other one of the same size.
     Compare(Pixels, Pixels),
     /// [`View::Layer`], and how many numbers it has.
     Layer(Pixels, usize),
+}
+
+impl Content {
+    /// The bytes that are shown of what is no light, for a picture of this size; none for light.
+    pub(super) fn plain_bytes(&self, [width, height]: [u32; 2]) -> Vec<u8> {
+        match self {
+            Content::Samples(counts, total) => bytes(counts, |n| Vec3::splat(*n as f32 / (*total).max(1) as f32)),
+            Content::Hits(aov, hits) => {
+                let middle = hits.get((height / 2 * width + width / 2) as usize);
+                let middle_depth = middle.filter(|hit| hit.shape != NOTHING).map_or(1.0, |hit| hit.depth);
+                bytes(hits, |hit| aov.color_of_hit(hit, middle_depth))
+            }
+            Content::Layer(values, _) => bytes(&values.colors, |color| Vec3::from(*color)),
+            Content::Color(_) | Content::Compare(..) => Vec::new(),
+        }
+    }
 }
 
 /// What is told about a frame beside its pictures.
@@ -182,23 +225,16 @@ pub struct Header {
     pub latency: Option<f64>,
     /// What [`View::Compare`] found: pixels that differ in any bit, and the largest difference.
     pub differing: Option<(usize, f32)>,
+    /// What the two pictures of [`View::Compare`] are called.
+    pub sides: Option<[String; 2]>,
+    /// How bright the picture's pixels are, if it is one of light.
+    pub histogram: Option<Histogram>,
+    /// What false colours mean, where they are shown.
+    pub legend: Option<Legend>,
     /// Pixels that are no light, for each picture that can have them.
     pub faults: Vec<(&'static str, Faults)>,
     /// Names and sizes in bytes of the pictures that follow.
     pub parts: Vec<(&'static str, usize)>,
-}
-
-/// How a frame is shown, beside what it is of.
-#[derive(Clone, Copy, Debug)]
-pub struct Look {
-    /// The factor of the difference of [`View::Compare`].
-    pub gain: f32,
-    /// Whether pixels that are no light are marked.
-    pub marks: bool,
-    /// Whether negative ones are light, as under filters with negative lobes.
-    pub negative: bool,
-    /// How light is shown.
-    pub view: ViewSettings,
 }
 
 /// A picture that the viewers get, as PNG files and as numbers.
@@ -212,8 +248,8 @@ pub struct Frame {
     pub content: Content,
     /// How names are given to what the numbers count.
     pub names: Names,
-    /// How light is shown.
-    pub view: ViewSettings,
+    /// How it is shown.
+    pub look: Look,
 }
 
 /// How shapes and materials are called in the scene file.
@@ -241,41 +277,48 @@ impl Frame {
         };
         let light = |pixels: &Pixels| faults(&pixels.colors, look.negative, |color| *color);
         let pictures: Vec<(&'static str, Vec<u8>)> = match &content {
-            Content::Color(colors) => vec![marked("picture", display(colors, look.view), light(colors))],
+            Content::Color(colors) => vec![marked("picture", look.bytes(colors), light(colors))],
             // Numbers as they are, of which any may be negative.
             Content::Layer(values, _) => {
-                let rgb = bytes(&values.colors, |color| Vec3::from(*color));
-                vec![marked("picture", rgb, faults(&values.colors, true, |color| *color))]
+                let found = faults(&values.colors, true, |color| *color);
+                vec![marked("picture", content.plain_bytes(header.sent), found)]
             }
-            Content::Samples(counts, total) => {
-                vec![(
-                    "picture",
-                    bytes(counts, |n| Vec3::splat(*n as f32 / (*total).max(1) as f32)),
-                )]
-            }
+            Content::Samples(..) => vec![("picture", content.plain_bytes(header.sent))],
             Content::Hits(aov, hits) => {
-                let middle = hits.get((height / 2 * width + width / 2) as usize);
-                let middle_depth = middle.filter(|hit| hit.shape != NOTHING).map_or(1.0, |hit| hit.depth);
-                let rgb = bytes(hits, |hit| aov.color_of_hit(hit, middle_depth));
                 // Below zero are normals and texture coordinates by right.
                 let values = |hit: &FirstHit| match aov {
                     Aov::Normal => hit.normal.into(),
+                    Aov::ShadingNormal => hit.shading_normal.into(),
                     Aov::Depth => [hit.depth, 0.0, 0.0],
                     Aov::Uv => [hit.uv.x, hit.uv.y, 0.0],
+                    Aov::Barycentric => [hit.barycentric.x, hit.barycentric.y, 0.0],
                     _ => [0.0; 3],
                 };
-                vec![marked("picture", rgb, faults(hits, true, values))]
+                vec![marked(
+                    "picture",
+                    content.plain_bytes(header.sent),
+                    faults(hits, true, values),
+                )]
             }
-            Content::Compare(gpu, cpu) => {
-                header.differing = difference(gpu, cpu, 0.0).map(|found| (found.unequal, found.largest));
+            Content::Compare(first, second) => {
+                header.differing = difference(first, second, 0.0).map(|found| (found.unequal, found.largest));
                 vec![
-                    marked("gpu", display(gpu, look.view), light(gpu)),
-                    marked("cpu", display(cpu, look.view), light(cpu)),
-                    ("difference", amplified(gpu, cpu, look.gain)),
+                    marked("first", look.bytes(first), light(first)),
+                    marked("second", look.bytes(second), light(second)),
+                    ("difference", amplified(first, second, look.gain)),
                 ]
             }
         };
         header.faults = found;
+        header.histogram = match &content {
+            Content::Color(pixels) | Content::Compare(pixels, _) => Some(Histogram::of(&pixels.colors)),
+            Content::Samples(..) | Content::Hits(..) | Content::Layer(..) => None,
+        };
+        header.legend = header
+            .histogram
+            .as_ref()
+            .filter(|_| look.false_color)
+            .map(|_| Legend::of(look.view.exposure));
         let (parts, pictures): (Vec<_>, Vec<_>) = pictures
             .into_par_iter()
             .map(|(name, rgb)| {
@@ -289,7 +332,7 @@ impl Frame {
             pictures,
             content,
             names,
-            view: look.view,
+            look,
         }
     }
 
@@ -306,21 +349,26 @@ impl Frame {
         Some(match &self.content {
             Content::Color(pixels) => {
                 let color = *pixels.colors.get(i)?;
-                let shown = self.view.rgb8(color).map(|byte| byte.to_string()).join(" ");
-                vec![("linear RGB", numbers(color)), ("shown", shown)]
+                let shown = self.look.shown(color).map(|byte| byte.to_string()).join(" ");
+                vec![("linear RGB", numbers(color)), ("bits", bits(color)), ("shown", shown)]
             }
             Content::Layer(values, count) => {
                 let values = values.colors.get(i)?.iter().take(*count);
-                vec![("layer", values.map(|v| format!("{v}")).collect::<Vec<_>>().join("  "))]
+                let joined = |told: fn(&f32) -> String| values.clone().map(told).collect::<Vec<_>>().join("  ");
+                let bits = joined(|v| format!("{:08x}", v.to_bits()));
+                vec![("layer", joined(|v| format!("{v}"))), ("bits", bits)]
             }
             Content::Samples(counts, total) => vec![("samples", format!("{} of {total}", counts.get(i)?))],
             Content::Hits(aov, hits) => self.hit(*aov, hits.get(i)?),
-            Content::Compare(gpu, cpu) => {
-                let (gpu, cpu) = (Vec3::from(*gpu.colors.get(i)?), Vec3::from(*cpu.colors.get(i)?));
+            Content::Compare(first, second) => {
+                let (first, second) = (*first.colors.get(i)?, *second.colors.get(i)?);
+                let apart = Vec3::from(first) - Vec3::from(second);
                 vec![
-                    ("GPU", numbers(gpu.into())),
-                    ("CPU", numbers(cpu.into())),
-                    ("GPU - CPU", numbers((gpu - cpu).into())),
+                    ("first", numbers(first)),
+                    ("bits", bits(first)),
+                    ("second", numbers(second)),
+                    ("bits", bits(second)),
+                    ("difference", numbers(apart.into())),
                 ]
             }
         })
@@ -337,12 +385,12 @@ impl Frame {
             (_, Some(light)) => format!("lights[{light}]"),
         };
         let mut known = match aov {
-            Aov::Normal => vec![("normal", numbers(hit.normal.into()))],
-            Aov::ShadingNormal => vec![("shading normal", numbers(hit.shading_normal.into()))],
-            Aov::Depth => vec![("depth", numbers([hit.depth]))],
-            Aov::Barycentric => vec![("barycentric", numbers(hit.barycentric.into()))],
+            Aov::Normal => values("normal", hit.normal.into()),
+            Aov::ShadingNormal => values("shading normal", hit.shading_normal.into()),
+            Aov::Depth => values("depth", [hit.depth]),
+            Aov::Barycentric => values("barycentric", hit.barycentric.into()),
             Aov::Primitive if hit.primitive != hit.shape => vec![("triangle", hit.primitive.to_string())],
-            Aov::Uv => vec![("uv", numbers(hit.uv.into()))],
+            Aov::Uv => values("uv", hit.uv.into()),
             _ => Vec::new(),
         };
         known.push(("on", shape));
@@ -360,6 +408,15 @@ fn numbers<const N: usize>(values: [f32; N]) -> String {
     values.map(|v| format!("{v}")).join("  ")
 }
 
+/// The bits of floats, in hexadecimal.
+fn bits<const N: usize>(values: [f32; N]) -> String {
+    values.map(|v| format!("{:08x}", v.to_bits())).join("  ")
+}
+
+fn values<const N: usize>(name: &'static str, values: [f32; N]) -> Vec<(&'static str, String)> {
+    vec![(name, numbers(values)), ("bits", bits(values))]
+}
+
 /// The bytes of values that are shown as they are, not as light.
 fn bytes<T: Sync>(pixels: &[T], color: impl Fn(&T) -> Vec3 + Sync) -> Vec<u8> {
     let byte = |v: f32| (v * 255.0 + 0.5) as u8; // saturates
@@ -367,15 +424,6 @@ fn bytes<T: Sync>(pixels: &[T], color: impl Fn(&T) -> Vec3 + Sync) -> Vec<u8> {
         .par_iter()
         .with_min_len(1024)
         .flat_map_iter(|pixel| color(pixel).to_array().map(byte))
-        .collect()
-}
-
-fn display(pixels: &Pixels, view: ViewSettings) -> Vec<u8> {
-    pixels
-        .colors
-        .par_iter()
-        .with_min_len(1024)
-        .flat_map_iter(|color| view.rgb8(*color))
         .collect()
 }
 
@@ -399,12 +447,12 @@ fn amplified(gpu: &Pixels, cpu: &Pixels, gain: f32) -> Vec<u8> {
 }
 
 /// A picture of radiance as a PNG file.
-pub fn png_of(pixels: &Pixels, view: ViewSettings) -> Vec<u8> {
-    png(pixels.width, pixels.height, &display(pixels, view))
+pub(super) fn png_of(pixels: &Pixels, look: Look) -> Vec<u8> {
+    png(pixels.width, pixels.height, &look.bytes(pixels))
 }
 
 /// A PNG file of 8-bit RGB, packed for speed.
-fn png(width: u32, height: u32, rgb: &[u8]) -> Vec<u8> {
+pub(super) fn png(width: u32, height: u32, rgb: &[u8]) -> Vec<u8> {
     // Writing to memory fails only if the sizes do not fit; the page then shows no picture, which the tests would see.
     image::in_memory(width, height, rgb).unwrap_or_else(|error| {
         tracing::error!("a picture of {width} x {height} cannot be made: {error}");

@@ -1,69 +1,14 @@
-//! Writing the camera into the scene file, and taking it back. Only the numbers that differ are touched: comments, layout,
-//! line ends and a byte-order mark stay, byte for byte.
+//! Writing files in one step, and the camera into the scene file: only the numbers that differ are touched.
 
 use std::fs;
 use std::io::Write;
-use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use toml_edit::{Document, Item, TableLike, Value};
+use toml::Value;
 
 use super::camera::{Entry, entries};
-use crate::scene::{CameraDescription, Description, is_course, is_gltf};
-
-/// What a file was before a save and is after it.
-#[derive(Debug)]
-pub struct Saved {
-    path: PathBuf,
-    before: String,
-    after: String,
-}
-
-impl Saved {
-    /// Whether a file's content is what was saved.
-    pub fn is(&self, content: &[u8]) -> bool {
-        self.after.as_bytes() == content
-    }
-
-    /// Gives the file the text that it had.
-    ///
-    /// # Errors
-    ///
-    /// What to tell the user: the file has been changed since, or cannot be read or written.
-    pub fn undo(&self) -> Result<(), String> {
-        let place = self.path.display();
-        let now = fs::read(&self.path).map_err(|error| format!("{place}: {error}"))?;
-        if !self.is(&now) {
-            return Err(format!(
-                "{place}: has been changed since the camera was saved, and stays as it is"
-            ));
-        }
-        replace(&self.path, self.before.as_bytes()).map_err(|error| format!("{place}: cannot be written: {error}"))
-    }
-}
-
-/// Puts a camera into the file, which is replaced in one step. Values that are as they were are not touched; `None` if
-/// all are.
-///
-/// # Errors
-///
-/// What to tell the user: the file cannot be read or written, or is no scene that this camera fits.
-pub fn save_camera(path: &Path, camera: &CameraDescription) -> Result<Option<Saved>, String> {
-    let place = path.display();
-    if is_gltf(path) {
-        let rule = "must be TOML for a camera to be saved into it; it is glTF, and wgray convert makes a scene of it";
-        return Err(format!("{place}: {rule}"));
-    }
-    // A link stays one: what it leads to is replaced.
-    let path = fs::canonicalize(path).map_err(|error| format!("{place}: {error}"))?;
-    let before = fs::read_to_string(&path).map_err(|error| format!("{place}: {error}"))?;
-    let after = with_camera(&before, &place.to_string(), camera)?;
-    if after == before {
-        return Ok(None);
-    }
-    replace(&path, after.as_bytes()).map_err(|error| format!("{place}: cannot be written: {error}"))?;
-    Ok(Some(Saved { path, before, after }))
-}
+use super::edit::edited;
+use crate::scene::{CameraDescription, Description, KeyPath, Segment};
 
 /// Replaces a file in one step: whoever reads it sees the old content or the new.
 pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
@@ -88,96 +33,29 @@ pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
     Ok(())
 }
 
-fn with_camera(text: &str, origin: &str, camera: &CameraDescription) -> Result<String, String> {
-    if is_course(Path::new(origin)) {
-        return Err(format!(
-            "{origin}: must be TOML for a camera to be saved into it; it is JSON"
-        ));
-    }
-    let described = Description::parse(text, origin).map_err(|error| format!("mend the file first: {error}"))?;
-    if std::mem::discriminant(&described.camera) != std::mem::discriminant(camera) {
+/// The text of a scene file with another camera. Values that are as they were are not touched.
+///
+/// # Errors
+///
+/// What to tell the user: the file is no scene that this camera fits.
+pub fn with_camera(text: &str, origin: &str, camera: &CameraDescription) -> Result<String, String> {
+    let mend = |error| format!("mend the file first: {error}");
+    let before = Description::parse_camera(text, origin).map_err(mend)?;
+    if std::mem::discriminant(&before) != std::mem::discriminant(camera) {
         return Err(format!("{origin}: the file has another type of camera by now"));
     }
-    let document = Document::parse(text).map_err(|error| format!("{origin}: {error}"))?;
-    let table: &dyn TableLike = document
-        .get("camera")
-        .and_then(Item::as_table_like)
-        .ok_or_else(|| format!("{origin}: camera is no table"))?;
-    let mut changes = Vec::new();
-    for ((key, old), (_, new)) in entries(&described.camera).into_iter().zip(entries(camera)) {
+    let mut text = text.to_owned();
+    for ((key, old), (_, new)) in entries(&before).into_iter().zip(entries(camera)) {
         if old != new {
-            changes.extend(edits(text, table, key, new).ok_or_else(|| format!("{origin}: camera.{key} has no place"))?);
+            let path = KeyPath(["camera", key].map(Segment::from).to_vec());
+            let value = match new {
+                Entry::Number(x) => Value::from(x),
+                Entry::Point(point) => Value::from(point.to_array().to_vec()),
+            };
+            text = edited(&text, &path, Some(&value)).map_err(|why| format!("{origin}: {why}"))?;
         }
-    }
-    // From the end: what comes before a change stays where it is.
-    changes.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
-    let mut text = text.to_string();
-    for (range, new) in changes {
-        text.replace_range(range, &new);
     }
     Ok(text)
-}
-
-/// What to put where in a text.
-type Edit = (Range<usize>, String);
-
-/// The edits that give a key of the camera a value; `None` if the text has no place for it.
-fn edits(text: &str, table: &dyn TableLike, key: &str, entry: Entry) -> Option<Vec<Edit>> {
-    let number_at = |old: &Value, new: f64| Some((!is(old, new)).then_some((old.span()?, written(new))));
-    let whole = match entry {
-        Entry::Number(x) => written(x),
-        Entry::Point(p) => format!("[{}]", p.to_array().map(written).join(", ")),
-    };
-    match (table.get(key).and_then(Item::as_value), entry) {
-        (Some(Value::Array(array)), Entry::Point(point)) if array.len() == 3 => {
-            let pairs = array.iter().zip(point.to_array());
-            let edits: Option<Vec<Option<Edit>>> = pairs.map(|(old, new)| number_at(old, new)).collect();
-            Some(edits?.into_iter().flatten().collect())
-        }
-        (Some(old), Entry::Number(x)) => Some(number_at(old, x)?.into_iter().collect()),
-        (Some(old), Entry::Point(_)) => Some(vec![(old.span()?, whole)]),
-        (None, _) => Some(vec![added(text, table, key, &whole)?]),
-    }
-}
-
-/// A key that is not there yet, after the last one of its table.
-fn added(text: &str, table: &dyn TableLike, key: &str, value: &str) -> Option<Edit> {
-    let values = table.iter().filter_map(|(_, item)| item.as_value()?.span());
-    let last = values.map(|span| span.end).max()?;
-    let first_key = table.iter().find_map(|(key, _)| table.key(key)?.span())?;
-    let line_start = text[..first_key.start].rfind('\n').map_or(0, |i| i + 1);
-    let before_key = &text[line_start..first_key.start];
-    if before_key.contains('{') {
-        return Some((last..last, format!(", {key} = {value}")));
-    }
-    // Its line begins as the first key's does: with blanks, or with `camera.`
-    let line_end = text[last..].find('\n').map_or(text.len(), |i| last + i);
-    let line_end = if text[..line_end].ends_with('\r') {
-        line_end - 1
-    } else {
-        line_end
-    };
-    let line_break = if text[line_end..].starts_with('\r') {
-        "\r\n"
-    } else {
-        "\n"
-    };
-    Some((line_end..line_end, format!("{line_break}{before_key}{key} = {value}")))
-}
-
-/// Whether a value is this number already, however it is written.
-fn is(value: &Value, number: f64) -> bool {
-    let known = value.as_float().or_else(|| value.as_integer().map(|i| i as f64));
-    known == Some(number)
-}
-
-/// Whole numbers without a point, as people write them.
-fn written(x: f64) -> String {
-    if x.fract() == 0.0 && x.abs() < 1e15 {
-        format!("{x:.0}")
-    } else {
-        Value::from(x).to_string()
-    }
 }
 
 #[cfg(test)]
@@ -233,21 +111,18 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn the_file_keeps_its_permissions_and_links() {
+    fn a_file_that_is_replaced_keeps_its_permissions() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
-        let (file, link) = (folder.path().join("s.toml"), folder.path().join("link.toml"));
+        let file = folder.path().join("s.toml");
         fs::write(&file, SCENE).unwrap();
         fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).unwrap();
-        std::os::unix::fs::symlink("s.toml", &link).unwrap();
-        let new = camera("position = [0, -2, 1.25]\nlook_at = [0, 0, 1]\nfov = 45");
-        save_camera(&link, &new).unwrap();
-        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
-        assert_ne!(fs::read_to_string(&file).unwrap(), SCENE);
+        replace(&file, b"other").unwrap();
+        assert_eq!(fs::read_to_string(&file).unwrap(), "other");
         assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o640);
         assert_eq!(
             fs::read_dir(folder.path()).unwrap().count(),
-            2,
+            1,
             "nothing is left behind"
         );
     }
@@ -290,24 +165,5 @@ mod tests {
         );
         assert!(saved.contains(path.trim_end()), "{saved}");
         assert_eq!(Description::parse(&saved, "s.toml").unwrap().camera, new);
-    }
-
-    #[test]
-    fn a_save_is_taken_back_unless_the_file_was_changed_since() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("s.toml");
-        let text = SCENE.replace('\n', "\r\n");
-        fs::write(&file, &text).unwrap();
-        let new = camera("position = [0, -2, 1.25]\nlook_at = [0, 0, 1]\nfov = 45");
-        let saved = save_camera(&file, &new).unwrap().unwrap();
-        assert!(saved.is(&fs::read(&file).unwrap()));
-        assert!(save_camera(&file, &new).unwrap().is_none(), "there is nothing to save");
-        saved.undo().unwrap();
-        assert_eq!(fs::read_to_string(&file).unwrap(), text);
-        assert!(saved.undo().unwrap_err().contains("has been changed since"));
-        let saved = save_camera(&file, &new).unwrap().unwrap();
-        fs::write(&file, "edited").unwrap();
-        assert!(saved.undo().unwrap_err().contains("has been changed since"));
-        assert_eq!(fs::read_to_string(&file).unwrap(), "edited");
     }
 }

@@ -1,4 +1,4 @@
-//! The page and what it is told: a small server of four files and one WebSocket.
+//! The page and what it is told: a small server of its files, the picture as a file, and one WebSocket.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
@@ -6,12 +6,13 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use axum::Router;
+use axum::body::Bytes;
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
-use axum::extract::{Request, State};
-use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::extract::{DefaultBodyLimit, Path as UrlPath, Request, State};
+use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
-use axum::routing::get;
+use axum::routing::{get, post};
 use hyper::server::conn::http1;
 use hyper_util::rt::TokioIo;
 use hyper_util::service::TowerToHyperService;
@@ -19,9 +20,12 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::{Semaphore, watch};
 use tokio::time::MissedTickBehavior;
 
+use super::download::{exr_file, png_file};
 use super::guard::Guard;
 use super::messages::{self, Command};
+use super::object::{Listed, Object, Seen};
 use super::picture::Frame;
+use super::reference::Reference;
 use super::session::{Session, Viewers};
 use super::times::{Time, Times};
 
@@ -33,6 +37,10 @@ const REQUESTS: usize = 64;
 const REQUEST: Duration = Duration::from_secs(10);
 /// The largest message of a viewer, in bytes: a command is far smaller.
 const LARGEST_MESSAGE: usize = 4096;
+/// The largest file to compare with, in bytes.
+const LARGEST_FILE: usize = 256 << 20;
+/// The longest name of one, in characters.
+const LONGEST_NAME: usize = 80;
 /// A viewer that takes nothing for so long is gone.
 const SEND: Duration = Duration::from_secs(30);
 /// So often a viewer is told where the time goes, while that changes.
@@ -81,7 +89,9 @@ impl Listener {
             state: session.state.clone(),
             frames: session.frames.clone(),
             times: session.times.clone(),
+            seen: session.seen.clone(),
             send: Arc::new(session.commands()),
+            give: Arc::new(session.references()),
             seats: Arc::new(Semaphore::new(VIEWERS)),
             viewers: session.viewers(),
         };
@@ -119,35 +129,94 @@ struct Shared {
     state: watch::Receiver<Arc<messages::State>>,
     frames: watch::Receiver<Option<Arc<Frame>>>,
     times: Times,
+    seen: watch::Receiver<Option<Arc<Seen>>>,
     send: Arc<dyn Fn(Command) -> Option<u64> + Send + Sync>,
+    give: Arc<dyn Fn(Reference) -> bool + Send + Sync>,
     seats: Arc<Semaphore>,
     viewers: Viewers,
 }
 
+/// The page's modules.
+const MODULES: [(&str, &str); 12] = [
+    ("/camera.js", include_str!("page/camera.js")),
+    ("/compare.js", include_str!("page/compare.js")),
+    ("/object.js", include_str!("page/object.js")),
+    ("/editor.js", include_str!("page/editor.js")),
+    ("/link.js", include_str!("page/link.js")),
+    ("/page.js", include_str!("page/page.js")),
+    ("/picture.js", include_str!("page/picture.js")),
+    ("/probes.js", include_str!("page/probes.js")),
+    ("/render.js", include_str!("page/render.js")),
+    ("/shader.js", include_str!("page/shader.js")),
+    ("/times.js", include_str!("page/times.js")),
+    ("/view.js", include_str!("page/view.js")),
+];
+
 fn routes(shared: Shared) -> Router {
-    const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
     let file =
         |kind: &'static str, text: &'static str| get(move || async move { ([(header::CONTENT_TYPE, kind)], text) });
-    Router::new()
+    let modules = MODULES.into_iter().fold(Router::new(), |router, (path, text)| {
+        router.route(path, file("text/javascript; charset=utf-8", text))
+    });
+    modules
         .route("/", file("text/html; charset=utf-8", include_str!("page/index.html")))
         .route(
             "/style.css",
             file("text/css; charset=utf-8", include_str!("page/style.css")),
         )
-        .route("/page.js", file(JAVASCRIPT, include_str!("page/page.js")))
-        .route("/picture.js", file(JAVASCRIPT, include_str!("page/picture.js")))
-        .route("/shader.js", file(JAVASCRIPT, include_str!("page/shader.js")))
-        .route("/times.js", file(JAVASCRIPT, include_str!("page/times.js")))
-        .route("/editor.js", file(JAVASCRIPT, include_str!("page/editor.js")))
+        .route("/picture.png", get(picture_png))
+        .route("/picture.exr", get(picture_exr))
+        .route(
+            "/reference/{name}",
+            post(reference).layer(DefaultBodyLimit::max(LARGEST_FILE)),
+        )
         .route("/socket", get(socket))
         .layer(middleware::from_fn_with_state(shared.clone(), guarded))
         .with_state(shared)
 }
 
+/// The picture that is shown, as a file of a kind.
+async fn picture(shared: Shared, kind: &'static str, make: fn(&Frame) -> io::Result<Vec<u8>>) -> Response {
+    let frame = shared.frames.borrow().clone();
+    let Some(frame) = frame.filter(|frame| frame.header.sent == frame.header.finest) else {
+        return (StatusCode::CONFLICT, "there is no whole picture yet").into_response();
+    };
+    match tokio::task::spawn_blocking(move || make(&frame)).await {
+        Ok(Ok(file)) => ([(header::CONTENT_TYPE, kind)], file).into_response(),
+        Ok(Err(error)) => (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()).into_response(),
+        Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()).into_response(),
+    }
+}
+
+async fn picture_png(State(shared): State<Shared>) -> Response {
+    picture(shared, "image/png", |frame| Ok(png_file(frame))).await
+}
+
+async fn picture_exr(State(shared): State<Shared>) -> Response {
+    picture(shared, "image/x-exr", exr_file).await
+}
+
+/// Takes a file to compare with. It comes from the viewer's machine: nothing of this one is read.
+async fn reference(State(shared): State<Shared>, UrlPath(name): UrlPath<String>, body: Bytes) -> Response {
+    let frame = shared.frames.borrow().clone();
+    let view = frame.map(|frame| frame.look.view).unwrap_or_default();
+    let name: String = name.chars().filter(|c| !c.is_control()).take(LONGEST_NAME).collect();
+    let work = move || Reference::decode(name, body.to_vec(), view);
+    match tokio::task::spawn_blocking(work).await {
+        Ok(Ok(reference)) => match (shared.give)(reference) {
+            true => StatusCode::NO_CONTENT.into_response(),
+            false => (StatusCode::SERVICE_UNAVAILABLE, "busy: the file was dropped").into_response(),
+        },
+        Ok(Err(error)) => (StatusCode::UNPROCESSABLE_ENTITY, error).into_response(),
+        Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()).into_response(),
+    }
+}
+
 /// Refuses what comes from elsewhere, and tells the browser to load nothing from there.
 async fn guarded(State(shared): State<Shared>, request: Request, next: Next) -> Response {
-    let socket = request.uri().path() == "/socket";
-    let mut response = match shared.guard.check(request.headers(), socket) {
+    // What changes anything must come from the page itself.
+    let acts = request.uri().path() == "/socket" || request.method() != Method::GET;
+    let mut response = match shared.guard.check(request.headers(), acts) {
         Ok(()) => next.run(request).await,
         Err(why) => (StatusCode::FORBIDDEN, why).into_response(),
     };
@@ -187,8 +256,22 @@ async fn socket(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Resp
 enum Ask {
     /// What is known of a pixel?
     Pixel([u32; 2]),
+    /// What is at a pixel?
+    Object([u32; 2]),
+    /// What is said of the object of this name?
+    Inspect(Inspect),
+    /// Which objects have this in their names?
+    Objects(String),
     #[serde(untagged)]
     Command(Command),
+}
+
+/// An object by its name.
+#[derive(Deserialize)]
+struct Inspect {
+    name: String,
+    #[serde(default)]
+    material: Option<String>,
 }
 
 /// What a viewer is told, beside frames.
@@ -201,6 +284,8 @@ enum Tell<'a> {
         y: u32,
         values: Vec<(&'static str, String)>,
     },
+    Object(Box<Object>),
+    Objects(Listed),
     /// The number of a command that was given; the state says when it has been followed.
     Asked(u64),
     Refused(String),
@@ -235,7 +320,7 @@ async fn view(mut socket: WebSocket, shared: &Shared) -> Option<()> {
             message = socket.recv() => {
                 heard = Instant::now();
                 match message?.ok()? {
-                    Message::Text(asked) => match answer(&asked, shared) {
+                    Message::Text(asked) => match answer(&asked, shared).await {
                         Some(answer) => text(&answer)?,
                         None => continue,
                     },
@@ -267,12 +352,27 @@ async fn view(mut socket: WebSocket, shared: &Shared) -> Option<()> {
     }
 }
 
-fn answer(asked: &str, shared: &Shared) -> Option<Tell<'static>> {
+async fn answer(asked: &str, shared: &Shared) -> Option<Tell<'static>> {
     match serde_json::from_str(asked) {
         Ok(Ask::Pixel([x, y])) => {
             let frame = shared.frames.borrow().clone();
             let values = frame.and_then(|frame| frame.pixel(x, y)).unwrap_or_default();
             Some(Tell::Pixel { x, y, values })
+        }
+        Ok(Ask::Object(pixel)) => {
+            let nothing = move || Object::none("", Some(pixel));
+            let found = of_scene(shared, nothing, move |seen| seen.at(pixel)).await;
+            Some(Tell::Object(Box::new(found)))
+        }
+        Ok(Ask::Inspect(Inspect { name, material })) => {
+            let nothing = || Object::none(&name, None);
+            let wanted = name.clone();
+            let found = of_scene(shared, nothing, move |seen| seen.object(&wanted, material.as_deref())).await;
+            Some(Tell::Object(Box::new(found)))
+        }
+        Ok(Ask::Objects(part)) => {
+            let found = of_scene(shared, Listed::default, move |seen| seen.objects(&part)).await;
+            Some(Tell::Objects(found))
         }
         Ok(Ask::Command(command)) => {
             let dropped = || Tell::Refused("busy: a command was dropped".to_string());
@@ -280,6 +380,18 @@ fn answer(asked: &str, shared: &Shared) -> Option<Tell<'static>> {
         }
         Err(error) => Some(Tell::Refused(format!("not understood: {error}"))),
     }
+}
+
+/// What is found in the scene, on a thread of its own: it may be large. Or what is told where there is none.
+async fn of_scene<T: Send + 'static>(
+    shared: &Shared,
+    nothing: impl Fn() -> T,
+    find: impl FnOnce(&Seen) -> T + Send + 'static,
+) -> T {
+    let seen = shared.seen.borrow().clone();
+    let Some(seen) = seen else { return nothing() };
+    let found = tokio::task::spawn_blocking(move || find(&seen)).await;
+    found.unwrap_or_else(|_| nothing())
 }
 
 fn text(tell: &Tell) -> Option<Message> {

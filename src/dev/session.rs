@@ -11,8 +11,10 @@ use tokio::sync::watch;
 
 use super::build::Builder;
 use super::messages::{Command, Event, Report, State};
+use super::object::Seen;
 use super::painter::{Painter, Told};
 use super::picture::Frame;
+use super::reference::Reference;
 use super::source::Sources;
 use super::times::Times;
 use super::watch::Watch;
@@ -49,6 +51,8 @@ pub struct Session {
     pub frames: watch::Receiver<Option<Arc<Frame>>>,
     /// Where the time goes.
     pub times: Times,
+    /// The scene and how it is looked at, once there is one.
+    pub seen: watch::Receiver<Option<Arc<Seen>>>,
     viewers: Viewers,
     watch: Option<Watch>,
     thread: Option<JoinHandle<()>>,
@@ -116,11 +120,12 @@ impl Session {
         let snapshot = sources.read();
         let (events, inbox) = sync_channel(WAITING);
         let started = Instant::now();
-        let first = Event::Files(Box::new(snapshot.clone()), started);
+        let first = Event::Files(Box::new(snapshot.clone()), started, 0);
         let _ = events.send(first); // the inbox is here
-        let watch = Watch::start(sources.clone(), snapshot, {
+        let writes = Arc::default();
+        let watch = Watch::start(sources.clone(), snapshot, Arc::clone(&writes), {
             let events = events.clone();
-            move |snapshot, noticed| events.send(Event::Files(Box::new(snapshot), noticed)).is_ok()
+            move |snapshot, noticed, count| events.send(Event::Files(Box::new(snapshot), noticed, count)).is_ok()
         })?;
         let times = Times::default();
         let builder = Builder::start(choice, times.clone(), {
@@ -131,6 +136,7 @@ impl Session {
         })?;
         let (state_sender, state) = watch::channel(Arc::default());
         let (frame_sender, frames) = watch::channel(None);
+        let (scene_sender, seen) = watch::channel(None);
         let looking = Arc::new(AtomicUsize::new(0));
         let wanted_by = (only_for_viewers && out.is_none()).then(|| looking.clone());
         let told = Told {
@@ -139,8 +145,10 @@ impl Session {
             frames: frame_sender,
             times: times.clone(),
             editor,
+            seen: scene_sender,
+            events: events.clone(),
         };
-        let painter = Painter::new(sources, device, builder, out, wanted_by, told);
+        let painter = Painter::new(sources, device, builder, (out, wanted_by), writes, told);
         let thread = std::thread::Builder::new()
             .name("render".to_string())
             .spawn(move || run(painter, inbox))?;
@@ -154,6 +162,7 @@ impl Session {
             state,
             frames,
             times,
+            seen,
             watch: Some(watch),
             thread: Some(thread),
         })
@@ -164,6 +173,12 @@ impl Session {
         let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
         *asked += 1;
         let _ = self.events.send(Event::Command(command)); // the thread lives as long as this
+    }
+
+    /// A way to give pictures to compare with from other threads, without ever waiting: whether there is room for it.
+    pub fn references(&self) -> impl Fn(Reference) -> bool + Send + Sync + 'static {
+        let events = self.events.clone();
+        move |reference| events.try_send(Event::Reference(reference)).is_ok()
     }
 
     /// Counts those who look.

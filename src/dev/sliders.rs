@@ -98,6 +98,11 @@ impl Sliders {
         self.files = Some(shaders);
     }
 
+    /// Whether shaders are others than those of the files that were read last.
+    pub fn differ_from(&self, shaders: &Arc<Shaders>) -> bool {
+        self.files.as_ref().is_some_and(|known| known != shaders)
+    }
+
     /// What is marked.
     pub fn marks(&self) -> &Marks {
         &self.marks

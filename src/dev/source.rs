@@ -10,7 +10,9 @@ use super::diagnostic::Diagnostic;
 use super::picture::LayerName;
 use crate::gpu::compose::{self, Shaders};
 use crate::pack::{Packed, Specialization, pack};
-use crate::scene::{CameraDescription, Description, Integrator, Overrides, Scene, is_gltf};
+use crate::scene::{
+    CameraDescription, Description, Draft, Integrator, Overrides, Scene, folder_of, is_gltf, read_text,
+};
 
 /// Where the files are.
 #[derive(Clone, Debug)]
@@ -26,12 +28,30 @@ pub struct Sources {
 /// A scene that has been read and packed.
 #[derive(Debug)]
 pub struct Loaded {
+    /// The scene file's text; empty if it is none.
+    pub text: String,
+    /// What it describes, with the values of options in their places.
+    pub description: Description,
     /// The camera as the file describes it.
     pub camera: CameraDescription,
     /// The scene.
     pub scene: Scene,
     /// What the backends read.
     pub packed: Packed,
+}
+
+impl Loaded {
+    /// A scene that was read from a text, and packed.
+    pub fn new(text: String, scene: Scene, description: Description) -> Loaded {
+        let packed = pack(&scene).without_layers(); // no view shows them
+        Loaded {
+            text,
+            camera: description.camera.clone(),
+            description,
+            scene,
+            packed,
+        }
+    }
 }
 
 /// What a kernel is compiled for: its constants, the integrator, whether sampling is adaptive, and the layer that takes the
@@ -122,17 +142,18 @@ impl Sources {
         let start = Instant::now();
         // The stamps are taken first: a file that changes while it is read is read again.
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
-        let mut text = String::new();
-        if !is_gltf(&self.scene) {
-            text = fs::read_to_string(&self.scene).unwrap_or_default();
-            let origin = self.scene.display().to_string();
-            let described = Description::parse_defined(&text, &origin, &self.overrides.define);
-            if let Ok(described) = &described {
-                files.extend(self.assets(described).map(|path| (path.clone(), self.stamp(&path))));
-            }
-        }
         let mut named = BTreeSet::new();
-        let scene = Scene::load_and_list(&self.scene, &self.overrides, &mut named);
+        let (mut text, origin) = (String::new(), self.scene.display().to_string());
+        let scene = match is_gltf(&self.scene) {
+            true => Scene::load_and_list(&self.scene, &self.overrides, &mut named),
+            false => read_text(&self.scene).and_then(|read| {
+                text = read;
+                let draft = Draft::read(&text, &origin, folder_of(&self.scene), &self.overrides)?;
+                let assets = self.assets(&draft.description);
+                files.extend(assets.map(|path| (path.clone(), self.stamp(&path))));
+                draft.check(&mut named)
+            }),
+        };
         // What the files themselves name is known now.
         for path in named {
             if files.iter().all(|(known, _)| *known != path) {
@@ -141,18 +162,15 @@ impl Sources {
             }
         }
         let mut took = [start.elapsed(), Duration::ZERO];
-        let scene = scene
-            .map_err(|error| Diagnostic::scene(&error, &text))
-            .map(|(scene, described)| {
+        let scene = match scene {
+            Ok((scene, description)) => {
                 let start = Instant::now();
-                let packed = pack(&scene).without_layers(); // no view shows them
+                let loaded = Loaded::new(text, scene, description);
                 took[1] = start.elapsed();
-                Arc::new(Loaded {
-                    camera: described.camera,
-                    scene,
-                    packed,
-                })
-            });
+                Ok(Arc::new(loaded))
+            }
+            Err(error) => Err(Diagnostic::scene(&error, &text)),
+        };
         Snapshot {
             scene,
             shaders,

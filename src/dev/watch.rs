@@ -5,17 +5,30 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use notify::event::{AccessKind, AccessMode, EventKind, ModifyKind};
 use notify::{RecommendedWatcher, RecursiveMode, Watcher as _};
 
-use super::source::{Snapshot, Sources};
+use super::source::{Loaded, Snapshot, Sources, Stamp};
 
 /// Files are read once nothing has happened to them for so long: an editor's save is several events.
 const QUIET: Duration = Duration::from_millis(20);
 /// Files are read after so long, even if something still happens to them.
 const PATIENCE: Duration = Duration::from_millis(150);
+
+/// What a session has written into the scene file itself: the watcher need not read that again.
+#[derive(Default)]
+pub struct Writes {
+    /// How many there were.
+    pub count: u64,
+    /// What the scene is since the last one, and the files that it is made of, until the watcher has taken it over.
+    pub known: Option<Known>,
+}
+
+/// A scene, and the state of its files.
+pub type Known = (Arc<Loaded>, Vec<(PathBuf, Stamp)>);
 
 /// What wakes the watcher.
 enum Wake {
@@ -47,11 +60,12 @@ pub struct Watch {
 
 impl Watch {
     /// Watches the files of `sources`, and gives `changed` every new state of them with the time at which a change was
-    /// noticed, until it returns false. `first` is the state that is known.
+    /// noticed, and the count of `writes` before it was read, until it returns false. `first` is the state that is known.
     pub fn start(
         sources: Sources,
         first: Snapshot,
-        changed: impl FnMut(Snapshot, Instant) -> bool + Send + 'static,
+        writes: Arc<Mutex<Writes>>,
+        changed: impl FnMut(Snapshot, Instant, u64) -> bool + Send + 'static,
     ) -> notify::Result<Watch> {
         let (sender, receiver) = channel();
         let stop = sender.clone();
@@ -67,7 +81,7 @@ impl Watch {
         folders.follow(&sources, &first);
         let thread = std::thread::Builder::new()
             .name("watch".to_string())
-            .spawn(move || run(&receiver, &mut folders, &sources, first, changed))
+            .spawn(move || run(&receiver, &mut folders, &sources, first, &writes, changed))
             .map_err(notify::Error::io)?;
         Ok(Watch {
             stop,
@@ -90,7 +104,8 @@ fn run(
     folders: &mut Folders,
     sources: &Sources,
     mut last: Snapshot,
-    mut changed: impl FnMut(Snapshot, Instant) -> bool,
+    writes: &Mutex<Writes>,
+    mut changed: impl FnMut(Snapshot, Instant, u64) -> bool,
 ) {
     while let Ok(wake) = wakes.recv() {
         let noticed = Instant::now();
@@ -112,11 +127,18 @@ fn run(
             folders.forget(); // a folder made anew under an old name is another one
         }
         folders.follow(sources, &last);
+        let count = {
+            let mut writes = writes.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some((scene, files)) = writes.known.take() {
+                (last.scene, last.files) = (Ok(scene), files);
+            }
+            writes.count
+        };
         if let Some(new) = sources.reread(&last) {
             // The scene may use other files now. They are stamped already: a change since then wakes us or shows here.
             folders.follow(sources, &new);
             last = new.clone();
-            if !changed(new, noticed) {
+            if !changed(new, noticed, count) {
                 return;
             }
         }

@@ -19,6 +19,8 @@ use crate::film::{Film, Region};
 use crate::pack::FirstHit;
 use crate::scene::ViewSettings;
 
+#[cfg(feature = "dev")]
+pub(crate) use aov::Channel;
 pub use aov::{Aov, AovSource};
 pub use difference::{Difference, difference};
 pub use exr::read_exr;

@@ -54,7 +54,7 @@ pub enum CheckpointError {
 
 /// How a checkpoint is opened.
 pub struct Opening<'a> {
-    /// Where it is.
+    /// Where it is; in a folder each job has one of its own.
     pub path: PathBuf,
     /// Whether to go on from one that is there.
     pub resume: bool,
@@ -109,6 +109,10 @@ impl<'a> Checkpoint<'a> {
             mut wait,
             mut tell,
         } = opening;
+        let name = match name.is_dir() {
+            true => name.join(identity.file_name()),
+            false => name,
+        };
         let failed = |error| CheckpointError::Io {
             path: name.clone(),
             error,
@@ -186,6 +190,11 @@ impl<'a> Checkpoint<'a> {
             }
             return Checkpoint::go_on(name, path, file, header, form, interval, tell);
         }
+    }
+
+    /// What messages call it.
+    pub fn name(&self) -> &Path {
+        &self.name
     }
 
     fn go_on(

@@ -50,6 +50,30 @@ impl Identity {
         }
     }
 
+    /// The name of a file that is of this job alone.
+    pub fn file_name(&self) -> String {
+        let Identity {
+            version,
+            shaders,
+            scene,
+            picture,
+            region,
+            pixel_samples,
+            adaptive,
+            layers,
+            exact_rounding,
+        } = self;
+        let mut hasher = blake3::Hasher::new();
+        for text in [version, shaders, scene] {
+            list(&mut hasher, text.as_bytes());
+        }
+        list(&mut hasher, bytes_of(picture));
+        list(&mut hasher, bytes_of(region));
+        list(&mut hasher, bytes_of(pixel_samples));
+        list(&mut hasher, &[*adaptive, *layers, *exact_rounding].map(u8::from));
+        format!("{}.checkpoint", &hasher.finalize().to_hex()[..16])
+    }
+
     /// The pixels that are rendered.
     pub fn region(&self) -> Region {
         let [x0, y0, x1, y1] = self.region;

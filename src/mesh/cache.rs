@@ -7,9 +7,13 @@ use std::sync::{Arc, OnceLock};
 pub struct Cache<T>(OnceLock<Arc<T>>);
 
 impl<T> Cache<T> {
-    /// What was computed before, or is now.
+    /// What was computed before, or is now: not while others wait, as the threads that compute may come to wait themselves.
     pub fn get_or_init(&self, compute: impl FnOnce() -> T) -> Arc<T> {
-        Arc::clone(self.0.get_or_init(|| Arc::new(compute())))
+        if let Some(known) = self.0.get() {
+            return known.clone();
+        }
+        let computed = Arc::new(compute());
+        self.0.get_or_init(|| computed).clone()
     }
 }
 

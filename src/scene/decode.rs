@@ -1,5 +1,6 @@
 //! Image files to texels, within limits that are known from a file's header before anything is decoded.
 
+use std::cell::Cell;
 use std::io::Cursor;
 
 use image::error::{DecodingError, LimitError, LimitErrorKind};
@@ -13,9 +14,12 @@ pub(super) const LONGEST_SIDE: u32 = 16_384;
 /// What a decoder may take beside the image, in bytes: rows, tables, the parts of a compressed file.
 const BESIDE: usize = 64 << 20;
 
-/// What the values of an image may take while it is decoded, in bytes, and how many more for a byte of its file: a small file may be an
+/// What the values of an image may take, in bytes, and how many more for a byte of its file; decoders take as much again beside them. A small file may be an
 /// image of 16,384 x 16,384 zeros.
-const LARGEST: (u64, u64) = (512 << 20, 32);
+const LARGEST: (u64, u64) = (256 << 20, 32);
+
+/// What texels that an EXR file shows and does not store may take, in bytes, beside as many for a byte of the file.
+const BLANK: u64 = 64 << 20;
 
 /// What a header says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,11 +95,15 @@ pub(super) fn decode(
     if format == ImageFormat::Png {
         return decode_png(bytes, fits);
     }
+    // The texels that the layers of an EXR file store. What they show may be fewer, and may be more.
+    let stored = Cell::new(0);
     if format == ImageFormat::OpenExr
         && let Some(image) = gray_exr(
             bytes,
-            // What is stored may be more than what is shown.
-            |size, bytes_of_pixel| sides(size).and_then(|()| weigh(bytes, size, bytes_of_pixel)),
+            |size, bytes_of_pixel| {
+                stored.set(stored.get() + u64::from(size.0) * u64::from(size.1));
+                sides(size).and_then(|()| weigh(bytes, size, bytes_of_pixel))
+            },
             |header| {
                 check(header, &fits)?;
                 weigh(bytes, (header.width, header.height), 3 * size_of::<f32>() as u64)
@@ -115,6 +123,9 @@ pub(super) fn decode(
     let is_deep = color.bytes_per_pixel() > color.channel_count();
     check(Header { width, height, is_deep }, &fits)?;
     weigh(bytes, (width, height), color.bytes_per_pixel().into())?;
+    if format == ImageFormat::OpenExr {
+        weigh_blank(bytes, (width, height), stored.get())?;
+    }
     Ok(DynamicImage::from_decoder(decoder)?)
 }
 
@@ -127,6 +138,19 @@ fn weigh(file: &[u8], (width, height): (u32, u32), bytes_of_texel: u64) -> Resul
         true => Ok(()),
         false => Err(Refused::Large(format!(
             "has {width} x {height} texels, which take {bytes} bytes; of a file of {length} bytes they must take at most {most}"
+        ))),
+    }
+}
+
+/// Refuses an EXR file whose window shows far more than it stores: what is blank costs such a file no bytes at all.
+fn weigh_blank(file: &[u8], (width, height): (u32, u32), stored: u64) -> Result<(), Refused> {
+    let blank = (u64::from(width) * u64::from(height)).saturating_sub(stored);
+    let (bytes, length) = (blank * 3 * size_of::<f32>() as u64, file.len() as u64);
+    let most = BLANK + length * LARGEST.1;
+    match bytes <= most {
+        true => Ok(()),
+        false => Err(Refused::Large(format!(
+            "shows {width} x {height} texels and stores {stored}; the others take {bytes} bytes; of a file of {length} bytes they must take at most {most}"
         ))),
     }
 }

@@ -53,6 +53,14 @@ impl FromStr for Define {
     }
 }
 
+#[cfg(feature = "dev")]
+impl Define {
+    /// Whether the value stands in for that of a key of the file, for a part of it or for what it is a part of.
+    pub(super) fn stands_in_for(&self, key: &KeyPath) -> bool {
+        self.key.0.iter().zip(&key.0).all(|(own, step)| is_step(own, step))
+    }
+}
+
 impl fmt::Display for Define {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}={}", self.key, self.value)
@@ -70,6 +78,21 @@ fn about(key: &KeyPath, message: String) -> Problem {
 fn unreadable(text: &str) -> Problem {
     let rule = "must be KEY=VALUE, such as render.seed=3 or shapes[2].radius=0.5";
     Problem::new(format!("{} {rule}", cut(text)))
+}
+
+impl FromStr for KeyPath {
+    type Err = Problem;
+
+    /// A path as a scene file has it: `materials."dark red".color`, `shapes[2].radius`.
+    fn from_str(text: &str) -> Result<KeyPath, Problem> {
+        match read_key(text)? {
+            (path, "") => Ok(path),
+            _ => Err(Problem::new(format!(
+                "{} must be a path, such as shapes[2].radius",
+                cut(text)
+            ))),
+        }
+    }
 }
 
 /// The most steps of a path: tables and lists of a file are no deeper in each other.

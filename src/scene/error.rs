@@ -157,11 +157,11 @@ impl std::error::Error for Problem {}
 
 /// The way from the top of a file to a value: `shapes[2].size`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct KeyPath(pub(super) Vec<Segment>);
+pub struct KeyPath(pub(crate) Vec<Segment>);
 
 /// A step of a [`KeyPath`].
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Segment {
+pub(crate) enum Segment {
     Key(String),
     Index(usize),
 }
@@ -206,6 +206,41 @@ impl fmt::Display for KeyPath {
         }
         Ok(())
     }
+}
+
+#[cfg(feature = "dev")]
+impl KeyPath {
+    /// The path as a scene file has it, whatever its length: what is read back as the same path.
+    pub(crate) fn exact(&self) -> String {
+        let mut text = String::new();
+        for segment in &self.0 {
+            match segment {
+                Segment::Index(index) => text.push_str(&format!("[{index}]")),
+                Segment::Key(key) => {
+                    if !text.is_empty() {
+                        text.push('.');
+                    }
+                    text.push_str(&written_key(key));
+                }
+            }
+        }
+        text
+    }
+}
+
+/// A key as TOML has it: bare, or in quotes.
+#[cfg(feature = "dev")]
+fn written_key(key: &str) -> std::borrow::Cow<'_, str> {
+    let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if !key.is_empty() && key.chars().all(is_bare) {
+        return key.into();
+    }
+    let escaped = key.chars().map(|c| match c {
+        '"' | '\\' => format!("\\{c}"),
+        c if c.is_control() => format!("\\u{:04X}", c as u32),
+        c => c.to_string(),
+    });
+    format!("\"{}\"", escaped.collect::<String>()).into()
 }
 
 /// Says, on the way up, where a problem is, so that no path is built while all is well:

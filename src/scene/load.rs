@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use super::around::{Background, of_option, surround};
 use super::course;
 use super::define::{Define, Defines};
+#[cfg(feature = "dev")]
+use super::error::KeyPath;
 use super::error::{At, Problem, SceneError};
 use super::gltf::{GltfChoice, describe, is_gltf};
 use super::parse::{NOT_UTF8, invalid, line_of_path, syntax_error};
@@ -102,6 +104,47 @@ impl Overrides {
     }
 }
 
+#[cfg(feature = "dev")]
+impl Overrides {
+    /// What stands in for the value of a key of the file, or for a part of it, if anything does.
+    pub(crate) fn in_place_of(&self, key: &KeyPath) -> Option<String> {
+        if let Some(define) = self.define.iter().find(|define| define.stands_in_for(key)) {
+            return Some(format!("--define {define}"));
+        }
+        let options: [(bool, &str, &[&str]); 9] = [
+            (self.size.is_some(), "--size", &["image.width", "image.height"]),
+            (self.integrator.is_some(), "integrator", &["render.integrator"]),
+            (self.max_depth.is_some(), "max_depth", &["render.max_depth"]),
+            (self.seed.is_some(), "seed", &["render.seed"]),
+            (
+                self.pixel_samples.is_some() || self.pixel_pattern.is_some(),
+                "pixel_samples",
+                &["render.pixel_samples"],
+            ),
+            (self.light_samples.is_some(), "light_samples", &["render.light_samples"]),
+            (self.adaptive.is_some(), "adaptive", &["render.adaptive"]),
+            (
+                self.environment.is_some(),
+                "--environment",
+                &["environment", "render.background"],
+            ),
+            (
+                self.background.is_some(),
+                "--background",
+                &["environment", "render.background", "render.alpha"],
+            ),
+        ];
+        let path = key.exact();
+        let is_in = |whole: &&str| {
+            path.strip_prefix(*whole)
+                .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+        };
+        let mut given = options.into_iter().filter(|(is_given, ..)| *is_given);
+        let found = given.find(|(_, _, keys)| keys.iter().any(is_in));
+        found.map(|(_, name, _)| name.to_owned())
+    }
+}
+
 fn set_count(samples: &mut SamplesDescription, count: Option<u32>, integrator: Integrator) -> Result<(), Problem> {
     if let Some(count) = count {
         samples.count = sample_count(samples.pattern(integrator), count)?;
@@ -172,7 +215,8 @@ impl Scene {
     }
 }
 
-pub(super) fn folder_of(path: &Path) -> &Path {
+/// The folder of a file.
+pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().unwrap_or(Path::new("."))
 }
 
@@ -216,27 +260,102 @@ fn parse_beside(
     overrides: &Overrides,
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<(Scene, Description), SceneError> {
-    let mut defines = Defines::new(&overrides.define);
-    let mut description = Description::parse_with(text, origin, &mut defines)?;
-    overrides.apply(&mut description).map_err(SceneError::Override)?;
-    if let Some(option) = overrides.gltf.first() {
-        let rule = format!("is for scenes that are glTF files, and {origin} is none");
-        return Err(SceneError::Override(Problem::of(option, rule)));
+    Draft::read(text, origin, folder, overrides)?.check(files)
+}
+
+/// A scene file's text that has been read, and not checked.
+pub(crate) struct Draft<'a> {
+    text: &'a str,
+    origin: &'a str,
+    folder: &'a Path,
+    overrides: &'a Overrides,
+    defines: Defines<'a>,
+    /// What it describes, with the other values in their places.
+    pub description: Description,
+}
+
+impl<'a> Draft<'a> {
+    /// Reads the text of a file of this name, beside which the files lie that it names.
+    pub fn read(
+        text: &'a str,
+        origin: &'a str,
+        folder: &'a Path,
+        overrides: &'a Overrides,
+    ) -> Result<Draft<'a>, SceneError> {
+        let mut defines = Defines::new(&overrides.define);
+        let description = Description::parse_with(text, origin, &mut defines)?;
+        let draft = Draft {
+            text,
+            origin,
+            folder,
+            overrides,
+            defines,
+            description,
+        };
+        draft.overridden()
     }
-    let is_course = course::is_course(Path::new(origin));
-    let root = if is_course {
-        course::asset_root(folder)
-    } else {
-        folder.to_owned()
-    };
-    let assets = overrides.assets(folder, &root);
-    let invalid = |problem| match is_course {
-        true => course::invalid(text, origin, problem, &defines),
-        false => invalid(text, origin, problem, &defines),
-    };
-    let checked = description.validate_and_list(&assets, files);
-    let scene = overrides.finish(checked, invalid, |path| path.set_place(origin, line_of_path(text)))?;
-    Ok((scene, description))
+
+    /// Reads a text that differs from one that was read as `before` inside of one table alone, that at the first two steps of a path.
+    /// Where that table has a header of its own nothing else is read again.
+    #[cfg(feature = "dev")]
+    pub fn change(
+        text: &'a str,
+        origin: &'a str,
+        folder: &'a Path,
+        overrides: &'a Overrides,
+        (before, at): (&Description, &KeyPath),
+    ) -> Result<Draft<'a>, SceneError> {
+        let mut defines = Defines::new(&overrides.define);
+        let Some((description, is_rest)) = Description::parse_change(text, origin, &mut defines, before, at)? else {
+            return Draft::read(text, origin, folder, overrides);
+        };
+        let draft = Draft {
+            text,
+            origin,
+            folder,
+            overrides,
+            defines,
+            description,
+        };
+        // The options stand in for values outside of the parts, and are in their places still where these were not read again.
+        if is_rest { draft.overridden() } else { Ok(draft) }
+    }
+
+    fn overridden(mut self) -> Result<Draft<'a>, SceneError> {
+        let applied = self.overrides.apply(&mut self.description);
+        applied.map_err(SceneError::Override)?;
+        if let Some(option) = self.overrides.gltf.first() {
+            let rule = format!("is for scenes that are glTF files, and {} is none", self.origin);
+            return Err(SceneError::Override(Problem::of(option, rule)));
+        }
+        Ok(self)
+    }
+
+    /// Checks every value. What files the scene is made of is told even if it breaks a rule.
+    pub fn check(self, files: &mut BTreeSet<PathBuf>) -> Result<(Scene, Description), SceneError> {
+        let Draft {
+            text,
+            origin,
+            folder,
+            overrides,
+            defines,
+            description,
+        } = self;
+        let is_course = course::is_course(Path::new(origin));
+        let root = if is_course {
+            course::asset_root(folder)
+        } else {
+            folder.to_owned()
+        };
+        let assets = overrides.assets(folder, &root);
+        let invalid = |problem| match is_course {
+            true => course::invalid(text, origin, problem, &defines),
+            false => invalid(text, origin, problem, &defines),
+        };
+        let checked = description.validate_and_list(&assets, files);
+        let scene = overrides.finish(checked, invalid, |path| path.set_place(origin, line_of_path(text)))?;
+        Ok((scene, description))
+    }
 }
 
 impl Overrides {
@@ -278,7 +397,7 @@ impl Overrides {
 }
 
 /// The text of a file.
-fn read_text(path: &Path) -> Result<String, SceneError> {
+pub(crate) fn read_text(path: &Path) -> Result<String, SceneError> {
     let bytes = read(path).map_err(|error| SceneError::Read {
         path: path.to_owned(),
         error,

@@ -34,22 +34,29 @@ pub fn load(path: &Path, normals: Option<Normals>) -> Result<Arc<Mesh>, MeshErro
     let Some(key) = key(path, normals) else {
         return Mesh::load(path, normals).map(Arc::new); // which says what is wrong with the file
     };
+    if let Some(mesh) = known(&key) {
+        return Ok(mesh);
+    }
+    // Not under the lock: reading is done by all threads, and one of them may have come here for another scene.
+    let read = Arc::new(Mesh::load(path, normals)?);
+    let libraries = libraries(&read);
+    if let Some(mesh) = known(&key) {
+        return Ok(mesh); // another thread was faster
+    }
+    let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
+    let mesh = Arc::downgrade(&read);
+    in_use.get_or_insert_default().insert(key, Known { mesh, libraries });
+    Ok(read)
+}
+
+/// The mesh, if it is in use and its files of materials are as they were.
+fn known(key: &Key) -> Option<Arc<Mesh>> {
     let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
     let in_use = in_use.get_or_insert_default();
     in_use.retain(|_, known| known.mesh.strong_count() > 0);
-    if let Some(known) = in_use.get(&key)
-        && let Some(mesh) = known.mesh.upgrade()
-        && libraries(&mesh) == known.libraries
-    {
-        return Ok(mesh);
-    }
-    let mesh = Arc::new(Mesh::load(path, normals)?);
-    let known = Known {
-        mesh: Arc::downgrade(&mesh),
-        libraries: libraries(&mesh),
-    };
-    in_use.insert(key, known);
-    Ok(mesh)
+    let known = in_use.get(key)?;
+    let mesh = known.mesh.upgrade()?;
+    (libraries(&mesh) == known.libraries).then_some(mesh)
 }
 
 fn key(path: &Path, normals: Option<Normals>) -> Option<Key> {
@@ -94,6 +101,21 @@ mod tests {
         let copy = folder.path().join("b.obj");
         fs::copy(&path, &copy).unwrap();
         assert!(!Arc::ptr_eq(&first, &load(&copy, None).unwrap()));
+    }
+
+    #[test]
+    fn threads_that_read_for_each_other_do_not_wait_for_ever() {
+        use rayon::prelude::*;
+        let folder = tempfile::tempdir().unwrap();
+        let files: Vec<PathBuf> = (0..32).map(|i| folder.path().join(format!("{i}.obj"))).collect();
+        // So large that all threads read it.
+        let many = SMALL.repeat(2000);
+        files.iter().for_each(|file| fs::write(file, &many).unwrap());
+        let read = files
+            .par_iter()
+            .chain(&files)
+            .map(|file| load(file, None).unwrap().triangles.len());
+        assert_eq!(read.sum::<usize>(), 64 * 2000);
     }
 
     #[test]

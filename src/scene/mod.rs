@@ -4,6 +4,7 @@
 //! [`Description::validate`] alone). Nothing behind a `Scene` checks again.
 
 mod around;
+mod bounds;
 mod camera_path;
 mod course;
 mod decode;
@@ -41,17 +42,28 @@ use crate::gltf::Imported;
 use crate::mesh::Mesh;
 
 pub use around::Background;
+pub use bounds::Bounds;
 pub use camera_path::CameraPath;
 #[cfg(feature = "dev")]
 pub(crate) use course::is_course;
 pub use define::Define;
 pub use description::*;
+#[cfg(feature = "dev")]
+pub(crate) use error::Segment;
 pub use error::{ErrorPlace, KeyPath, Problem, SceneError};
 pub use framing::{Framing, View, framed};
 pub use gltf::{GltfChoice, is_gltf};
 pub use image_file::Assets;
 pub use load::Overrides;
+#[cfg(feature = "dev")]
+pub(crate) use load::{Draft, folder_of, read_text};
 pub use metals::MetalIndex;
+#[cfg(feature = "dev")]
+pub(crate) use parse::Pieces;
+#[cfg(all(test, feature = "dev"))]
+pub(crate) use schema::fields::Kind as FieldKind;
+#[cfg(feature = "dev")]
+pub(crate) use schema::fields::{Field, Names, fields};
 pub use schema::schema;
 pub use texture::{
     Channel, Color, Encoding, Image, NormalMap, Texels, Texture, TextureFilter, TextureKind, Value, Wrap,

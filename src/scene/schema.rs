@@ -1,6 +1,8 @@
 //! The JSON Schema of scene files, made of the very types that read them (`description/`) and of the limits that their values are
 //! checked by (`limits.rs`).
 
+#[cfg(feature = "dev")]
+pub(crate) mod fields;
 pub(super) mod kinds;
 
 use schemars::generate::SchemaSettings;
@@ -18,6 +20,15 @@ const SPLIT: &str = "|";
 /// What it refuses the program refuses. The program knows more rules: those of several values together, such as a camera that looks at
 /// its own position, and of what names refer to.
 pub fn schema() -> String {
+    let mut schema = of_files();
+    without_kinds(&mut schema);
+    schema["title"] = json!("wgray scene");
+    schema["description"] = json!("A scene of wgray, version ".to_owned() + env!("CARGO_PKG_VERSION") + ".");
+    format!("{schema:#}\n")
+}
+
+/// The schema, in which values have their kinds as titles.
+fn of_files() -> Value {
     // Editors that do not look beside a reference see all that is said in its place.
     let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
     let mut schema = settings
@@ -26,9 +37,19 @@ pub fn schema() -> String {
         .to_value();
     of_camera(&mut schema);
     finish(&mut schema);
-    schema["title"] = json!("wgray scene");
-    schema["description"] = json!("A scene of wgray, version ".to_owned() + env!("CARGO_PKG_VERSION") + ".");
-    format!("{schema:#}\n")
+    schema
+}
+
+/// Takes the kinds away, which descriptions tell.
+fn without_kinds(schema: &mut Value) {
+    match schema {
+        Value::Array(all) => all.iter_mut().for_each(without_kinds),
+        Value::Object(all) => {
+            all.retain(|key, value| key != "title" || !value.is_string());
+            all.values_mut().for_each(without_kinds);
+        }
+        _ => {}
+    }
 }
 
 /// A table that its key `type` tells apart: `shape` is what it is of. Each type has its tag, its description and its own schema, which
@@ -183,8 +204,8 @@ fn tell_kind(schema: &mut Value) {
         Some(Value::String(told)) => told.split_whitespace().collect::<Vec<_>>().join(" "),
         _ => String::new(),
     };
-    if let Some(Value::String(kind)) = all.remove("title") {
-        let (words, range) = kind.split_once(SPLIT).unwrap_or((&kind, ""));
+    if let Some(Value::String(kind)) = all.get("title") {
+        let (words, range) = kind.split_once(SPLIT).unwrap_or((kind, ""));
         let is_told = words.is_empty() || told.to_lowercase().contains(words);
         let more = [words, range]
             .into_iter()

@@ -112,6 +112,69 @@ fn scripts_of_slurm_render_the_picture() {
     );
 }
 
+/// Between two tries the scene changes, and changes back.
+#[cfg(unix)]
+#[test]
+fn a_changed_scene_begins_anew_beside_the_old_one() {
+    let place = Place::new();
+    let render = |output: &str| {
+        place.quietly(&[
+            "render",
+            "small.toml",
+            "--device",
+            "cpu",
+            "--reproducible",
+            "-o",
+            output,
+        ])
+    };
+    let program = program().display().to_string();
+    let own = [
+        "--device",
+        "cpu",
+        "--reproducible",
+        "--tiles",
+        "2",
+        "--program",
+        &program,
+    ];
+    written(&place, "slurm", &[&["small.toml", "-o", "out.exr"][..], &own].concat());
+    let run = |script: &str, index: &str| {
+        let script = place.path("small.farm").join(script).display().to_string();
+        let ran = task("bash", &[&script], &[("SLURM_ARRAY_TASK_ID", index)]);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        ran.stderr
+    };
+    let kept = || {
+        let folder = fs::read_dir(place.path("small.farm/checkpoints/picture-of-2/1"));
+        let mut names: Vec<_> = folder
+            .expect("a folder")
+            .map(|entry| entry.expect("a file").file_name())
+            .collect();
+        names.sort();
+        names
+    };
+    render("old.exr");
+    run("tile.sh", "0");
+    let old = kept();
+    place.write("small.toml", &super::SCENE.replace("0.8, 0.8, 0.8", "0.8, 0.8, 0.9"));
+    render("new.exr");
+    assert!(place.read("old.exr") != place.read("new.exr"), "the control");
+    run("tile.sh", "0");
+    let both = kept();
+    assert!(
+        old.len() == 1 && both.len() == 2 && both.contains(&old[0]),
+        "{old:?} {both:?}"
+    );
+    place.write("small.toml", super::SCENE);
+    run("tile.sh", "0");
+    assert_eq!(kept(), both, "what was kept of the old scene is gone on from");
+    run("tile.sh", "1");
+    run("merge.sh", "0");
+    assert!(place.read("out.exr") == place.read("old.exr"));
+    assert!(!place.path("small.farm/checkpoints/picture-of-2").exists());
+}
+
 /// The scripts in a template.
 fn scripts(template: &str) -> Vec<String> {
     let script = |text: &str| -> String {
@@ -254,6 +317,46 @@ fn tiles_are_as_long_as_was_asked() {
     );
 }
 
+#[test]
+fn why_tasks_are_not_as_long_as_was_asked_is_told() {
+    let place = Place::new();
+    for (size, samples, told) in [
+        // By far more than what a task's beginning takes, and by far less.
+        (
+            "64x1",
+            "65536",
+            "a part is a row at least, and takes longer than 0 ms\n",
+        ),
+        ("1x1", "1", " to begin; the picture is one task\n"),
+        (
+            "16x2000",
+            "64",
+            " to begin; tasks are longer, so that it is half of them at most\n",
+        ),
+    ] {
+        let more = [
+            "small.toml",
+            "-o",
+            "out.png",
+            "--device",
+            "cpu",
+            "--size",
+            size,
+            "--task-time",
+            "0",
+            "--overwrite",
+        ];
+        let ran = farm(&place, "slurm", &[&more[..], &["--pixel-samples", samples]].concat());
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        assert!(
+            ran.stderr.starts_with("warning: --task-time: ") && ran.stderr.ends_with(told),
+            "{size}: {}{}",
+            ran.stderr,
+            ran.stdout
+        );
+    }
+}
+
 /// Programs of Slurm that note what they are asked for.
 #[cfg(unix)]
 #[test]
@@ -340,6 +443,18 @@ fn what_is_not_for_farms_is_refused() {
             &["small.toml", "-o", "-"],
             2,
             "error: --output: -: must be a file, which the tasks' machines reach\n",
+        ),
+        #[cfg(unix)]
+        (
+            &["small.toml", "-o", "x.png", "-o", "/dev/stdout", "--tiles", "1"],
+            2,
+            "error: --output: /dev/stdout: must be a file, which the tasks' machines reach\n",
+        ),
+        #[cfg(unix)]
+        (
+            &["small.toml", "-o", "/dev/null", "--tiles", "1"],
+            2,
+            "error: --output: /dev/null: must be a file, which the tasks' machines reach\n",
         ),
         (
             &["small.toml", "-o", "x.png", "--tile", "1/2"],

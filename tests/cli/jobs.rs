@@ -1,5 +1,6 @@
 //! Jobs that end early and go on, and pictures in parts: by the program itself, its signals and its files.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write as _;
 use std::process::{Child, Command, Stdio};
@@ -302,6 +303,60 @@ fn checkpoints_of_other_jobs_are_refused() {
         let interval = format!("--checkpoint-interval={good}");
         assert_eq!(run(&["--checkpoint", "d", &interval]).code, 0, "{good}");
     }
+}
+
+/// In a folder no job meets what another has left.
+#[test]
+fn a_folder_has_a_checkpoint_for_each_job() {
+    let place = Place::new();
+    fs::create_dir(place.path("kept")).expect("a folder");
+    let run = |more: &[&str]| {
+        let base = [
+            "render",
+            "small.toml",
+            "-o",
+            "out.##.png",
+            "--device",
+            "cpu",
+            "--checkpoint",
+            "kept",
+        ];
+        place.run(&[&base[..], more].concat())
+    };
+    let files = || {
+        let all = fs::read_dir(place.path("kept")).expect("a folder");
+        all.map(|entry| entry.expect("a file").file_name().into_string().expect("UTF-8"))
+            .collect::<BTreeSet<_>>()
+    };
+    let mut seen = BTreeSet::new();
+    for more in [
+        &[][..],
+        &["--seed", "7"],
+        &["--spp", "4"],
+        &["--size", "11x6"],
+        &["--crop", "0,0,5,5"],
+        &["--exact-rounding"],
+    ] {
+        let ran = run(more);
+        assert_eq!(ran.code, 0, "{more:?}: {}", ran.stderr);
+        let now = files();
+        let new: Vec<_> = now.difference(&seen).cloned().collect();
+        let [new] = &new[..] else { panic!("{more:?}: {new:?}") };
+        // It is there now, as any other would be.
+        let ran = run(more);
+        let told = format!("error: --checkpoint: kept/{new}: is there already; --resume goes on from it");
+        assert!(
+            ran.code == 2 && ran.stderr.starts_with(&told),
+            "{more:?}: {}",
+            ran.stderr
+        );
+        assert_eq!(run(&[more, &["--resume"]].concat()).code, 0);
+        assert_eq!(files(), now, "{more:?}");
+        seen = now;
+    }
+    let ran = run(&["--frames", "1-2"]);
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    assert!(ran.stderr.contains("--checkpoint: kept: must have #"), "{}", ran.stderr);
 }
 
 /// Pieces of another job, moved behind the header of this one.

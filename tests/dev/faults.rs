@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use wgray::dev::{Command, Frame, View};
+use wgray::dev::{Against, Command, Frame, View};
 
 use super::running::{Files, KERNEL, Running, SCENE};
 
@@ -51,12 +51,12 @@ fn faults_of_a_shader_are_counted_and_marked() {
         with_faults(running).filter(|frame| pixel(&frame.pictures[0], 0, 3) != magenta)
     });
     running.session.send(Command::Marks(true));
-    running.session.send(Command::View(View::Compare));
+    running.session.send(Command::View(View::Compare(Against::Cpu)));
     let frame = running.wait("the comparison", |running| {
-        with_faults(running).filter(|frame| frame.header.view == View::Compare)
+        with_faults(running).filter(|frame| frame.header.view == View::Compare(Against::Cpu))
     });
     assert_eq!(pixel(&frame.pictures[0], 0, 3), magenta);
-    assert_eq!(frame.header.faults[1], ("cpu", Default::default()));
+    assert_eq!(frame.header.faults[1], ("second", Default::default()));
 }
 
 #[test]

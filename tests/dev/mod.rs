@@ -14,3 +14,4 @@ mod server;
 mod shader_layers;
 mod shader_sliders;
 mod views;
+mod writing;

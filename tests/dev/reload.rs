@@ -21,7 +21,15 @@ fn the_first_picture_is_what_render_makes() {
     let [r, g, b] = colors[y * 40 + x];
     let told = frame.pixel(x as u32, y as u32).unwrap();
     let shown = [r, g, b].map(|value| wgray::image::encode(value).to_string()).join(" ");
-    assert_eq!(told, [("linear RGB", format!("{r}  {g}  {b}")), ("shown", shown)]);
+    let bits = [r, g, b].map(|value| format!("{:08x}", value.to_bits())).join("  ");
+    assert_eq!(
+        told,
+        [
+            ("linear RGB", format!("{r}  {g}  {b}")),
+            ("bits", bits),
+            ("shown", shown)
+        ]
+    );
     assert_eq!(frame.pixel(40, 0), None);
 }
 

@@ -4,7 +4,7 @@ use std::fs;
 
 use wgray::backend::Backend as _;
 use wgray::cpu::Cpu;
-use wgray::dev::{Command, Content, Move, View};
+use wgray::dev::{Against, Command, Content, Move, View};
 use wgray::film::Region;
 
 use super::running::{Files, KERNEL, RADIANCE, Running, SCENE, SETTLED};
@@ -58,15 +58,15 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
     std::thread::sleep(SETTLED);
     assert_eq!(running.revision(), revision, "nothing was rendered again");
     // The save is taken back: the file's text is what it was, and the view stays.
-    assert!(running.state().can_undo);
-    running.session.send(Command::UndoSave);
+    assert_eq!(running.state().undo.as_deref(), Some("camera"));
+    running.session.send(Command::UndoWrite);
     running.wait("the file to be as it was", |running| {
-        (running.state().camera_moved && !running.state().can_undo).then_some(())
+        (running.state().camera_moved && running.state().undo.is_none()).then_some(())
     });
     assert_eq!(files.read("scene.toml"), SCENE);
     std::thread::sleep(SETTLED);
     assert_eq!((running.colors(), running.state().camera_moved), (shown, true));
-    running.session.send(Command::UndoSave);
+    running.session.send(Command::UndoWrite);
     running.session.send(Command::SaveCamera);
     running.wait("the camera to be the file's", |running| {
         (!running.state().camera_moved).then_some(())
@@ -132,7 +132,7 @@ fn the_cpu_agrees_until_a_shader_is_changed() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
-    running.session.send(Command::View(View::Compare));
+    running.session.send(Command::View(View::Compare(Against::Cpu)));
     let compared = |running: &Running| {
         running
             .frame()

@@ -234,21 +234,35 @@ fn windows_of_exr_files_are_refused_by_their_headers() {
     let sound = folder.path().join("sound.exr");
     image::Rgb32FImage::new(8, 6).save(&sound).unwrap();
     let sound = fs::read(sound).unwrap();
-    let window = b"dataWindow\0box2i\0\x10\0\0\0";
-    let found = sound.windows(window.len()).position(|bytes| bytes == window);
-    let corners = found.expect("a window") + window.len();
+    let corners = |name: &str| {
+        let window = [name.as_bytes(), b"\0box2i\0\x10\0\0\0"].concat();
+        let found = sound.windows(window.len()).position(|bytes| bytes == window);
+        found.expect("a window") + window.len()
+    };
+    let (data, display) = (corners("dataWindow"), corners("displayWindow"));
     let scene = "image = { width = 8, height = 6 }\ncamera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 40 }\n\
                  [textures.t]\ntype = 'image'\nfile = 'a.exr'\n[materials.m]\ntype = 'phong'\ncolor = { texture = 't' }\n\
                  [[shapes]]\ntype = 'sphere'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\n";
     fs::write(folder.path().join("s.toml"), scene).unwrap();
-    for (number, value, code, rule) in [
-        (0, 0, 0, ""),
-        (0, -(1 << 28), 3, "must have at most 16384 texels along a side"),
-        (2, 1 << 28, 3, "must have at most 16384 texels along a side"),
+    for (window, numbers, value, code, rule) in [
+        (data, 0..1, 0, 0, ""),
+        (data, 0..1, -(1 << 28), 3, "must have at most 16384 texels along a side"),
+        (data, 2..3, 1 << 28, 3, "must have at most 16384 texels along a side"),
+        // What it shows may also be more than what it stores.
+        (display, 2..4, 999, 0, ""),
+        (
+            display,
+            2..4,
+            3999,
+            3,
+            "shows 4000 x 4000 texels and stores 48; the others take ",
+        ),
     ] {
         let mut file = sound.clone();
-        let at = corners + 4 * number;
-        file[at..at + 4].copy_from_slice(&i32::to_le_bytes(value));
+        for number in numbers {
+            let at = window + 4 * number;
+            file[at..at + 4].copy_from_slice(&i32::to_le_bytes(value));
+        }
         fs::write(folder.path().join("a.exr"), file).unwrap();
         let ran = super::render(folder.path(), "s.toml");
         assert!(

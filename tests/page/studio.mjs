@@ -112,8 +112,18 @@ export class Studio {
   // The picture that `wgray render` makes of the scene, as the bytes of a PNG file.
   render() {
     const out = this.path("rendered.png");
-    execFileSync(PROGRAM, ["render", this.path("scene.toml"), "--output", out, "--quiet"], { stdio: "pipe" });
+    this.renderTo(out);
     return [...fs.readFileSync(out)];
+  }
+
+  // Renders the scene into a file.
+  renderTo(file, more = []) {
+    execFileSync(PROGRAM, ["render", this.path("scene.toml"), "--output", file, "--quiet", ...more], { stdio: "pipe" });
+  }
+
+  // Whether two pictures are the same to the bit; if not, this throws.
+  diff(a, b) {
+    execFileSync(PROGRAM, ["diff", a, b], { stdio: "pipe" });
   }
 
   // Starts the program; resolves once it says where the page is.
@@ -172,9 +182,16 @@ export async function open(browser, studio, options = {}) {
       page.faults.push(`asks for ${request.url()}`);
     }
   });
+  if (process.env.WGRAY_PAGE) await page.route(/\.(js|css)$/, fromDisk);
   await page.goto(studio.url);
   await finished(page);
   return page;
+}
+
+// WGRAY_PAGE names a folder whose scripts and styles stand in for those in the program, so that they are tried without a build.
+function fromDisk(route) {
+  const file = path.join(process.env.WGRAY_PAGE, path.basename(new URL(route.request().url()).pathname));
+  return fs.existsSync(file) ? route.fulfill({ path: file }) : route.continue();
 }
 
 // Waits until the page shows a finished picture that is later than a revision; returns its revision.

@@ -141,8 +141,11 @@ pub fn run(engine: &Engine, start: Instant) -> anyhow::Result<ExitCode> {
     if outputs.is_empty() {
         return Err(Usage("--output: must be there: -o NAME.exr".to_owned()).into());
     }
-    if outputs.iter().any(|output| output.as_os_str() == "-") {
-        return Err(Usage("--output: -: must be a file, which the tasks' machines reach".to_owned()).into());
+    let is_stream =
+        |output: &&PathBuf| output.as_os_str() == "-" || Output::find(output).is_ok_and(|output| !output.is_file());
+    if let Some(output) = outputs.iter().find(is_stream) {
+        let rule = "must be a file, which the tasks' machines reach";
+        return Err(Usage(format!("--output: {}: {rule}", output.display())).into());
     }
     let stem = plain("SCENE", rendering.args.scene.file_stem().unwrap_or("scene".as_ref()))?;
     let to = match (engine, &own.to) {

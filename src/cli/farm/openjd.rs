@@ -218,7 +218,7 @@ fn template(work: &Work, to: &Path) -> Result<String, Usage> {
         [
             "--tile=\"$2/$tiles\"",
             "--output=\"$parts/$2.part\"",
-            "--checkpoint=\"$kept/$2.checkpoint\"",
+            "--checkpoint=\"$kept\"",
             "--resume",
             "--skip-existing",
             "--progress=openjd",
@@ -234,7 +234,7 @@ set -eu
 # left are the scene and the number of the part
 cd -- \"$folder\"
 parts={place}/parts/{picture}-of-$tiles
-kept={place}/checkpoints/{picture}-of-$tiles
+kept={place}/checkpoints/{picture}-of-$tiles/$2   # a folder: a changed scene has a file of its own
 mkdir -p -- \"$parts\" \"$kept\"
 {}
 ",

@@ -82,7 +82,7 @@ fn tile(work: &Work) -> String {
         [
             "--tile=\"$tile/$tiles\"",
             "--output=\"$parts/$tile.part\"",
-            "--checkpoint=\"$kept/$tile.checkpoint\"",
+            "--checkpoint=\"$kept\"",
             "--resume",
             "--skip-existing",
             "--progress=plain",
@@ -102,7 +102,7 @@ fn tile(work: &Work) -> String {
 task=$(( ${{1:-0}} + SLURM_ARRAY_TASK_ID ))   # of all, from 0; an array holds so many, and there may be several
 tile=$(( task % tiles + 1 ))
 {frame}parts=$place/parts/{picture}-of-$tiles
-kept=$place/checkpoints/{picture}-of-$tiles
+kept=$place/checkpoints/{picture}-of-$tiles/$tile   # a folder: a changed scene has a file of its own
 
 cd -- "$folder" || exit
 mkdir -p -- "$parts" "$kept" || exit

@@ -12,7 +12,6 @@ use wgray::job::{Cut, bands};
 use wgray::pack::Packed;
 use wgray::scene::{Camera, CameraPath, Geometry, Light, Projection, Reflection, Scene, Texels, TextureKind};
 
-use super::bounds::bounds;
 use super::kernel::features;
 
 type Counts = BTreeMap<&'static str, u64>;
@@ -185,7 +184,9 @@ impl Info {
                 seed: scene.render.seed,
             },
             camera: seen(&scene.camera, scene.camera_path.as_ref()),
-            bounds: bounds(scene).map(|(low, high)| [low, high].map(|corner| corner.to_array())),
+            bounds: scene
+                .bounds()
+                .map(|(low, high)| [low, high].map(|corner| corner.to_array())),
             shapes: shapes(scene, packed),
             materials: Kinds::of(scene.materials.iter().map(|material| reflection(&material.reflection))),
             textures: scene.textures.iter().map(|texture| textured(&texture.kind)).collect(),

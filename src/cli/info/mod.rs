@@ -1,6 +1,5 @@
 //! `wgray info`: what is in a scene, and what would render it. Nothing is rendered.
 
-mod bounds;
 mod gather;
 mod kernel;
 mod show;

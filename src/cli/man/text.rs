@@ -68,7 +68,7 @@ pub const FILES: &[(&str, &str)] = &[
     ),
     (
         "NAME.checkpoint",
-        "What --checkpoint keeps of an unfinished picture, under any name; --resume goes on from it. It remains after success.",
+        "What --checkpoint keeps of an unfinished picture, under any name, or one of its own in a folder; --resume goes on from it. It remains after success.",
     ),
     (
         "NAME.part",

@@ -120,7 +120,8 @@ pub struct Args {
     pub aov: Vec<Aov>,
 
     /// Keeps every finished piece of the picture in a file, and the one that is being rendered every --checkpoint-interval and
-    /// at signals, so that --resume can go on from it after any end. It remains after success
+    /// at signals, so that --resume can go on from it after any end. It remains after success. In a folder that is there each job has a file of
+    /// its own: a changed scene is begun anew beside what was kept of the old one
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
 

@@ -192,8 +192,8 @@ fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant)
     info!(seconds = setup, "ready");
     let took = work::write(plan, &mut renderer, outputs.places, keeper, stop);
     let took = took.map_err(|error| interrupted(error.into(), stop));
-    if let (Err(error), Some(path)) = (&took, &plan.checkpoint) {
-        let path = path.display();
+    if let (Err(error), Some(kept)) = (&took, &checkpoint) {
+        let path = kept.name().display();
         if error.is::<Interrupted>() {
             plan.said.again(
                 Level::Note,

@@ -1,27 +1,30 @@
 //! What those who look ask for: the camera and the view.
 
+use std::num::NonZeroU32;
 use std::time::Instant;
 
 use super::Painter;
 use crate::dev::build::guarded;
-use crate::dev::camera::{Move, moved};
-use crate::dev::messages::{Command, Notice, Report};
+use crate::dev::canvas::Limits;
+use crate::dev::messages::{Command, Notice};
 use crate::dev::picture::{LayerName, View};
-use crate::dev::save::save_camera;
 use crate::dev::source::{Constants, Loaded, constants};
 use crate::pack::{Camera, Packed, pack_camera};
 
 impl Painter {
     pub(super) fn take_command(&mut self, command: Command) {
         match command {
+            Command::Grab => self.walk.end_step(),
             Command::Move(by) => self.move_camera(by),
-            Command::ResetCamera => {
-                if self.camera.take().is_some() {
-                    self.camera_moved();
-                }
-            }
+            Command::Viewpoint(viewpoint) => self.place_camera(viewpoint),
+            Command::Frame(pixel) => self.frame(pixel),
+            Command::Back => self.retrace(false),
+            Command::Forth => self.retrace(true),
+            Command::ResetCamera => self.reset_camera(),
             Command::SaveCamera => self.save_camera(),
-            Command::UndoSave => self.undo_save(),
+            Command::Set(set) => self.set(&set),
+            Command::UndoWrite => self.turn(false),
+            Command::RedoWrite => self.turn(true),
             Command::View(view) => {
                 let old = std::mem::replace(&mut self.view, view);
                 self.keep_view();
@@ -43,7 +46,7 @@ impl Painter {
             }
             Command::Gain(gain) => {
                 self.gain = gain.clamp(1.0, 1e9);
-                if self.view == View::Compare && self.running.is_some() {
+                if matches!(self.view, View::Compare(_)) {
                     self.show();
                 }
             }
@@ -54,56 +57,49 @@ impl Painter {
             Command::UndoSliders => self.take_back_sliders(),
             Command::Marks(marks) => {
                 self.marks = marks;
-                if self.running.is_some() {
+                self.show();
+            }
+            Command::Look(choice) => match choice.checked() {
+                Ok(look) => {
+                    self.look = look;
                     self.show();
                 }
+                Err(error) => self.notice(&Err(error), String::new()),
+            },
+            Command::Pause(paused) => self.paused = paused,
+            Command::Restart => {
+                self.camera_waits = true; // it is begun again from where the camera is
+                if let Some(running) = &mut self.running {
+                    running.halted = false;
+                }
             }
+            Command::Samples(most) => {
+                let samples = most.map_or(u32::MAX, NonZeroU32::get);
+                self.limit(Limits { samples, ..self.limits });
+            }
+            Command::Preview(preview) => {
+                let scale = preview.scale();
+                self.limit(Limits { scale, ..self.limits });
+            }
+            Command::Keep => self.keep(),
         }
     }
 
-    fn move_camera(&mut self, by: Move) {
-        let Some(loaded) = &self.loaded else { return };
-        let old = self.camera.as_ref().unwrap_or(&loaded.camera);
-        let new = moved(old, by);
-        if new != *old {
-            self.camera = (new != loaded.camera).then_some(new);
-            self.camera_moved();
-        }
-    }
-
-    fn camera_moved(&mut self) {
-        self.camera_waits = true;
-        if let Some(running) = &mut self.running {
-            running.halted = false;
-        }
-        self.since.get_or_insert((Instant::now(), false));
-    }
-
-    fn save_camera(&mut self) {
-        let Some(loaded) = &self.loaded else { return };
-        let camera = self.camera.as_ref().unwrap_or(&loaded.camera);
-        let result = save_camera(&self.sources.scene, camera).map(|saved| {
-            self.saved = saved.or(self.saved.take());
-        });
-        self.notice(&result, format!("camera saved into {}", self.sources.scene.display()));
-        (self.report)(Report::Saved(result));
-    }
-
-    /// Takes the last save back; the camera stays where it is.
-    fn undo_save(&mut self) {
-        let (Some(saved), Some(loaded)) = (self.saved.take(), &self.loaded) else {
+    /// Renders more or less of the picture from now on.
+    fn limit(&mut self, limits: Limits) {
+        if limits == self.limits {
             return;
-        };
-        let result = saved.undo();
-        if result.is_ok() {
-            self.camera.get_or_insert_with(|| loaded.camera.clone());
-            self.taken_back = true;
         }
-        self.notice(
-            &result,
-            format!("{} is as it was before the save", self.sources.scene.display()),
-        );
-        (self.report)(Report::Unsaved(result));
+        self.limits = limits;
+        let view = self.seen();
+        let Some(running) = &mut self.running else { return };
+        match guarded(|| running.canvas.set_limits(limits, view)) {
+            Ok(()) => self.begun((Instant::now(), false)),
+            Err(error) => return self.fail(&error),
+        }
+        if self.is_done() {
+            self.show();
+        }
     }
 
     pub(super) fn notice(&mut self, result: &Result<(), String>, good: String) {
@@ -112,7 +108,12 @@ impl Painter {
             Ok(()) => (good, false),
             Err(error) => (error.clone(), true),
         };
-        self.state.notice = Some(Notice { number, text, bad });
+        self.state.notice = Some(Notice {
+            number,
+            command: self.heard + 1,
+            text,
+            bad,
+        });
     }
 
     /// The camera that is looked through, for a scene.

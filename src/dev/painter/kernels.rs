@@ -70,7 +70,7 @@ impl Painter {
         let info = &gpu.device().info;
         self.state.device = format!("{}, {}", info.name, info.driver);
         self.device = Some(gpu.device().clone());
-        let packed = self.packed(&loaded);
+        let (packed, limits) = (self.packed(&loaded), self.limits);
         let view = if constants.3.is_some() { View::Color } else { self.view };
         self.sliders.runs(gpu.live().sliders());
         let sliders = self.sliders.values(gpu.live().sliders());
@@ -78,7 +78,7 @@ impl Painter {
         let canvas = guarded(|| {
             self.times.of("upload", || gpu.update(&packed))?; // the scene may have changed since it was uploaded
             gpu.set_sliders(&sliders)?;
-            Canvas::new(gpu, packed, view)
+            Canvas::new(gpu, packed, view, limits)
         });
         match canvas {
             Ok(canvas) => {

@@ -1,27 +1,37 @@
 //! What a session does with what happens: decides what is rendered, compiled, shown and told.
 
 mod commands;
+mod comparison;
 mod kernels;
 mod shader;
 mod show;
+mod walk;
+mod writing;
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::SyncSender;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
+use self::comparison::Comparison;
 use self::show::Problems;
+use self::walk::Walk;
 use super::build::{Builder, Request, guarded};
 use super::camera::merged;
-use super::canvas::Canvas;
+use super::canvas::{Canvas, Limits};
+use super::diagnostic::Diagnostic;
+use super::history::History;
+use super::look::Choice;
 use super::messages::{Event, Report, State};
+use super::object::Seen;
 use super::picture::{Frame, View};
-use super::save::Saved;
 use super::sliders::Sliders;
 use super::source::{Constants, Loaded, Snapshot, Sources, Stamp};
 use super::times::Times;
+use super::watch::Writes;
 use crate::gpu::Device;
 use crate::gpu::compose::Shaders;
 use crate::scene::CameraDescription;
@@ -45,6 +55,7 @@ pub struct Painter {
     report: Box<dyn Fn(Report) + Send>,
     state_sender: watch::Sender<Arc<State>>,
     frame_sender: watch::Sender<Option<Arc<Frame>>>,
+    seen_sender: watch::Sender<Option<Arc<Seen>>>,
     state: State,
 
     /// The last scene that was right.
@@ -71,14 +82,24 @@ pub struct Painter {
     sliders: Sliders,
     /// Whether the camera or a slider moved since the picture was begun.
     camera_waits: bool,
-    /// The last save of a camera, while it can be taken back.
-    saved: Option<Saved>,
-    /// Whether it was, and the file has not been read again.
-    taken_back: bool,
+    /// What was written into the scene file, while it can be taken back.
+    history: History,
+    /// What the watcher is told of that.
+    writes: Arc<Mutex<Writes>>,
+    /// The files that the scene is made of.
+    files: Vec<(PathBuf, Stamp)>,
     view: View,
     times: Times,
     gain: f32,
     marks: bool,
+    look: Choice,
+    limits: Limits,
+    /// Whether nothing but first pictures is rendered.
+    paused: bool,
+    walk: Walk,
+    comparison: Comparison,
+    /// What happens elsewhere on behalf of this.
+    events: SyncSender<Event>,
     /// The sizes that were told last, asked for and shown, of a picture that is too large.
     smaller: Option<([u32; 2], [u32; 2])>,
 
@@ -128,6 +149,10 @@ pub struct Told {
     pub times: Times,
     /// The form of links that open an editor.
     pub editor: Option<String>,
+    /// Those who ask about the scene.
+    pub seen: watch::Sender<Option<Arc<Seen>>>,
+    /// The session's own inbox.
+    pub events: SyncSender<Event>,
 }
 
 impl Painter {
@@ -136,8 +161,8 @@ impl Painter {
         sources: Sources,
         device: Device,
         builder: Builder,
-        out: Option<PathBuf>,
-        looking: Option<Arc<AtomicUsize>>,
+        (out, looking): (Option<PathBuf>, Option<Arc<AtomicUsize>>),
+        writes: Arc<Mutex<Writes>>,
         told: Told,
     ) -> Painter {
         let Told {
@@ -146,6 +171,8 @@ impl Painter {
             frames: frame_sender,
             times,
             editor,
+            seen: seen_sender,
+            events,
         } = told;
         let state = State {
             scene: sources.scene.display().to_string(),
@@ -164,6 +191,7 @@ impl Painter {
             report,
             state_sender,
             frame_sender,
+            seen_sender,
             state,
             loaded: None,
             shaders: None,
@@ -180,12 +208,19 @@ impl Painter {
             camera: None,
             sliders: Sliders::default(),
             camera_waits: false,
-            saved: None,
-            taken_back: false,
+            history: History::default(),
+            writes,
+            files: Vec::new(),
             view: View::default(),
             times,
             gain: GAIN,
             marks: true,
+            look: Choice::default(),
+            limits: Limits::default(),
+            paused: false,
+            walk: Walk::default(),
+            comparison: Comparison::default(),
+            events,
             smaller: None,
             heard: 0,
             frames: 0,
@@ -202,12 +237,14 @@ impl Painter {
     /// Takes something that happened.
     pub fn take(&mut self, event: Event) {
         match event {
-            Event::Files(snapshot, noticed) => self.take_files(*snapshot, noticed),
+            Event::Files(snapshot, noticed, writes) => self.take_files(*snapshot, noticed, writes),
             Event::Built(built) => self.take_built(*built),
             Event::Command(command) => {
                 self.take_command(command);
                 self.heard += 1;
             }
+            Event::Reference(reference) => self.take_reference(reference),
+            Event::Measured(apart) => self.take_measured(apart),
             Event::Viewers => {
                 // Nobody has waited for the picture until now.
                 self.since = self.since.map(|(_, saved)| (Instant::now(), saved));
@@ -219,27 +256,50 @@ impl Painter {
         self.tell();
     }
 
-    fn take_files(&mut self, snapshot: Snapshot, noticed: Instant) {
+    fn take_files(&mut self, snapshot: Snapshot, noticed: Instant, writes: u64) {
         for (part, took) in ["read files", "pack"].into_iter().zip(snapshot.took) {
             if !took.is_zero() {
                 self.times.part(part, took);
             }
         }
-        if let Some((_, Stamp::Content(content))) = snapshot.files.first()
-            && self.saved.as_ref().is_some_and(|saved| !saved.is(content))
+        // What was read before this session wrote the file last is no news of the scene.
+        let is_new = writes == self.writes.lock().unwrap_or_else(PoisonError::into_inner).count;
+        let known = self.loaded.as_ref().map(|loaded| loaded.text.as_bytes());
+        if let (true, Some((_, Stamp::Content(content)))) = (is_new, snapshot.files.first())
+            && known != Some(content)
         {
-            self.saved = None; // nothing of the save is there to be taken back
+            self.history.forget(); // nothing of what was written is there to be taken back
         }
         let mut shown_otherwise = false;
-        match snapshot.scene {
+        if is_new {
+            self.files = snapshot.files;
+            shown_otherwise = self.take_scene(snapshot.scene);
+        }
+        match snapshot.shaders {
+            Ok(shaders) => {
+                self.problems.files = None;
+                if self.sliders.differ_from(&shaders) {
+                    self.keep_before();
+                }
+                self.read_shaders(shaders);
+            }
+            Err(problem) => self.problems.files = Some(problem),
+        }
+        self.show_files(noticed, shown_otherwise);
+    }
+
+    /// Takes a scene, or what is wrong with it. Gives whether what is rendered of it is shown otherwise.
+    fn take_scene(&mut self, scene: Result<Arc<Loaded>, Diagnostic>) -> bool {
+        let mut shown_otherwise = false;
+        match scene {
             Ok(loaded) => {
                 self.problems.scene = None;
-                // Whoever changes the file's camera wants to see it; what a save has written and is taken back was on screen.
-                if let (Some(camera), Some(old), false) = (&self.camera, &self.loaded, self.taken_back) {
+                // Whoever changes the file's camera wants to see it.
+                if let (Some(camera), Some(old)) = (&self.camera, &self.loaded) {
                     self.camera = merged(camera, &old.camera, &loaded.camera);
                 }
-                self.taken_back = false;
                 if self.loaded.as_ref().is_some_and(|old| old.packed != loaded.packed) {
+                    self.keep_before();
                     let cut = self.cut.take();
                     self.refused.retain(|known| Some(known) != cut.as_ref());
                 }
@@ -250,16 +310,15 @@ impl Painter {
                 let known = self.loaded.as_ref();
                 shown_otherwise = known.is_some_and(|old| old.scene.view != loaded.scene.view);
                 self.loaded = Some(loaded);
+                self.state.scenes += 1;
             }
             Err(problem) => self.problems.scene = Some(problem),
         }
-        match snapshot.shaders {
-            Ok(shaders) => {
-                self.problems.files = None;
-                self.read_shaders(shaders);
-            }
-            Err(problem) => self.problems.files = Some(problem),
-        }
+        shown_otherwise
+    }
+
+    /// Sees to it that what the files say now is shown.
+    fn show_files(&mut self, noticed: Instant, shown_otherwise: bool) {
         self.failures = 0;
         self.keep_view();
         self.settle((noticed, true));
@@ -373,8 +432,9 @@ impl Painter {
             .filter(|running| !running.halted)
             .is_some_and(|running| {
                 let more = !running.canvas.is_done(self.seen());
+                let first = running.canvas.is_new();
                 // While a kernel is compiled the processor is left to the compiler, but for the camera.
-                self.camera_waits || (more && (self.pending.is_none() || running.canvas.is_new()))
+                self.camera_waits || (more && (first || (self.pending.is_none() && !self.paused)))
             })
     }
 

@@ -157,10 +157,14 @@ impl Painter {
 
     /// The kernel that runs is shown from now on, with what it has.
     pub(super) fn show_parked(&mut self, since: (Instant, bool)) {
-        let view = self.seen();
+        let (view, limits) = (self.seen(), self.limits);
         let Some(running) = &mut self.running else { return };
         running.halted = false;
-        match guarded(|| running.canvas.change_view(view)) {
+        let shown = guarded(|| {
+            running.canvas.set_limits(limits, view)?;
+            running.canvas.change_view(view)
+        });
+        match shown {
             Ok(()) => {
                 self.changed(since);
                 self.upload_sliders(since);

@@ -1,14 +1,17 @@
 //! What everybody is shown and told.
 
+use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::Instant;
 
 use super::Painter;
 use crate::dev::build::guarded;
-use crate::dev::camera::text;
+use crate::dev::camera::{Viewpoint, text};
 use crate::dev::diagnostic::Diagnostic;
-use crate::dev::messages::Report;
-use crate::dev::picture::{Content, Frame, Header, Look, Names, View, png_of};
+use crate::dev::look::Look;
+use crate::dev::messages::{Preview, Report};
+use crate::dev::object::Seen;
+use crate::dev::picture::{Content, Frame, Header, Names, View, png_of};
 use crate::dev::save::replace;
 use crate::scene::ViewSettings;
 
@@ -55,8 +58,13 @@ impl Painter {
         let whole = sent == finest && samples > 0;
         let settings = (self.loaded.as_ref()).map_or(ViewSettings::default(), |loaded| loaded.scene.view);
         if let (Content::Color(colors), true) = (&content, whole) {
-            self.write_out(|| png_of(colors, settings), done);
+            let look = Look {
+                view: settings,
+                ..Look::default()
+            };
+            self.write_out(|| png_of(colors, look), done);
         }
+        let (content, sides) = self.beside(content, finest);
         let since = self.since.take();
         self.latency = since
             .map(|(noticed, _)| noticed.elapsed().as_secs_f64())
@@ -75,6 +83,7 @@ impl Painter {
             done,
             speed,
             latency: self.latency,
+            sides,
             ..Header::default()
         };
         let names = self.loaded.as_ref().map(|loaded| Names {
@@ -87,11 +96,13 @@ impl Painter {
             gain: self.gain,
             marks: self.marks,
             negative: bins.into_iter().any(|bin| bin.z < 0.0),
-            view: settings,
+            view: self.look.over(settings),
+            false_color: self.look.false_color,
         };
         let make = || Frame::new(header, content, names.unwrap_or_default(), look);
-        let frame = self.times.of("make PNG", make);
-        self.frame_sender.send_replace(Some(Arc::new(frame)));
+        let frame = Arc::new(self.times.of("make PNG", make));
+        self.frame_sender.send_replace(Some(frame.clone()));
+        self.measure(&frame);
         self.last_frame = Instant::now();
         self.frame_cost = start.elapsed();
         self.failures = 0;
@@ -143,8 +154,23 @@ impl Painter {
         }
     }
 
+    /// Tells what questions about the scene are answered from, where it has changed.
+    fn tell_seen(&self) {
+        let Some(loaded) = &self.loaded else { return };
+        let camera = self.packed_camera(loaded);
+        let is_known = |seen: &Arc<Seen>| Arc::ptr_eq(&seen.loaded, loaded) && seen.camera == camera;
+        if !self.seen_sender.borrow().as_ref().is_some_and(is_known) {
+            self.seen_sender.send_replace(Some(Arc::new(Seen {
+                loaded: Arc::clone(loaded),
+                camera,
+                sources: self.sources.clone(),
+            })));
+        }
+    }
+
     /// Tells everybody the state, where it has changed.
     pub(super) fn tell(&mut self) {
+        self.tell_seen();
         let camera = self
             .camera
             .as_ref()
@@ -156,11 +182,28 @@ impl Painter {
         if problems.is_empty() && !self.state.problems.is_empty() {
             (self.report)(Report::Mended);
         }
+        self.state.viewpoint = camera.map(Viewpoint::of);
         self.state.camera = camera.map(text).unwrap_or_default();
+        self.state.steps = self.walk.steps();
+        self.state.look = self.look;
+        let scene = self.loaded.as_ref().map(|loaded| &loaded.scene);
+        let settings = scene.map(|scene| scene.view).unwrap_or_default();
+        self.state.scene_look = (settings.exposure, settings.transform);
+        self.state.paused = self.paused;
+        let most = NonZeroU32::new(self.limits.samples).filter(|most| most.get() != u32::MAX);
+        let of_scene = self.loaded.as_ref().map_or(0, |loaded| loaded.packed.pixel_samples);
+        self.state.samples = (most, of_scene);
+        self.state.preview = Preview::try_from(self.limits.scale).unwrap_or_default();
+        self.state.comparable = self.comparison.comparable();
+        self.state.no_comparison = self.no_comparison();
+        self.state.apart = self.apart();
         self.state.camera_moved = self.camera.is_some();
         (self.state.heard, self.state.frame) = (self.heard, self.frames);
-        self.state.busy = self.camera_waits || self.pending.is_some() || (self.running.is_some() && !self.is_done());
-        self.state.can_undo = self.saved.is_some();
+        let rests = self.paused && !self.running.as_ref().is_some_and(|running| running.canvas.is_new());
+        let renders = self.running.is_some() && !self.is_done() && !rests;
+        self.state.busy = self.camera_waits || self.pending.is_some() || renders;
+        [self.state.undo, self.state.redo] =
+            [false, true].map(|again| self.history.last(again).map(|step| step.what.clone()));
         self.state.problems = problems;
         self.state.compiling = self.pending.is_some();
         (self.state.view, self.state.gain, self.state.marks) = (self.view, self.gain, self.marks);

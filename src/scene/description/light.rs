@@ -5,7 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::tagged::{ReadError, Tagged, tagged};
+use super::tables::ReadError;
+use super::tagged::{Tagged, tagged};
 use crate::scene::schema::kinds::{ConeAngle, InnerAngle, Point, Rgb, Size, Vector};
 
 tagged! {

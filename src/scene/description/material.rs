@@ -5,7 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::tagged::{ReadError, Tagged, tagged};
+use super::tables::ReadError;
+use super::tagged::{Tagged, tagged};
 use super::{ColorDescription, NormalMapDescription, PrincipledDescription, ValueDescription};
 use crate::scene::schema::kinds::{Absorption, Degrees, Etas, Ior, Ks, Metal, Share, ShareColor, Shininess};
 

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use toml::Table;
 
 use crate::mesh::Normals;
 use crate::scene::schema::kinds::{Angles, Degrees, Factor, Factor3, Matrix, Point, Vector};
@@ -159,7 +161,12 @@ pub enum Rotation {
     /// About the x axis, then about the y axis, then about the z axis.
     Angles(#[schemars(with = "Angles")] DVec3),
     /// About one axis.
-    About(RotationAbout),
+    About(#[serde(deserialize_with = "table")] RotationAbout),
+}
+
+/// Reads a table. Within an untagged enum serde takes a list of its values too.
+fn table<'de, D: Deserializer<'de>>(deserializer: D) -> Result<RotationAbout, D::Error> {
+    Table::deserialize(deserializer)?.try_into().map_err(D::Error::custom)
 }
 
 /// A rotation about an axis.

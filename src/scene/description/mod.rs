@@ -14,6 +14,7 @@ mod mesh;
 mod principled;
 mod render;
 mod shape;
+pub(super) mod tables;
 pub(super) mod tagged;
 mod texture;
 

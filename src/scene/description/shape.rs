@@ -7,7 +7,8 @@ use toml::Table;
 
 use super::gltf::GltfDescription;
 use super::mesh::MeshDescription;
-use super::tagged::{ReadError, Tagged, tagged};
+use super::tables::ReadError;
+use super::tagged::{Tagged, tagged};
 use crate::scene::schema::kinds::{Length, Point, Points3, Points4, Size, Vector};
 
 tagged! {

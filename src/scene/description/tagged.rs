@@ -2,6 +2,8 @@
 
 use toml::Table;
 
+use super::tables::ReadError;
+
 /// An enum whose variants a file tells apart by the key `type`.
 pub(in crate::scene) trait Tagged: Sized {
     /// The values that `type` may have.
@@ -10,9 +12,6 @@ pub(in crate::scene) trait Tagged: Sized {
     /// Reads the table without its `type`, which is `tag`; `None` if there is no such type.
     fn read(tag: &str, body: Table) -> Option<Result<Self, ReadError>>;
 }
-
-/// An error of serde with the path that leads to it.
-pub(in crate::scene) type ReadError = serde_path_to_error::Error<toml::de::Error>;
 
 /// Defines a [`Tagged`] enum. It is not left to serde's `tag` alone because that forgets, while reading, in
 /// which key of the table an error is.
@@ -42,7 +41,7 @@ macro_rules! tagged {
 
             fn read(tag: &str, body: Table) -> Option<Result<Self, ReadError>> {
                 match tag {
-                    $($tag => Some(serde_path_to_error::deserialize(body).map(Self::$variant)),)+
+                    $($tag => Some(crate::scene::description::tables::read(body).map(Self::$variant)),)+
                     _ => None,
                 }
             }

@@ -9,15 +9,17 @@ use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
-use super::tagged::{ReadError, Tagged, tagged};
+use super::tables::ReadError;
+use super::tagged::{Tagged, tagged};
 use crate::scene::schema::kinds::{
-    Anisotropy, Degrees, Factors, LineWidth, Rgb, Share, Strength, UvOffset, UvScale, UvSet,
+    Anisotropy, Degrees, Factors, LineWidth, Rgb, Share, Strength, UvOffset, UvScale, UvSet, tell_plain,
 };
 use crate::scene::{Channel, Encoding, TextureFilter, Wrap};
 
 /// A colour of a material: `[r, g, b]` or `{ texture = "NAME" }`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
+#[schemars(transform = tell_plain)]
 pub enum ColorDescription {
     /// Linear RGB.
     Plain(#[schemars(with = "Rgb")] DVec3),

@@ -1,5 +1,7 @@
 //! From the text of a scene file to its [`Description`], and from a key path to its line.
 
+#[cfg(feature = "dev")]
+mod change;
 mod parts;
 mod syntax;
 
@@ -16,10 +18,9 @@ use toml::{Table, Value};
 use self::parts::{Broken, Kind, LARGEST, Parts};
 use super::Integrator;
 use super::course;
-#[cfg(feature = "dev")]
-use super::define::Define;
 use super::define::Defines;
-use super::description::tagged::{ReadError, Tagged};
+use super::description::tables::{self, ReadError};
+use super::description::tagged::Tagged;
 use super::description::{
     CameraDescription, CameraKeyDescription, CameraPathDescription, Description, InstanceDescription, LightDescription,
     MaterialDescription, MeshFileDescription, ShapeDescription, TextureDescription,
@@ -28,6 +29,8 @@ use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
 use super::limits::{BLADES, DEEPEST, MOST, UV_SETS};
 use super::validate::depths;
 
+#[cfg(feature = "dev")]
+pub(crate) use change::Pieces;
 pub(super) use syntax::{NOT_UTF8, syntax_error};
 
 impl Description {
@@ -39,12 +42,6 @@ impl Description {
     /// Text that is no TOML or JSON, unknown and missing keys, unknown types, and values of the wrong type.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SceneError> {
         Description::parse_with(text, origin, &mut Defines::new(&[]))
-    }
-
-    /// [`Description::parse`], with other values in place of some of the text's, and no trace of them.
-    #[cfg(feature = "dev")]
-    pub(crate) fn parse_defined(text: &str, origin: &str, values: &[Define]) -> Result<Self, SceneError> {
-        Description::parse_with(text, origin, &mut Defines::new(values))
     }
 
     /// The same scene with other values in place of some of its own.
@@ -346,10 +343,9 @@ fn read<T: DeserializeOwned>(table: Table) -> Result<T, Problem> {
 
 /// Reads a table. What it may say depends on the integrator.
 pub(super) fn read_for<T: DeserializeOwned>(table: Table, integrator: Integrator) -> Result<T, Problem> {
-    let read = |table: Table| serde_path_to_error::deserialize(table);
     // The copy is for the message: reading consumes the values.
-    read(table.clone()).map_err(|error| {
-        let error = with_names(error, &table, |table| read(table).err());
+    tables::read(table.clone()).map_err(|error| {
+        let error = with_names(error, &table, |table| tables::read::<T>(table).err());
         explain(error, table, false, integrator)
     })
 }

@@ -172,6 +172,41 @@ fn bad_text_is_told_with_its_line() {
             "render.pixel_samples.count: is missing",
         ),
         (
+            "[render]\n\nadaptive = [0.1]",
+            3,
+            "render.adaptive: [0.1] must be a table, such as { error = 0.01 }",
+        ),
+        (
+            "[render]\npixel_samples = ['grid', 4]",
+            2,
+            "render.pixel_samples: [\"grid\", 4] must be a table, such as { pattern = \"grid\", count = 16 }",
+        ),
+        (
+            "path = ['linear', [[1]]]",
+            1,
+            "camera.path: [\"linear\", [[1]]] must be a table",
+        ),
+        (
+            "path = { keys = [{ frame = 1, fov = 30 }, [2]] }",
+            1,
+            "camera.path.keys[1]: [2] must be a table",
+        ),
+        (
+            "[environment]\nrotate = [[0, 0, 1], 90]",
+            2,
+            "environment.rotate: [[0, 0, 1], 90] must be a number of degrees, a list of 3 angles in degrees or a table such as { axis = [0, 0, 1], degrees = 90 }",
+        ),
+        (
+            "[materials.a]\ntype = 'phong'\nnormal_map = ['b']",
+            3,
+            "materials.a.normal_map: [\"b\"] must be a table, such as { texture = \"NAME\" }",
+        ),
+        (
+            "[materials.a]\ntype = 'phong'\nshininess = [['b']]",
+            3,
+            "materials.a.shininess: [[\"b\"]] must be a number",
+        ),
+        (
             "[render.light_samples]\ncount = 4\nn = 2",
             3,
             "render.light_samples.n: unknown key; the keys here are \"pattern\", \"count\"",
@@ -231,6 +266,7 @@ fn a_missing_section_or_key_is_told_at_the_table_it_belongs_to() {
         "s.toml:4: camera.fov: is missing"
     );
     assert_eq!(message("image = 3"), "s.toml:1: image: 3 must be a table");
+    assert_eq!(message("image = [4, 4]"), "s.toml:1: image: [4, 4] must be a table");
 }
 
 #[test]

@@ -111,7 +111,17 @@ impl JsonSchema for ShareColor {
         {
             *plain = share;
         }
+        tell_plain(&mut schema);
         schema
+    }
+}
+
+/// Where a texture may stand in place of a plain value, the key tells what that may be.
+pub(in crate::scene) fn tell_plain(schema: &mut Schema) {
+    let plain = schema.get("anyOf").and_then(|either| either.get(0)?.get("title"));
+    if let Some(told) = plain.and_then(Value::as_str) {
+        let told = told.replacen(SPLIT, &format!(", or a texture{SPLIT}"), 1);
+        schema.insert("title".to_owned(), Value::String(told));
     }
 }
 

@@ -2,15 +2,25 @@
 
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
-use wgray::scene::{Geometry, Scene};
+
+use super::{Geometry, Scene};
 
 /// A box, from its lowest corner to its highest.
 pub type Bounds = (DVec3, DVec3);
 
-/// The box around all shapes but planes, which are infinite; none where there are no others.
-pub fn bounds(scene: &Scene) -> Option<Bounds> {
-    let all = scene.shapes.iter().filter_map(|shape| of(&shape.geometry));
-    all.reduce(join)
+impl Scene {
+    /// The box around all shapes but planes, which are infinite; none where there are no others.
+    pub fn bounds(&self) -> Option<Bounds> {
+        let all = self.shapes.iter().filter_map(|shape| shape.geometry.bounds());
+        all.reduce(join)
+    }
+}
+
+impl Geometry {
+    /// The box around it; none around a plane.
+    pub fn bounds(&self) -> Option<Bounds> {
+        of(self)
+    }
 }
 
 fn join((low, high): Bounds, (other_low, other_high): Bounds) -> Bounds {

@@ -1,0 +1,73 @@
+//! The picture that is shown as a file: a PNG of what is seen, or an EXR of its numbers.
+
+use std::io::{self, Cursor};
+
+use ::exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer, LayerAttributes,
+    SmallVec, WritableImage,
+};
+
+use super::picture::{Content, Frame, png, png_of};
+use crate::image::{Channel, Pixels};
+
+/// A PNG file of what a frame shows, without marks: of a comparison its first picture.
+pub fn png_file(frame: &Frame) -> Vec<u8> {
+    match &frame.content {
+        Content::Color(pixels) | Content::Compare(pixels, _) => png_of(pixels, frame.look),
+        content => {
+            let [width, height] = frame.header.sent;
+            png(width, height, &content.plain_bytes([width, height]))
+        }
+    }
+}
+
+/// An EXR file of a frame's numbers, 32 bits each, with the channels that `wgray render` gives them.
+///
+/// # Errors
+///
+/// What the library does not write.
+pub fn exr_file(frame: &Frame) -> io::Result<Vec<u8>> {
+    let [width, height] = frame.header.sent;
+    let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = match &frame.content {
+        Content::Color(pixels) | Content::Compare(pixels, _) | Content::Layer(pixels, _) => colors(pixels),
+        Content::Samples(counts, _) => [AnyChannel::new("sample_count.N", FlatSamples::U32(counts.clone()))]
+            .into_iter()
+            .collect(),
+        Content::Hits(aov, hits) => aov
+            .channels()
+            .iter()
+            .filter_map(|channel| {
+                let samples = match channel {
+                    Channel::Float(_, value) => FlatSamples::F32(hits.iter().map(value).collect()),
+                    Channel::Whole(_, value) => FlatSamples::U32(hits.iter().map(value).collect()),
+                    Channel::ShadingNormal(_, part) => {
+                        FlatSamples::F32(hits.iter().map(|hit| hit.shading_normal[*part]).collect())
+                    }
+                    Channel::Mean(..) | Channel::Count(_) | Channel::Variance(..) => return None, // none of a first hit
+                };
+                Some(AnyChannel::new(channel.name(), samples))
+            })
+            .collect(),
+    };
+    let size = (width as usize, height as usize);
+    let layer = Layer::new(
+        size,
+        LayerAttributes::default(),
+        Encoding::SMALL_LOSSLESS,
+        AnyChannels::sort(channels),
+    );
+    let image = Image::empty(ImageAttributes::new(IntegerBounds::from_dimensions(size))).with_layer(layer);
+    let mut file = Cursor::new(Vec::new());
+    image.write().to_buffered(&mut file).map_err(io::Error::other)?;
+    Ok(file.into_inner())
+}
+
+fn colors(pixels: &Pixels) -> SmallVec<[AnyChannel<FlatSamples>; 4]> {
+    let channel = |(name, i): (&'static str, usize)| {
+        AnyChannel::new(
+            name,
+            FlatSamples::F32(pixels.colors.iter().map(|color| color[i]).collect()),
+        )
+    };
+    [("R", 0), ("G", 1), ("B", 2)].into_iter().map(channel).collect()
+}

@@ -1,0 +1,81 @@
+// Two pictures beside each other: with what, in which layout, and how far they are apart.
+
+import { ask, element, onFrame, onState } from "/link.js";
+import { choose, viewName } from "/view.js";
+
+const chosen = (name) => document.querySelector(`input[name=${name}]:checked`).value;
+let timer = 0;
+
+export function setUpCompare(picture, onKey, showNotice) {
+  element("against").addEventListener("change", () => choose("compare"));
+  element("layout").addEventListener("change", arrange);
+  element("pace").addEventListener("change", arrange);
+  element("gain").addEventListener("change", ({ target }) => ask({ gain: Number(target.value) }));
+  element("wipe").addEventListener("input", ({ target }) => picture.wipe(target.valueAsNumber));
+  const keep = () => ask("keep");
+  element("keep").addEventListener("click", keep);
+  onKey("t", keep);
+  onKey("x", () => picture.swap());
+  element("reference-file").addEventListener("change", ({ target }) => {
+    if (target.files[0]) give(target.files[0]);
+    target.value = "";
+  });
+  const panels = element("panels");
+  panels.addEventListener("dragover", (event) => event.preventDefault());
+  panels.addEventListener("drop", (event) => {
+    event.preventDefault();
+    if (event.dataTransfer.files[0]) give(event.dataTransfer.files[0]);
+  });
+
+  function arrange() {
+    const layout = chosen("layout");
+    picture.arrange(layout);
+    clearInterval(timer);
+    const pace = Number(element("pace").value);
+    if (layout === "flicker" && pace) timer = setInterval(() => picture.swap(), 1000 / pace);
+  }
+
+  // A file of the viewer's machine: the program gets its bytes.
+  async function give(file) {
+    try {
+      const answer = await fetch(`/reference/${encodeURIComponent(file.name)}`, { method: "POST", body: file });
+      if (!answer.ok) throw new Error((await answer.text()) || `${answer.status} ${answer.statusText}`);
+      document.querySelector("input[name=against][value=reference]").checked = true;
+      choose("compare");
+    } catch (error) {
+      showNotice(`${file.name}: ${error.message}`.replace(`${file.name}: ${file.name}: `, `${file.name}: `), true);
+    }
+  }
+
+  onState((state, heard) => {
+    element("reference-name").textContent = state.comparable[1] ?? "none";
+    const apart = state.apart;
+    const number = (value) => (value === null ? "no number" : value === 0 ? "0" : value.toPrecision(3));
+    element("rmse").textContent = apart ? number(apart.rmse) : "–";
+    element("flip").textContent = apart ? number(apart.flip) : "–";
+    if (!heard) return;
+    if (viewName(state.view) === "compare") {
+      document.querySelector(`input[name=against][value=${state.view.compare}]`).checked = true;
+    }
+    element("gain").value = state.gain;
+    if (picture.gain !== state.gain) picture.setGain(state.gain);
+  });
+
+  onFrame(({ differing, done, view }) => {
+    const verdict = element("differing");
+    const say = (kind, text) => {
+      verdict.className = kind;
+      if (verdict.textContent !== text) verdict.textContent = text;
+    };
+    if (differing) {
+      const [pixels, largest] = differing;
+      const at = done ? "" : " so far";
+      const apart = largest === null ? "some by no finite number" : `by ${largest.toPrecision(3)} at most`;
+      const count = `${pixels.toLocaleString("en")} ${pixels === 1 ? "pixel differs" : "pixels differ"}`;
+      say(pixels ? "differ" : "same", pixels ? `${count}${at}, ${apart}` : `0 pixels differ${at}: all bits are the same`);
+    } else {
+      say("", viewName(view) === "compare" ? "nothing to compare yet" : "–");
+    }
+  });
+  arrange();
+}

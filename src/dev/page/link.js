@@ -1,0 +1,95 @@
+// The connection to the program: what it tells goes to whoever listens, what is asked gets its answer.
+
+const RETRY = 500; // milliseconds
+const listeners = { state: [], frame: [], link: [], refused: [] };
+const named = new Map(); // who listens to other messages, by their names
+let socket = null;
+let state = null;
+let answers = []; // resolve the commands that have no number yet, in order
+let pixels = []; // and the questions for pixels
+let asked = 0; // the number of the last command that has one
+let [received, drawn] = [0, 0]; // numbers of frames, so that a late one is not shown after a newer
+
+export const element = (id) => document.getElementById(id);
+
+export const onState = (f) => listeners.state.push(f); // f(state, heard)
+export const onFrame = (f) => listeners.frame.push(f); // f(header, images by name)
+export const onLink = (f) => listeners.link.push(f); // f(whether it is there)
+export const onRefused = (f) => listeners.refused.push(f); // f(text)
+export const onMessage = (name, f) => named.set(name, [...(named.get(name) ?? []), f]); // f(value)
+
+const tell = (name, ...values) => listeners[name].forEach((f) => f(...values));
+const isOpen = () => socket?.readyState === WebSocket.OPEN;
+
+// Asks for something; resolves to the command's number, or to null if it was refused or nobody is there.
+export function ask(command) {
+  if (!isOpen()) return Promise.resolve(null);
+  socket.send(JSON.stringify(command));
+  return new Promise((resolve) => answers.push(resolve));
+}
+
+// Sends a question that is no command: what comes of it is a message.
+export function put(question) {
+  if (isOpen()) socket.send(JSON.stringify(question));
+}
+
+// What is known of a pixel: {x, y, values}, or null if nobody is there.
+export function askPixel(pixel) {
+  if (!isOpen()) return Promise.resolve(null);
+  socket.send(JSON.stringify({ pixel }));
+  return new Promise((resolve) => pixels.push(resolve));
+}
+
+// Whether the program has followed all that was asked for here: what is older than a choice must not undo it.
+export const isHeard = () => answers.length === 0 && state !== null && state.heard >= asked;
+export const lastState = () => state;
+
+export function connect() {
+  socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`);
+  socket.binaryType = "arraybuffer";
+  socket.onopen = () => {
+    asked = 0;
+    tell("link", true);
+  };
+  socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : showFrame(data));
+  socket.onclose = () => {
+    for (const resolve of [...answers, ...pixels]) resolve(null);
+    [answers, pixels] = [[], []];
+    tell("link", false);
+    setTimeout(connect, RETRY);
+  };
+}
+
+function hear(message) {
+  if (message.state) {
+    state = message.state;
+    tell("state", state, isHeard());
+  } else if (message.pixel) {
+    pixels.shift()?.(message.pixel);
+  } else if (message.asked !== undefined || message.refused !== undefined) {
+    const resolve = answers.shift();
+    asked = message.asked ?? asked;
+    if (message.refused !== undefined) tell("refused", message.refused);
+    resolve?.(message.asked ?? null);
+    if (state && isHeard()) tell("state", state, true);
+  } else {
+    for (const [name, value] of Object.entries(message)) named.get(name)?.forEach((f) => f(value));
+  }
+}
+
+// A frame: the length of its header, the header as JSON, and the PNG files that it counts.
+async function showFrame(data) {
+  const number = ++received;
+  const length = new DataView(data).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
+  let at = 4 + length;
+  const decoded = header.parts.map(async ([name, size]) => {
+    const blob = new Blob([new Uint8Array(data, at, size)], { type: "image/png" });
+    at += size;
+    return [name, await createImageBitmap(blob, { colorSpaceConversion: "none" })];
+  });
+  const images = new Map(await Promise.all(decoded));
+  if (number < drawn) return;
+  drawn = number;
+  tell("frame", header, images);
+}

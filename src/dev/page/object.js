@@ -1,0 +1,367 @@
+// The object that was clicked: its lines in the scene file, and its values as controls that write into it.
+
+import { ask, element, lastState, onLink, onMessage, onState, put } from "/link.js";
+
+const STEPS = 1000; // of a slider that goes by factors
+const LISTED = 250; // milliseconds without a key before names are asked for
+
+let asked = null; // the pixel, or the name and the material, that was asked for
+let scenes = null; // which scene it was asked of
+let signature = ""; // of the controls that are there
+let controls = new Map(); // by their paths
+let gesture = Math.floor(Math.random() * 2 ** 40); // changes of one gesture are one step of undo
+let held = null; // the path whose control is being moved
+let stale = false; // whether controls must be made anew once it is let go
+let sending = null; // the change that waits for the program
+let waiting = null; // the newest one after it
+
+const make = (tag, values = {}, ...children) => {
+  const made = Object.assign(document.createElement(tag), values);
+  made.append(...children);
+  return made;
+};
+
+// Selects what is at a pixel of the picture.
+export function select(pixel) {
+  asked = { at: pixel };
+  element("object").open = true;
+  scenes = lastState()?.scenes;
+  put({ object: pixel });
+}
+
+function inspect(name, material) {
+  asked = { name, material };
+  scenes = lastState()?.scenes;
+  put({ inspect: asked });
+}
+
+// The same again: the scene has changed.
+function again() {
+  if (asked?.at) put({ object: asked.at });
+  else if (asked) inspect(asked.name, asked.material);
+}
+
+export function setUpObject() {
+  const find = element("object-find");
+  let timer = 0;
+  const list = () => put({ objects: find.value });
+  find.addEventListener("input", () => {
+    clearTimeout(timer);
+    const known = [...element("object-names").children].some((option) => option.value === find.value);
+    if (known) inspect(find.value);
+    else timer = setTimeout(list, LISTED);
+  });
+  find.addEventListener("focus", list);
+  find.addEventListener("change", () => find.value && inspect(find.value));
+  onMessage("objects", ({ objects, more }) => {
+    const options = objects.map(([value, label]) => make("option", { value, label }));
+    element("object-names").replaceChildren(...options);
+    element("object-more").textContent = more ? `${more.toLocaleString("en")} more: type a part of the name` : "";
+  });
+  onMessage("object", showObject);
+  element("undo-write").addEventListener("click", () => ask("undo_write"));
+  element("redo-write").addEventListener("click", () => ask("redo_write"));
+  document.addEventListener("keydown", (event) => {
+    const isText = event.target.matches?.("textarea, input:not([type=range], [type=checkbox], [type=radio], [type=color])");
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || isText || event.key.toLowerCase() !== "z") return;
+    event.preventDefault();
+    ask(event.shiftKey ? "redo_write" : "undo_write");
+  });
+  onLink(() => {
+    scenes = null;
+    [sending, waiting] = [null, null];
+  });
+  onState((state) => {
+    for (const [id, what, word] of [["undo-write", state.undo, "Undo"], ["redo-write", state.redo, "Redo"]]) {
+      element(id).disabled = !what;
+      element(id).textContent = what ? `${word} ${what}` : word;
+    }
+    settle(state);
+    if (state.scenes !== scenes) {
+      scenes = state.scenes;
+      again();
+    }
+  });
+}
+
+// One change at a time: the next goes when the last was followed, so that a slider never runs ahead of the file.
+function write(field, value, note) {
+  const change = { path: field.path, value, gesture, note };
+  if (sending) waiting = change;
+  else send(change);
+}
+
+async function send({ note, ...set }) {
+  const change = { note, number: null, set };
+  sending = change;
+  change.number = await ask({ set });
+  if (sending !== change) return;
+  if (change.number === null) sending = null; // it was refused, which is told by itself
+  else settle(lastState());
+}
+
+function settle(state) {
+  if (!sending?.number || !state || state.heard < sending.number) return;
+  const { number, note } = sending;
+  const { command, bad, text } = state.notice ?? {};
+  note(command === number && bad ? text : "");
+  const next = waiting;
+  [sending, waiting] = [null, null];
+  if (next) send(next);
+}
+
+function letGo() {
+  held = null;
+  gesture++;
+  if (stale) again();
+  stale = false;
+}
+
+// What is being changed shows what the user wants, and not what the file says yet.
+const isBusy = (path) => path === held || path === sending?.set.path || path === waiting?.path;
+
+// What of an object says which controls it has.
+const form = ({ name, note, gone, groups }) => JSON.stringify([name, note, gone, groups.map((group) => [
+  group.name, group.kind, group.fields.map(({ path, kind, length, choices, fixed, value, required }) => [
+    path, kind, length, choices, fixed, value === undefined, required,
+  ]),
+])]);
+
+function showObject(object) {
+  // Another may have been asked for since.
+  if (asked?.at ? String(object.at) !== String(asked.at) : object.at || object.name !== asked?.name) return;
+  if (object.name) asked = { name: object.name, material: object.material };
+  const next = form(object);
+  if (next === signature) {
+    object.groups.forEach((group, i) => {
+      showLines(element("object-groups").children[i].querySelector("pre"), group, object.file);
+      for (const field of group.fields) if (!isBusy(field.path)) controls.get(field.path)?.(field);
+    });
+    return;
+  }
+  if (held) {
+    stale = true;
+    return;
+  }
+  signature = next;
+  element("object-name").textContent = object.name;
+  element("object-note").textContent = object.gone || object.note || "";
+  controls = new Map();
+  const focused = document.activeElement?.dataset?.control;
+  const closed = new Set([...element("object-groups").children].filter(({ open }) => !open).map(({ dataset }) => dataset.name));
+  element("object-groups").replaceChildren(...object.groups.map((group) => groupOf(group, object.file, closed)));
+  if (focused) document.querySelector(`[data-control="${CSS.escape(focused)}"]`)?.focus();
+}
+
+function groupOf(group, file, closed) {
+  const pre = make("pre", { tabIndex: 0 });
+  showLines(pre, group, file);
+  const summary = make("summary", {}, make("b", { textContent: group.name }), group.kind && group.kind !== group.name ? ` ${group.kind}` : "");
+  const details = make("details", { className: "group", open: !closed.has(group.name) }, summary, pre);
+  details.dataset.name = group.name;
+  const [there, absent] = [group.fields.filter(({ value }) => value !== undefined), group.fields.filter(({ value }) => value === undefined)];
+  details.append(...there.map(fieldOf));
+  if (absent.length) {
+    const more = make("details", { className: "absent" }, make("summary", { textContent: `${absent.length} not in the file` }), ...absent.map(fieldOf));
+    details.append(more);
+  }
+  return details;
+}
+
+function showLines(pre, { line, text, more }, file) {
+  pre.hidden = !line;
+  if (!line) return;
+  const lines = text.split("\n");
+  const width = String(line + lines.length).length;
+  const numbered = lines.map((content, i) => `${String(line + i).padStart(width)}  ${content}`);
+  if (more) numbered.push(`${" ".repeat(width)}  … ${more} more lines`);
+  pre.textContent = numbered.join("\n");
+  pre.setAttribute("aria-label", `${file}, from line ${line}`);
+}
+
+// One value: its name, its controls, and what was wrong with the last change.
+function fieldOf(field) {
+  const error = make("p", { className: "bad", hidden: true });
+  error.setAttribute("role", "alert");
+  const title = make("span", { className: "name", textContent: field.name, title: field.about });
+  const unit = make("small", { textContent: field.unit && field.unit !== "linear" ? field.unit : "" });
+  const head = make("div", { className: "head" }, title, unit);
+  const box = make("div", { className: "field", role: "group" }, head);
+  box.dataset.path = field.path;
+  box.setAttribute("aria-label", field.unit ? `${field.name}, ${field.unit}` : field.name);
+  const note = (text) => {
+    error.textContent = text;
+    error.hidden = !text;
+    box.classList.toggle("invalid", Boolean(text));
+  };
+  let current = field;
+  const change = (value) => write(current, value, note);
+  const made = { number: numberOf, whole: numberOf, color: colorOf, vector: vectorOf, choice: choiceOf, switch: switchOf, text: textOf }[field.kind](field, change);
+  if (field.fixed) {
+    head.append(make("small", { className: "fixed", textContent: field.fixed }));
+    for (const input of made.inputs) input.disabled = true;
+  } else if (field.value === undefined) {
+    head.append(make("small", { textContent: field.default === undefined ? "absent" : "default" }));
+  } else if (!field.required) {
+    const out = make("button", { type: "button", textContent: "default", title: `Takes ${field.name} out of the file` });
+    out.addEventListener("click", () => {
+      change(null);
+      letGo();
+    });
+    head.append(out);
+  }
+  made.inputs.forEach((input, i) => {
+    input.dataset.control = `${field.path} ${i}`;
+    input.addEventListener("pointerdown", () => (held = field.path));
+    input.addEventListener("pointerup", () => setTimeout(() => held === field.path && letGo()));
+    input.addEventListener("change", letGo);
+    input.addEventListener("blur", () => held === field.path && letGo());
+  });
+  box.append(...made.elements, error);
+  controls.set(field.path, (next) => {
+    current = next;
+    made.update(next);
+  });
+  return box;
+}
+
+const valueOf = (field) => field.value ?? field.default;
+const digits = (x, count) => Number(x.toPrecision(count));
+const say = (x) => (x === undefined || x === null ? "" : String(x));
+
+function numberBox(field, label) {
+  const box = make("input", { type: "number", step: field.kind === "whole" ? "1" : "any" });
+  if (field.range) [box.min, box.max] = field.range.map(say);
+  box.setAttribute("aria-label", label);
+  box.inputMode = "decimal";
+  return box;
+}
+
+// A box takes a number when it is left or stepped, unless it is empty or none.
+const onNumber = (box, use) => box.addEventListener("change", () => box.value !== "" && Number.isFinite(box.valueAsNumber) && use(box.valueAsNumber));
+
+function numberOf(field, change) {
+  const box = numberBox(field, field.name);
+  onNumber(box, change);
+  const inputs = [box];
+  let range = null;
+  let slider = field.slider;
+  const place = (x) => (slider.logarithmic ? (STEPS * Math.log(x / slider.from)) / Math.log(slider.to / slider.from) : x);
+  const number = (at) => (slider.logarithmic ? digits(slider.from * (slider.to / slider.from) ** (at / STEPS), 3) : digits(at, 12));
+  if (slider) {
+    range = make("input", { type: "range" });
+    range.setAttribute("aria-label", `${field.name}, slider`);
+    range.addEventListener("input", () => {
+      held = field.path;
+      const rough = number(range.valueAsNumber);
+      const x = field.kind === "whole" ? Math.round(rough) : rough;
+      box.value = say(x);
+      range.setAttribute("aria-valuetext", say(x));
+      change(x);
+    });
+    inputs.unshift(range);
+  }
+  const update = (next) => {
+    const x = valueOf(next);
+    if (document.activeElement !== box) box.value = say(x);
+    if (!range) return;
+    slider = next.slider ?? slider;
+    const [low, high, step] = slider.logarithmic ? [0, STEPS, 1] : [slider.from, slider.to, slider.step];
+    Object.assign(range, { min: say(low), max: say(high), step: say(step), value: say(x === undefined ? low : place(x)) });
+    range.setAttribute("aria-valuetext", say(x));
+  };
+  update(field);
+  return { inputs, elements: [make("div", { className: range ? "pair" : "single" }, ...inputs)], update };
+}
+
+const encode = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
+const decode = (x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4);
+
+// What a display shows of linear light that is divided by its largest component, where that is above 1.
+function hexOf(color) {
+  const most = Math.max(1, ...color);
+  const byte = (x) => Math.round(255 * encode(Math.min(1, Math.max(0, x / most)))).toString(16).padStart(2, "0");
+  return `#${color.map(byte).join("")}`;
+}
+
+function colorOf(field, change) {
+  const picker = make("input", { type: "color", title: "As a display shows it (sRGB)" });
+  picker.setAttribute("aria-label", `${field.name}, as a display shows it (sRGB)`);
+  let now = [0, 0, 0];
+  picker.addEventListener("input", () => {
+    held = field.path;
+    if (picker.value === hexOf(now)) return;
+    const most = Math.max(1, ...now);
+    now = [1, 3, 5].map((at) => digits(decode(parseInt(picker.value.slice(at, at + 2), 16) / 255) * most, 4));
+    parts.show(now);
+    change(now);
+  });
+  const parts = numbersOf(field, ["red", "green", "blue"].map((name) => `${field.name}, linear ${name}`), (list) => {
+    now = list;
+    picker.value = hexOf(now);
+    change(now);
+  });
+  const legend = make("small", { className: "quiet" });
+  const update = (next) => {
+    now = valueOf(next) ?? [0, 0, 0];
+    picker.value = hexOf(now);
+    parts.update(next);
+    const most = Math.max(...now);
+    legend.textContent = most > 1 ? `sRGB of the colour over ${digits(most, 4)}; linear red, green, blue` : "sRGB; linear red, green, blue";
+  };
+  update(field);
+  const elements = [make("div", { className: "color" }, picker, ...parts.inputs), legend];
+  return { inputs: [picker, ...parts.inputs], elements, update };
+}
+
+// Number boxes for a list.
+function numbersOf(field, labels, change) {
+  let now = [];
+  const boxes = labels.map((label) => numberBox(field, label));
+  boxes.forEach((box, i) => onNumber(box, (x) => {
+    now = boxes.map((other, j) => now[j] ?? (Number.isFinite(other.valueAsNumber) ? other.valueAsNumber : 0));
+    now[i] = x;
+    change([...now]);
+  }));
+  const show = (list) => {
+    now = [...list];
+    boxes.forEach((box, i) => {
+      if (document.activeElement !== box) box.value = say(list[i]);
+    });
+  };
+  return { inputs: boxes, show, update: (next) => show(valueOf(next) ?? []) };
+}
+
+function vectorOf(field, change) {
+  const names = field.length <= 4 ? ["x", "y", "z", "w"] : [];
+  const labels = Array.from({ length: field.length }, (_, i) => `${field.name}, ${names[i] ?? i + 1}`);
+  const parts = numbersOf(field, labels, change);
+  parts.update(field);
+  return { inputs: parts.inputs, elements: [make("div", { className: "vector" }, ...parts.inputs)], update: parts.update };
+}
+
+function choiceOf(field, change) {
+  const box = make("select", {}, ...field.choices.map((value) => make("option", { value, textContent: value })));
+  box.setAttribute("aria-label", field.name);
+  if (valueOf(field) === undefined) box.prepend(make("option", { value: "", textContent: "–" }));
+  box.addEventListener("change", () => box.value && change(box.value));
+  const update = (next) => (box.value = valueOf(next) ?? "");
+  update(field);
+  return { inputs: [box], elements: [box], update };
+}
+
+function switchOf(field, change) {
+  const box = make("input", { type: "checkbox" });
+  box.addEventListener("change", () => change(box.checked));
+  const update = (next) => (box.checked = valueOf(next) ?? false);
+  update(field);
+  return { inputs: [box], elements: [make("label", { className: "check" }, box, field.name)], update };
+}
+
+function textOf(field) {
+  const box = make("input", { type: "text", readOnly: true });
+  box.setAttribute("aria-label", field.name);
+  const update = (next) => (box.value = say(valueOf(next)));
+  update(field);
+  return { inputs: [box], elements: [box], update };
+}

@@ -1,0 +1,133 @@
+// Pixels and their values: the one that is pointed at, and those that are pinned, with what they were before.
+
+import { askPixel, element, onFrame, onLink } from "/link.js";
+
+const MOST = 16; // pins
+const HISTORY = 60; // values that a pin keeps
+let asking = false;
+let pins = []; // {pixel, history: [{revision, samples, values}]}
+
+export function setUpProbes(picture, onKey) {
+  picture.pointed = () => read(picture);
+  const pin = () => add(picture.cursor, picture);
+  onKey("n", pin);
+  element("pin").addEventListener("click", pin);
+  onLink(() => (asking = false));
+  onFrame((header) => {
+    read(picture);
+    pins.forEach((pin) => refresh(pin, header));
+  });
+  showPins(picture);
+}
+
+// One question at a time: the next waits for the answer.
+async function read(picture) {
+  const pixel = picture.cursor;
+  element("pin").disabled = !pixel;
+  if (!pixel) {
+    element("swatch").hidden = true;
+    element("values").textContent = "Point at a pixel to read its value";
+    return;
+  }
+  if (asking) return;
+  asking = true;
+  const answer = await askPixel(pixel);
+  asking = false;
+  if (!answer) return;
+  if (String(picture.cursor) !== String(pixel)) return read(picture);
+  show(answer, picture.header);
+}
+
+const bold = (text) => Object.assign(document.createElement("b"), { textContent: text });
+
+function show({ x, y, values }, header) {
+  const parts = [bold("pixel "), `${x} ${y}`];
+  for (const [name, value] of values) parts.push(bold(`   ${nameOf(name, header)} `), value);
+  element("values").replaceChildren(...parts);
+  const shown = values.find(([name]) => name === "shown")?.[1];
+  element("swatch").hidden = !shown;
+  if (shown) element("swatch").style.background = `rgb(${shown})`;
+}
+
+// The two pictures of a comparison have names.
+const nameOf = (name, header) => ({ first: header?.sides?.[0], second: header?.sides?.[1] })[name] ?? name;
+
+function add(pixel, picture) {
+  if (!pixel || pins.length >= MOST || pins.some((pin) => String(pin.pixel) === String(pixel))) return;
+  const pin = { pixel, history: [] };
+  pins.push(pin);
+  element("probes").open = true;
+  showPins(picture);
+  refresh(pin, picture.header);
+}
+
+async function refresh(pin, { revision, samples, view }) {
+  const answer = await askPixel(pin.pixel);
+  if (!answer || !pins.includes(pin)) return;
+  // Of each picture the newest value counts.
+  const entry = { revision, samples, view: JSON.stringify(view), values: answer.values };
+  const last = pin.history.at(-1);
+  if (last && last.revision === revision && last.view === entry.view) pin.history.pop();
+  pin.history.push(entry);
+  pin.history.splice(0, pin.history.length - HISTORY);
+  showPin(pin);
+}
+
+function showPins(picture) {
+  element("probe-count").textContent = pins.length || "";
+  picture.pins = pins.map(({ pixel }) => pixel);
+  element("pins").replaceChildren(...pins.map((pin) => {
+    const item = document.createElement("li");
+    const remove = Object.assign(document.createElement("button"), { type: "button", textContent: "×" });
+    remove.setAttribute("aria-label", `Remove the probe at ${pin.pixel.join(" ")}`);
+    remove.addEventListener("click", () => {
+      pins = pins.filter((other) => other !== pin);
+      showPins(picture);
+    });
+    pin.output = document.createElement("div");
+    item.append(bold(pin.pixel.join(" ")), remove, pin.output);
+    showPin(pin);
+    return item;
+  }));
+}
+
+// The newest values in full, those before in short, newest first, and a curve of their first number.
+function showPin(pin) {
+  const make = (tag, text) => Object.assign(document.createElement(tag), { textContent: text });
+  const newest = pin.history.at(-1);
+  if (!newest || !pin.output) return;
+  const list = document.createElement("dl");
+  for (const [name, value] of newest.values) list.append(make("dt", name), make("dd", value));
+  const parts = [list];
+  const before = pin.history.slice(0, -1).filter(({ view }) => view === newest.view);
+  if (before.length) {
+    const history = document.createElement("details");
+    const rows = before.reverse().map(({ values, samples }) => make("li", `${values[0]?.[1] ?? "–"} (${samples} samples)`));
+    const older = document.createElement("ol");
+    older.append(...rows);
+    history.append(make("summary", `${before.length} before`), older);
+    history.open = pin.open ?? false;
+    history.addEventListener("toggle", () => (pin.open = history.open));
+    parts.push(curve([...before.reverse(), newest]), history);
+  }
+  pin.output.replaceChildren(...parts);
+}
+
+function curve(entries) {
+  const numbers = entries.map(({ values }) => Number.parseFloat(values[0]?.[1])).map((v) => (Number.isFinite(v) ? v : 0));
+  const canvas = Object.assign(document.createElement("canvas"), { width: 280, height: 36 });
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", `The first value over ${numbers.length} pictures, from ${numbers[0]} to ${numbers.at(-1)}`);
+  const context = canvas.getContext("2d");
+  const [low, high] = [Math.min(...numbers), Math.max(...numbers)];
+  context.strokeStyle = getComputedStyle(document.documentElement).getPropertyValue("--accent");
+  context.lineWidth = 2;
+  context.beginPath();
+  numbers.forEach((v, i) => {
+    const x = numbers.length > 1 ? 2 + (276 * i) / (numbers.length - 1) : 140;
+    const y = high > low ? 33 - (30 * (v - low)) / (high - low) : 18;
+    context.lineTo(x, y);
+  });
+  context.stroke();
+  return canvas;
+}

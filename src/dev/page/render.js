@@ -1,0 +1,50 @@
+// How far the picture is: progress, pause, limits, and the picture as a file.
+
+import { ask, element, onFrame, onState } from "/link.js";
+import { viewName } from "/view.js";
+
+export function setUpRender(onKey) {
+  const pause = () => ask({ pause: element("pause").getAttribute("aria-pressed") !== "true" });
+  element("pause").addEventListener("click", pause);
+  onKey(" ", pause);
+  element("restart").addEventListener("click", () => ask("restart"));
+  element("most-samples").addEventListener("change", ({ target }) => {
+    const most = Math.floor(target.valueAsNumber);
+    ask({ samples: most >= 1 ? Math.min(most, 65536) : null });
+  });
+  element("preview").addEventListener("change", ({ target }) => ask({ preview: Number(target.value) }));
+  onState((state, heard) => {
+    if (!heard) return;
+    element("pause").setAttribute("aria-pressed", state.paused);
+    element("pause").textContent = state.paused ? "Go on" : "Pause";
+    const [most, all] = state.samples;
+    const field = element("most-samples");
+    if (document.activeElement !== field) field.value = most ?? "";
+    field.placeholder = all || "all";
+    element("preview").value = state.preview;
+  });
+  onFrame(showProgress);
+}
+
+function showProgress(header) {
+  const { samples, total, speed, view, latency } = header;
+  const counts = ["color", "samples", "compare", "layer"].includes(viewName(view));
+  element("bar").value = !counts ? 1 : total ? samples / total : 0;
+  element("samples").textContent = counts ? `${samples} of ${total}` : "1 ray a pixel";
+  element("speed").textContent = counts && speed ? withPrefix(speed) : "–";
+  if (latency !== null) element("latency").textContent = latency < 1 ? `${Math.round(latency * 1000)} ms` : `${latency.toFixed(2)} s`;
+  const whole = String(header.sent) === String(header.finest) && (!counts || samples > 0);
+  const name = element("scene").textContent.split(/[/\\]/).at(-1).replace(/\.[^.]*$/, "") || "picture";
+  for (const kind of ["png", "exr"]) {
+    const link = element(`save-${kind}`);
+    link.setAttribute("aria-disabled", !whole);
+    link.download = viewName(view) === "color" ? `${name}.${kind}` : `${name}-${viewName(view)}.${kind}`;
+    if (whole) link.href = `/picture.${kind}`;
+    else link.removeAttribute("href");
+  }
+}
+
+function withPrefix(n) {
+  const [divisor, prefix] = n >= 1e9 ? [1e9, " G"] : n >= 1e6 ? [1e6, " M"] : n >= 1e3 ? [1e3, " k"] : [1, ""];
+  return (n / divisor).toPrecision(3) + prefix;
+}

@@ -1,0 +1,156 @@
+//! What the picture is compared with, and how far the two are apart.
+
+use std::sync::Arc;
+
+use super::Painter;
+use crate::dev::messages::Event;
+use crate::dev::picture::{Against, Content, Frame, View};
+use crate::dev::reference::{Apart, Reference};
+use crate::image::Pixels;
+
+/// The pictures to compare with.
+#[derive(Default)]
+pub struct Comparison {
+    /// The last whole one before the last saved change.
+    pub before: Option<Reference>,
+    /// One that was kept or given.
+    pub reference: Option<Reference>,
+    /// The last measure.
+    apart: Option<Apart>,
+    /// Whether a measure is under way.
+    measuring: bool,
+}
+
+impl Comparison {
+    /// Whether there is a picture before the last change, and the reference's name.
+    pub fn comparable(&self) -> (bool, Option<String>) {
+        let name = self.reference.as_ref().map(|reference| reference.name.clone());
+        (self.before.is_some(), name)
+    }
+
+    fn with(&self, against: Against) -> Option<&Reference> {
+        match against {
+            Against::Cpu => None,
+            Against::Before => self.before.as_ref(),
+            Against::Reference => self.reference.as_ref(),
+        }
+    }
+}
+
+impl Painter {
+    /// The picture on the screen, if it is a whole one of light, and has the newest of all changes.
+    fn whole_picture(&self) -> Option<Pixels> {
+        let frame = self.frame_sender.borrow().clone()?;
+        let header = &frame.header;
+        let is_whole = header.sent == header.finest && header.samples > 0 && header.revision == self.revision;
+        match &frame.content {
+            Content::Color(pixels) | Content::Compare(pixels, _) if is_whole => Some(pixels.clone()),
+            _ => None,
+        }
+    }
+
+    /// Files were saved: what is on the screen is the picture before.
+    pub(super) fn keep_before(&mut self) {
+        if let Some(pixels) = self.whole_picture() {
+            self.comparison.before = Some(Reference {
+                name: "before the change".to_string(),
+                pixels: Arc::new(pixels),
+            });
+        }
+    }
+
+    /// Keeps the picture to compare others with.
+    pub(super) fn keep(&mut self) {
+        match self.whole_picture() {
+            Some(pixels) => {
+                self.take_reference(Reference {
+                    name: "kept picture".to_string(),
+                    pixels: Arc::new(pixels),
+                });
+                self.notice(&Ok(()), "the picture is kept to compare others with".to_string());
+            }
+            None => self.notice(
+                &Err("there is no whole picture of light to keep yet".to_string()),
+                String::new(),
+            ),
+        }
+    }
+
+    pub(super) fn take_reference(&mut self, reference: Reference) {
+        self.comparison.reference = Some(reference);
+        self.comparison.apart = None;
+        if self.view == View::Compare(Against::Reference) && self.running.is_some() {
+            self.show();
+        }
+    }
+
+    /// Puts what is compared with beside a picture; the names of both.
+    pub(super) fn beside(&self, content: Content, whole: [u32; 2]) -> (Content, Option<[String; 2]>) {
+        let View::Compare(against) = self.view else {
+            return (content, None);
+        };
+        let picture = "picture".to_string();
+        match (content, self.comparison.with(against)) {
+            (Content::Color(pixels), Some(other)) => match other.at(whole, [pixels.width, pixels.height]) {
+                Some(second) => (Content::Compare(pixels, second), Some([picture, other.name.clone()])),
+                None => (Content::Color(pixels), None),
+            },
+            (content @ Content::Compare(..), _) => (content, Some(["GPU".to_string(), "CPU".to_string()])),
+            (content, _) => (content, None),
+        }
+    }
+
+    /// Measures a finished comparison on a thread of its own: it takes longer than a picture.
+    pub(super) fn measure(&mut self, frame: &Arc<Frame>) {
+        if frame.header.done && !self.comparison.measuring && matches!(frame.content, Content::Compare(..)) {
+            self.comparison.measuring = true;
+            let (frame, events) = (frame.clone(), self.events.clone());
+            let work = move || {
+                if let Content::Compare(first, second) = &frame.content {
+                    let apart = Apart::of(frame.header.number, first, second);
+                    let _ = events.send(Event::Measured(apart)); // after the session's end nobody wants it
+                }
+            };
+            let started = std::thread::Builder::new().name("measure".to_string()).spawn(work);
+            self.comparison.measuring = started.is_ok();
+        }
+    }
+
+    pub(super) fn take_measured(&mut self, apart: Apart) {
+        self.comparison.measuring = false;
+        self.comparison.apart = Some(apart);
+        // Meanwhile there may be another picture.
+        let newest = self.frame_sender.borrow().clone();
+        if let Some(frame) = newest.filter(|frame| frame.header.number != apart.frame) {
+            self.measure(&frame);
+        }
+    }
+
+    /// The measure of what is on the screen.
+    pub(super) fn apart(&self) -> Option<Apart> {
+        self.comparison.apart.filter(|apart| apart.frame == self.frames)
+    }
+
+    /// What keeps the picture that is compared with from being shown, if anything does.
+    pub(super) fn no_comparison(&self) -> Option<String> {
+        let View::Compare(against) = self.view else { return None };
+        let whole = self.running.as_ref()?.canvas.finest_size();
+        let missing = match against {
+            Against::Cpu => return None,
+            Against::Before => "no change has been saved since the camera stands here",
+            Against::Reference => "there is no reference yet: keep a picture, or open a file",
+        };
+        match self.comparison.with(against) {
+            None => Some(missing.to_string()),
+            Some(other) if other.at(whole, [1, 1]).is_none() => {
+                let Pixels { width, height, .. } = *other.pixels;
+                let [w, h] = whole;
+                Some(format!(
+                    "{}: is {width} x {height}; the picture is {w} x {h}",
+                    other.name
+                ))
+            }
+            Some(_) => None,
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Writing into the scene file: the camera, and values that are set on the page. What is written is checked first, and can be
+//! taken back.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, PoisonError};
+use std::time::Instant;
+
+use super::Painter;
+use crate::dev::edit::edited;
+use crate::dev::history::Step;
+use crate::dev::messages::{Report, Set};
+use crate::dev::object::{Seen, object_of};
+use crate::dev::save::{replace, with_camera};
+use crate::dev::source::{Loaded, Stamp};
+use crate::scene::{Draft, KeyPath, Segment, folder_of, is_course, is_gltf, read_text};
+
+impl Painter {
+    /// Writes a value into the scene file.
+    pub(super) fn set(&mut self, set: &Set) {
+        let result = self.try_set(set);
+        if result.is_err() {
+            self.notice(&result, String::new()); // what is written is seen
+        }
+        // A slider that is drawn writes many times, and the terminal is told of none but what goes wrong.
+        if result.is_err() || set.gesture.is_none() {
+            (self.report)(Report::Wrote(set.path.clone(), result));
+        }
+    }
+
+    fn try_set(&mut self, set: &Set) -> Result<(), String> {
+        let path: KeyPath = set.path.parse().map_err(|problem| format!("{problem}"))?;
+        let (file, before) = self.scene_file("a value")?;
+        let loaded = self.read_again(&before)?;
+        let seen = Seen {
+            camera: self.packed_camera(&loaded),
+            loaded: Arc::clone(&loaded),
+            sources: self.sources.clone(),
+        };
+        let (Some(object), Some(field)) = (object_of(&path), seen.field(&path)) else {
+            return Err(format!("{path}: is nothing that can be changed"));
+        };
+        let value = match (&set.value, &field.fixed) {
+            (_, Some(why)) => Err(why.clone()),
+            (serde_json::Value::Null, None) if field.required => Err("must be there".to_owned()),
+            (serde_json::Value::Null, None) => Ok(None),
+            (given, None) => field.value_of(given, &seen.names()).map(Some),
+        };
+        let value = value.map_err(|why| format!("{path}: {why}"))?;
+        let origin = self.sources.scene.display();
+        let after = edited(&before, &path, value.as_ref()).map_err(|why| format!("{origin}: {why}"))?;
+        let step = Step::new(path.to_string(), object, set.gesture);
+        self.write(&file, (&loaded, &before), after, step)
+    }
+
+    /// Writes the camera that is looked through into the scene file.
+    pub(super) fn save_camera(&mut self) {
+        let result = self.try_save_camera();
+        self.notice(&result, format!("camera saved into {}", self.sources.scene.display()));
+        (self.report)(Report::Wrote("camera".to_owned(), result));
+    }
+
+    fn try_save_camera(&mut self) -> Result<(), String> {
+        let (file, before) = self.scene_file("a camera")?;
+        let loaded = self.read_again(&before)?;
+        let camera = self.camera.as_ref().unwrap_or(&loaded.camera);
+        let after = with_camera(&before, &self.sources.scene.display().to_string(), camera)?;
+        let at = KeyPath(vec![Segment::from("camera")]);
+        let mut step = Step::new("camera".to_owned(), at, None);
+        step.is_camera = true;
+        self.write(&file, (&loaded, &before), after, step)
+    }
+
+    /// Takes back what was written last, or makes it again.
+    pub(super) fn turn(&mut self, again: bool) {
+        let Some(what) = self.history.last(again).map(|step| step.what.clone()) else {
+            return;
+        };
+        let result = self.try_turn(again);
+        let done = if again { "written again" } else { "taken back" };
+        self.notice(&result, format!("{what}: {done}"));
+        (self.report)(Report::Turned(format!("{done}: {what}"), result));
+    }
+
+    fn try_turn(&mut self, again: bool) -> Result<(), String> {
+        let (file, before) = self.scene_file("a value")?;
+        let place = self.sources.scene.display().to_string();
+        let others = || format!("{place}: has been changed since by somebody else, and stays as it is");
+        let loaded = self
+            .loaded
+            .clone()
+            .filter(|loaded| loaded.text == before)
+            .ok_or_else(others)?;
+        let after = self.history.turned(&before, again).ok_or_else(others)?;
+        let step = self.history.last(again).ok_or_else(others)?;
+        let (at, keeps_view) = (step.at.clone(), step.is_camera && !again);
+        let read = self.read_change(&loaded, &at, after)?;
+        self.replace(&file, &read)?;
+        self.history.turn(again);
+        // What a save has written was on screen, and stays there.
+        let view = keeps_view.then(|| self.camera.clone().unwrap_or(loaded.camera.clone()));
+        let shown_otherwise = self.take_written(read);
+        if let (Some(view), Some(loaded)) = (view, &self.loaded) {
+            self.camera = (view != loaded.camera).then_some(view);
+        }
+        self.show_files(Instant::now(), shown_otherwise);
+        Ok(())
+    }
+
+    /// The scene file behind its links, and its text.
+    fn scene_file(&self, what: &str) -> Result<(PathBuf, String), String> {
+        let scene = &self.sources.scene;
+        let place = scene.display();
+        let kind = match scene {
+            scene if is_gltf(scene) => Some("glTF"),
+            scene if is_course(scene) => Some("JSON"),
+            _ => None,
+        };
+        if let Some(kind) = kind {
+            let rule = format!("must be TOML for {what} to be saved into it");
+            return Err(format!(
+                "{place}: {rule}; it is {kind}, and wgray convert makes a scene of it"
+            ));
+        }
+        let file = fs::canonicalize(scene).map_err(|error| format!("{place}: {error}"))?;
+        let text = read_text(scene).map_err(|error| error.to_string())?;
+        Ok((file, text))
+    }
+
+    /// The scene of a text: that which is known, if nobody has changed the file since.
+    fn read_again(&self, text: &str) -> Result<Arc<Loaded>, String> {
+        if let Some(loaded) = self.loaded.as_ref().filter(|loaded| loaded.text == text) {
+            return Ok(Arc::clone(loaded));
+        }
+        let origin = self.sources.scene.display().to_string();
+        let folder = folder_of(&self.sources.scene);
+        let read = Draft::read(text, &origin, folder, &self.sources.overrides);
+        let read = read.and_then(|draft| draft.check(&mut BTreeSet::new()));
+        let (scene, description) = read.map_err(|error| format!("mend the file first: {error}"))?;
+        Ok(Arc::new(Loaded::new(text.to_owned(), scene, description)))
+    }
+
+    /// The scene of a text that differs from a known one inside of one table.
+    fn read_change(&self, known: &Loaded, at: &KeyPath, text: String) -> Result<Arc<Loaded>, String> {
+        let origin = self.sources.scene.display().to_string();
+        let folder = folder_of(&self.sources.scene);
+        let known = (&known.description, at);
+        let read = Draft::change(&text, &origin, folder, &self.sources.overrides, known);
+        let read = read.and_then(|draft| draft.check(&mut BTreeSet::new()));
+        let (scene, description) = read.map_err(|error| error.to_string())?;
+        Ok(Arc::new(Loaded::new(text, scene, description)))
+    }
+
+    /// Writes a text that is a scene, and shows it.
+    fn write(
+        &mut self,
+        file: &Path,
+        (known, before): (&Loaded, &str),
+        after: String,
+        step: Step,
+    ) -> Result<(), String> {
+        if after == before {
+            return Ok(());
+        }
+        let read = self.read_change(known, &step.at, after)?;
+        self.replace(file, &read)?;
+        if self.loaded.as_ref().is_none_or(|loaded| loaded.text != before) {
+            self.history.forget();
+        }
+        self.history.add(step, before, &read.text);
+        let shown_otherwise = self.take_written(read);
+        self.show_files(Instant::now(), shown_otherwise);
+        Ok(())
+    }
+
+    fn replace(&self, file: &Path, read: &Loaded) -> Result<(), String> {
+        let place = self.sources.scene.display();
+        replace(file, read.text.as_bytes()).map_err(|error| format!("{place}: cannot be written: {error}"))
+    }
+
+    /// Takes a scene that this session has written, so that its file need not be read again.
+    fn take_written(&mut self, read: Arc<Loaded>) -> bool {
+        if let Some((_, stamp)) = self.files.first_mut() {
+            *stamp = Stamp::Content(read.text.clone().into_bytes());
+        }
+        {
+            let mut writes = self.writes.lock().unwrap_or_else(PoisonError::into_inner);
+            writes.count += 1;
+            writes.known = (!self.files.is_empty()).then(|| (Arc::clone(&read), self.files.clone()));
+        }
+        self.take_scene(Ok(read))
+    }
+}

@@ -1,0 +1,264 @@
+//! Values that are set on the page: written into the scene file, shown at once, taken back, or refused.
+
+use std::fs;
+
+use serde_json::{Value, json};
+use wgray::dev::{Command, Move, Set, Sources};
+use wgray::scene::Overrides;
+
+use super::running::{Files, Running, SCENE, SETTLED};
+
+/// Sets a value, and waits until that was followed.
+#[track_caller]
+fn set(running: &Running, path: &str, value: Value, gesture: Option<u64>) {
+    let path = path.to_owned();
+    follow(running, Command::Set(Set { path, value, gesture }));
+}
+
+#[track_caller]
+fn follow(running: &Running, command: Command) {
+    let heard = running.state().heard;
+    running.session.send(command);
+    running.wait("the command to be followed", |running| {
+        (running.state().heard > heard).then_some(())
+    });
+}
+
+/// What was said against the last command.
+#[track_caller]
+fn refused(running: &Running) -> String {
+    let state = running.state();
+    let notice = state.notice.clone().unwrap();
+    assert!(notice.bad && notice.command == state.heard, "{notice:?}");
+    notice.text
+}
+
+#[test]
+fn a_value_that_is_set_is_written_and_shown() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let before = running.colors();
+    set(&running, "materials.red.color", json!([0.1, 0.75, 0.1]), None);
+    assert_eq!(
+        files.read("scene.toml"),
+        SCENE.replace("[0.8, 0.1, 0.1]", "[0.1, 0.75, 0.1]")
+    );
+    running.wait_rendered(&files);
+    assert_ne!(running.colors(), before);
+    assert_eq!(running.state().undo.as_deref(), Some("materials.red.color"));
+    // Keys that are absent are added, and go again; what the file has is not written again.
+    set(&running, "shapes[0].radius", json!(0.5), None);
+    assert_eq!(running.state().undo.as_deref(), Some("materials.red.color"));
+    set(&running, "render.seed", json!(3), None);
+    assert!(files.read("scene.toml").contains("count = 4 }\nseed = 3\n\n[materials"));
+    set(&running, "render.seed", Value::Null, None);
+    assert!(!files.read("scene.toml").contains("seed"));
+    // Another kernel, by a value that is one of some names.
+    set(&running, "render.pixel_samples.pattern", json!("random"), None);
+    running.wait_rendered(&files);
+    // The page hears of every scene, and the watcher of none that was written here.
+    let scenes = running.state().scenes;
+    std::thread::sleep(SETTLED);
+    assert_eq!(running.state().scenes, scenes);
+    files.edit("scene.toml", "fov = 40", "fov = 44");
+    running.wait("the edited scene", |running| {
+        (running.state().scenes > scenes).then_some(())
+    });
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn what_was_written_is_taken_back_and_written_again() {
+    let files = Files::new(&SCENE.replace('\n', "\r\n"));
+    let start = files.read("scene.toml");
+    let running = files.start();
+    running.wait_rendered(&files);
+    let mut texts = vec![start.clone()];
+    for (path, value) in [
+        ("shapes[0].radius", json!(0.25)),
+        ("camera.fov", json!(50)),
+        ("lights[0].visible", json!(false)),
+    ] {
+        set(&running, path, value, None);
+        texts.push(files.read("scene.toml"));
+    }
+    // A slider that is drawn is one step.
+    for i in 1..=20 {
+        set(&running, "materials.red.shininess", json!(16 + i), Some(7));
+    }
+    assert_eq!(running.state().undo.as_deref(), Some("materials.red.shininess"));
+    let last = files.read("scene.toml");
+    assert!(last.contains("shininess = 36\r\n"), "{last}");
+    // The camera's save is a step too, and the view stays when it is taken back.
+    follow(&running, Command::Move(Move::Orbit(0.3, 0.1)));
+    follow(&running, Command::SaveCamera);
+    assert_eq!(running.state().undo.as_deref(), Some("camera"));
+    follow(&running, Command::UndoWrite);
+    assert!(running.state().camera_moved);
+    assert_eq!(files.read("scene.toml"), last);
+    for text in texts.iter().rev() {
+        follow(&running, Command::UndoWrite);
+        assert_eq!(files.read("scene.toml"), *text);
+    }
+    let state = running.state();
+    assert_eq!(
+        (state.undo.as_deref(), state.redo.as_deref()),
+        (None, Some("shapes[0].radius"))
+    );
+    follow(&running, Command::UndoWrite); // there is nothing
+    assert_eq!(files.read("scene.toml"), start);
+    for text in &texts[1..] {
+        follow(&running, Command::RedoWrite);
+        assert_eq!(files.read("scene.toml"), *text);
+    }
+    follow(&running, Command::RedoWrite);
+    assert_eq!(files.read("scene.toml"), last);
+    follow(&running, Command::ResetCamera);
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn a_value_that_breaks_a_rule_is_refused_and_the_file_stays() {
+    let files = Files::new(SCENE);
+    fs::write(files.path("other.png"), "").unwrap();
+    let running = files.start();
+    running.wait_rendered(&files);
+    for (path, value, told) in [
+        (
+            "shapes[0].radius",
+            json!(-1),
+            "shapes[0].radius: -1 must be finite and greater than 0",
+        ),
+        ("shapes[0].radius", json!("large"), "\"large\" must be a number"),
+        ("shapes[0].radius", Value::Null, "must be there"),
+        ("shapes[1].normal", json!([1, 0, 0]), "must not be parallel"),
+        ("shapes[1].normal", json!([1, 0]), "must be a list of 3 numbers"),
+        (
+            "shapes[0].material",
+            json!("blue"),
+            "must be one of the names that it may have",
+        ),
+        ("render.pixel_samples.count", json!(5), "must be a square number"),
+        ("render.pixel_samples.count", json!(2.5), "must be a whole number"),
+        ("image.width", json!(70_000), "must be from 1 to 65536"),
+        ("shapes[0].type", json!("disk"), "is nothing that can be changed"),
+        (
+            "textures.new.file",
+            json!("other.png"),
+            "is nothing that can be changed",
+        ),
+        ("shapes[9].radius", json!(1), "is nothing that can be changed"),
+        ("shapes", json!([]), "is nothing that can be changed"),
+        ("shapes[0]", json!({}), "is nothing that can be changed"),
+        ("shapes[0", json!(1), "must be"),
+        ("", json!(1), "must be"),
+    ] {
+        set(&running, path, value, None);
+        let said = refused(&running);
+        assert!(said.contains(told), "{path}: {said}");
+        assert_eq!(files.read("scene.toml"), SCENE, "{path}");
+    }
+    assert_eq!(running.state().undo, None);
+    // A file that is broken is mended by hand.
+    files.edit("scene.toml", "radius = 0.5", "radius = ");
+    let broken = files.read("scene.toml");
+    set(&running, "camera.fov", json!(50), None);
+    assert!(refused(&running).starts_with("mend the file first: "));
+    assert_eq!(files.read("scene.toml"), broken);
+    files.write("scene.toml", SCENE);
+    set(&running, "camera.fov", json!(50), None);
+    assert_eq!(files.read("scene.toml"), SCENE.replace("fov = 40", "fov = 50"));
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn what_somebody_else_has_changed_is_not_taken_back() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    set(&running, "camera.fov", json!(50), None);
+    files.edit("scene.toml", "# a small scene", "# another scene");
+    let theirs = files.read("scene.toml");
+    running.session.send(Command::UndoWrite); // noticed or not
+    running.wait("nothing to be taken back", |running| {
+        running.state().undo.is_none().then_some(())
+    });
+    assert_eq!(files.read("scene.toml"), theirs);
+    // What they wrote is the ground of the next change.
+    set(&running, "camera.fov", json!(55), None);
+    assert_eq!(files.read("scene.toml"), theirs.replace("fov = 50", "fov = 55"));
+    follow(&running, Command::UndoWrite);
+    assert_eq!(files.read("scene.toml"), theirs);
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn what_an_option_stands_in_for_stays() {
+    let files = Files::new(SCENE);
+    let sources = Sources {
+        overrides: Overrides {
+            size: Some((32, 24)),
+            define: vec!["shapes[0].radius=0.75".parse().unwrap()],
+            ..Overrides::default()
+        },
+        ..files.sources()
+    };
+    let running = Running::start(sources, None);
+    running.wait_done(0);
+    for (path, value, told) in [
+        (
+            "shapes[0].radius",
+            json!(0.25),
+            "shapes[0].radius: --define shapes[0].radius=0.75 stands in for what the file says",
+        ),
+        (
+            "image.width",
+            json!(20),
+            "image.width: --size stands in for what the file says",
+        ),
+    ] {
+        set(&running, path, value, None);
+        assert_eq!(refused(&running), told);
+        assert_eq!(files.read("scene.toml"), SCENE);
+    }
+    // Beside it values are set, and the defined one stays.
+    let revision = running.revision();
+    set(&running, "shapes[0].center", json!([0, 0, 0.75]), None);
+    running.wait_done(revision);
+    assert_eq!(
+        files.read("scene.toml"),
+        SCENE.replace("[0, 0, 0.5]\nradius", "[0, 0, 0.75]\nradius")
+    );
+    let seen = running.session.seen.borrow().clone().unwrap();
+    let field = seen.object("shapes[0]", None).groups[0]
+        .fields
+        .iter()
+        .find(|field| field.name == "radius")
+        .cloned()
+        .unwrap();
+    assert!(field.fixed.is_some() && field.value == Some(json!(0.5)));
+}
+
+#[test]
+fn a_link_stays_one_and_the_file_keeps_its_permissions() {
+    let files = Files::new(SCENE);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        fs::set_permissions(files.path("scene.toml"), fs::Permissions::from_mode(0o640)).unwrap();
+        std::os::unix::fs::symlink("scene.toml", files.path("link.toml")).unwrap();
+        let sources = Sources {
+            scene: files.path("link.toml"),
+            ..files.sources()
+        };
+        let running = Running::start(sources, None);
+        running.wait_rendered(&files);
+        set(&running, "camera.fov", json!(50), None);
+        assert!(fs::symlink_metadata(files.path("link.toml")).unwrap().is_symlink());
+        assert_eq!(files.read("scene.toml"), SCENE.replace("fov = 40", "fov = 50"));
+        let mode = fs::metadata(files.path("scene.toml")).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o640);
+        running.wait_rendered(&files);
+    }
+}

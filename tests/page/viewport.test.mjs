@@ -1,0 +1,393 @@
+// The page as a viewport: moving, seeing, comparing, working, for everybody.
+
+import assert from "node:assert/strict";
+import fs from "node:fs";
+import { after, afterEach, before, beforeEach, test } from "node:test";
+
+import { Studio, decoded, finished, launch, open, revision, settled, shown } from "./studio.mjs";
+
+let browser;
+let studio;
+
+before(async () => (browser = await launch()));
+after(() => browser.close());
+beforeEach(async () => {
+  studio = new Studio();
+  await studio.start();
+});
+afterEach(async () => {
+  await Promise.all(browser.contexts().map((context) => context.close()));
+  await studio.remove();
+});
+
+const text = (page, selector) => page.locator(selector).innerText();
+const canvas = (page, part = "picture") => page.locator(`[data-part=${part}] canvas`);
+const camera = (page) => text(page, "#camera-text");
+
+// A point of the picture, 0 to 1 along each side, in the window.
+async function at(page, x, y, part = "picture") {
+  const box = await canvas(page, part).boundingBox();
+  const { left, top, scale } = await canvas(page, part).evaluate((canvas) => ({ ...canvas.dataset }));
+  return [box.x + Number(left) + 120 * x * Number(scale), box.y + Number(top) + 90 * y * Number(scale)];
+}
+
+// Waits until the camera's text is another.
+const moved = (page, last) =>
+  page.waitForFunction((last) => document.getElementById("camera-text").innerText !== last, last).then(() => settled(page)).then(() => camera(page));
+
+async function dragged(page, button = "left", dx = 60) {
+  const [x, y] = await at(page, 0.5, 0.5);
+  await page.mouse.move(x, y);
+  await page.mouse.down({ button });
+  await page.mouse.move(x + dx, y + 10, { steps: 3 });
+  await page.mouse.up({ button });
+}
+
+test("the wheel dollies, the middle button pans, the right one is the browser's", async () => {
+  const page = await open(browser, studio);
+  const start = await camera(page);
+  const [x, y] = await at(page, 0.5, 0.5);
+  await page.mouse.move(x, y);
+  await page.mouse.wheel(0, -300);
+  const near = await moved(page, start);
+  const distance = (text) => Math.hypot(...["position", "look_at"].map((key) => new RegExp(`${key} = \\[(.*)\\]`).exec(text)[1].split(",").map(Number)).reduce((a, b) => a.map((v, i) => v - b[i])));
+  assert.ok(Math.abs(distance(near) / distance(start) - Math.exp(-0.3)) < 1e-3, near);
+  await dragged(page, "middle");
+  const panned = await moved(page, near);
+  assert.ok(Math.abs(distance(panned) - distance(near)) < 1e-3, "a pan keeps the distance");
+  const menu = page.evaluate(() => new Promise((resolve) => document.addEventListener("contextmenu", (event) => resolve(event.defaultPrevented), { once: true })));
+  await dragged(page, "right");
+  assert.equal(await menu, false, "its own menu comes");
+  await settled(page);
+  assert.equal(await camera(page), panned, "the right button moves nothing");
+});
+
+test("steps of the camera are taken back and made again", async () => {
+  const page = await open(browser, studio);
+  const start = await camera(page);
+  assert.ok(await page.locator("#back").isDisabled());
+  await dragged(page);
+  const first = await moved(page, start);
+  await dragged(page, "left", -90);
+  const second = await moved(page, first);
+  await canvas(page).focus();
+  await page.keyboard.press("z");
+  assert.equal(await moved(page, second), first, "a drag is one step");
+  await page.keyboard.press("z");
+  assert.equal(await moved(page, first), start);
+  assert.ok(await page.locator("#back").isDisabled());
+  await page.keyboard.press("Shift+Z");
+  assert.equal(await moved(page, start), first);
+  await page.click("#forth");
+  assert.equal(await moved(page, first), second);
+  await page.keyboard.press("r");
+  assert.equal(await moved(page, second), start);
+  await page.click("#back");
+  assert.equal(await moved(page, start), second, "a reset is a step too");
+});
+
+test("one flies by keys, and looks around by dragging", async () => {
+  const page = await open(browser, studio);
+  const start = await camera(page);
+  const point = (text, key) => new RegExp(`${key} = \\[(.*)\\]`).exec(text)[1].split(",").map(Number);
+  await canvas(page).focus();
+  await page.keyboard.press("v");
+  assert.ok(await page.locator("input[value=fly]").isChecked());
+  await page.keyboard.down("w");
+  await page.waitForFunction((last) => document.getElementById("camera-text").innerText !== last, start);
+  await page.keyboard.up("w");
+  await settled(page);
+  const there = await camera(page);
+  assert.ok(point(there, "position")[1] > point(start, "position")[1], "forwards");
+  await dragged(page);
+  const looked = await moved(page, there);
+  assert.deepEqual(point(looked, "position"), point(there, "position"));
+  await page.keyboard.press("Escape");
+  assert.ok(await page.locator("input[value=orbit]").isChecked());
+});
+
+test("the object under the pointer is framed, then all", async () => {
+  const page = await open(browser, studio);
+  const start = await camera(page);
+  await canvas(page).focus();
+  const [x, y] = await at(page, 0.5, 0.5); // the sphere
+  await page.mouse.move(x, y);
+  await page.locator("#values", { hasText: "linear RGB" }).waitFor();
+  await page.keyboard.press("f");
+  const framed = await moved(page, start);
+  assert.match(framed, /look_at = \[0, 0, 0\.5\]/);
+  await page.keyboard.press("PageDown");
+  const away = await moved(page, framed);
+  await page.click("#frame-all"); // a plane has no end: the sphere is all
+  assert.equal(await moved(page, away), framed);
+});
+
+test("bookmarks are kept in the browser, and gone to", async () => {
+  const page = await open(browser, studio);
+  await dragged(page);
+  await page.locator("#reset:enabled").waitFor();
+  await settled(page);
+  const marked = await camera(page);
+  await page.click("#bookmark");
+  await page.click("#reset");
+  await moved(page, marked);
+  await page.reload();
+  await finished(page);
+  const start = await camera(page);
+  await page.getByRole("button", { name: "view 1", exact: true }).click();
+  assert.equal(await moved(page, start), marked);
+  await page.getByRole("button", { name: "Delete view 1" }).click();
+  assert.equal(await page.locator("#bookmarks li").count(), 0);
+});
+
+test("two fingers pan and dolly, a tap reads a pixel", async () => {
+  const page = await open(browser, studio, { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
+  const start = await camera(page);
+  const [x, y] = await at(page, 0.5, 0.5);
+  await page.touchscreen.tap(x, y);
+  await page.locator("#values", { hasText: /pixel \d+ \d+ .*linear RGB/ }).waitFor();
+  assert.equal(await camera(page), start, "a tap moves nothing");
+  const client = await page.context().newCDPSession(page);
+  const touch = (type, apart) => client.send("Input.dispatchTouchEvent", {
+    type, touchPoints: type === "touchEnd" ? [] : [{ x: x - apart, y, id: 1 }, { x: x + apart, y, id: 2 }],
+  });
+  await touch("touchStart", 30);
+  for (const apart of [36, 42, 50, 60]) await touch("touchMove", apart);
+  await touch("touchEnd");
+  const near = await moved(page, start);
+  const height = (text) => Number(/position = \[[^,]*, ([^,]*)/.exec(text)[1]);
+  assert.ok(Math.abs(height(near)) < 0.7 * Math.abs(height(start)), near);
+  // Whatever is touched has room for a finger, and the picture stays where it is.
+  const small = await page.evaluate(() => [...document.querySelectorAll("aside button, aside select, aside summary, aside input[type=number], #toolbar span, #zooming button")]
+    .filter((control) => control.checkVisibility()).map((control) => [control.id || control.textContent, control.getBoundingClientRect()])
+    .filter(([, box]) => box.height < 44 || box.width < 44).map(([name, box]) => `${name}: ${box.width} x ${box.height}`));
+  assert.deepEqual(small, []);
+  await page.evaluate(() => scrollTo(0, document.scrollingElement.scrollHeight));
+  const box = await canvas(page).boundingBox();
+  assert.ok(box.y >= 0 && box.y + box.height < 844, "the picture stays while the controls scroll");
+});
+
+test("exposure, transform and false colours change what is shown, not what it is", async () => {
+  const page = await open(browser, studio);
+  const [x, y] = await at(page, 0.5, 0.4);
+  await page.mouse.move(x, y);
+  await page.locator("#values", { hasText: "linear RGB" }).waitFor();
+  const linear = async () => /linear RGB (.*?)   shown/.exec(await text(page, "#values"))[1];
+  const value = await linear();
+  const bits = /bits ([0-9a-f]{8})  ([0-9a-f]{8})  ([0-9a-f]{8})/.exec(value).slice(1);
+  const floats = new Float32Array(new Uint32Array(bits.map((b) => parseInt(b, 16))).buffer);
+  assert.deepEqual([...floats].map((v) => Math.fround(v)), value.split("   bits")[0].split("  ").map((v) => Math.fround(Number(v))));
+  const seen = [String(await shown(page))];
+  const look = async (act) => {
+    await act();
+    await settled(page);
+    seen.push(String(await shown(page)));
+  };
+  assert.ok(await page.locator("#as-scene").isDisabled());
+  await look(() => page.fill("#exposure-number", "1.5"));
+  // It is what a render by this exposure is.
+  studio.edit("scene.toml", "height = 90", "height = 90\nexposure = 1.5");
+  assert.equal(seen[1], String(await decoded(page, studio.render())));
+  await settled(page);
+  await look(() => page.selectOption("#transform", "agx"));
+  await look(() => page.check("#false-color"));
+  assert.ok(await page.locator("#legend").isVisible());
+  assert.equal(new Set(seen).size, 4, "all differ");
+  await page.click("#zoom-fit");
+  await page.mouse.move(x, y);
+  await page.locator("#values", { hasText: "linear RGB" }).waitFor();
+  assert.equal(await linear(), value);
+  await look(() => page.click("#as-scene"));
+  assert.equal(seen[4], seen[1], "the scene has this exposure by now");
+  assert.match(await text(page, "#histogram-text"), /light from 2\^-\d+ to 2\^-?\d+; [\d.]+ % above white/);
+  assert.deepEqual(page.faults, []);
+});
+
+test("a pinned pixel keeps what it was", async () => {
+  const page = await open(browser, studio);
+  const [x, y] = await at(page, 0.5, 0.5);
+  await canvas(page).focus();
+  await page.mouse.move(x, y);
+  await page.locator("#values", { hasText: "linear RGB" }).waitFor();
+  await page.keyboard.press("n");
+  await page.locator("#pins dd").first().waitFor();
+  const value = (await page.locator("#pins dd").first().innerText()).trim();
+  studio.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.1, 0.8");
+  await page.locator("#pins details").waitFor();
+  await settled(page);
+  await page.locator("#pins details summary", { hasText: /^1 before$/ }).click();
+  assert.ok((await page.locator("#pins ol li").first().innerText()).startsWith(value));
+  assert.notEqual((await page.locator("#pins dd").first().innerText()).trim(), value);
+  await page.getByRole("button", { name: /^Remove the probe/ }).click();
+  assert.equal(await page.locator("#pins li").count(), 0);
+});
+
+test("the picture is compared with what it was, with a kept one and with files", async () => {
+  const page = await open(browser, studio);
+  const seen = await shown(page);
+  await page.keyboard.press("7");
+  await page.getByLabel("Before the edit").check();
+  await page.locator("#badge", { hasText: "no change has been saved" }).waitFor();
+  studio.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.1, 0.8");
+  await page.locator("#differing", { hasText: /^[\d,]+ pixels differ, by/ }).waitFor();
+  await settled(page);
+  assert.deepEqual(await shown(page, "second"), seen, "the second is the picture before");
+  await page.locator("#rmse", { hasText: /^0\.\d+$/ }).waitFor();
+  await page.locator("#flip", { hasText: /^0\.\d+$/ }).waitFor();
+  // In one place: by halves, or one after the other.
+  await page.getByLabel("Wipe").check();
+  assert.ok(await canvas(page, "second").isHidden());
+  const wiped = await shown(page, "first");
+  await page.locator("#wipe").fill("1");
+  const whole = await shown(page, "first");
+  assert.notDeepEqual(wiped, whole);
+  await page.locator("#wipe").fill("0");
+  assert.deepEqual(await shown(page, "first"), seen, "all of it is the second");
+  await page.getByLabel("Flicker", { exact: true }).first().check();
+  await page.selectOption("#pace", "0");
+  assert.deepEqual(await shown(page, "first"), whole);
+  await page.keyboard.press("x");
+  assert.deepEqual(await shown(page, "first"), seen);
+  await page.keyboard.press("x");
+  // A file: as a render makes it of the scene as it is, all values are the same in an EXR.
+  await page.getByLabel("Side by side").check();
+  const exr = studio.path("reference.exr");
+  studio.renderTo(exr);
+  await page.setInputFiles("#reference-file", exr);
+  await page.locator("#differing", { hasText: "all bits are the same" }).waitFor();
+  await page.locator("#rmse", { hasText: /^0$/ }).waitFor();
+  assert.equal(await text(page, "#reference-name"), "reference.exr");
+  const png = studio.path("reference.png");
+  studio.renderTo(png);
+  await page.setInputFiles("#reference-file", png);
+  await page.locator("#reference-name", { hasText: "reference.png" }).waitFor();
+  await settled(page);
+  assert.deepEqual(await shown(page, "second"), await shown(page, "first"), "of a PNG the same bytes are shown");
+  // What is no picture, or of another size, is told.
+  await page.setInputFiles("#reference-file", studio.path("scene.toml"));
+  await page.locator("#notice.bad", { hasText: "scene.toml" }).waitFor();
+  studio.renderTo(png, ["--size", "60x45"]);
+  await page.setInputFiles("#reference-file", png);
+  await page.locator("#badge", { hasText: "is 60 x 45; the picture is 120 x 90" }).waitFor();
+  await page.keyboard.press("1");
+  await settled(page);
+  await page.keyboard.press("t");
+  await page.locator("#reference-name", { hasText: "kept picture" }).waitFor();
+  assert.deepEqual(page.faults.filter((fault) => !fault.includes("422")), []);
+});
+
+test("rendering pauses, is limited, made smaller, and saved as files", async () => {
+  studio.edit("scene.toml", "count = 4 }\nlight", "count = 64 }\nlight");
+  const page = await open(browser, studio);
+  await page.fill("#most-samples", "5");
+  await page.press("#most-samples", "Enter");
+  await settled(page);
+  await page.locator("#samples", { hasText: /^5 of 5$/ }).waitFor();
+  await page.fill("#most-samples", "");
+  await page.press("#most-samples", "Enter");
+  await page.locator("#samples", { hasText: /^64 of 64$/ }).waitFor();
+  await page.selectOption("#preview", "4");
+  await page.waitForFunction(() => document.getElementById("panels").dataset.sent === "30x23");
+  await settled(page);
+  assert.equal(await text(page, "#smaller"), "30 × 23");
+  await page.selectOption("#preview", "1");
+  await page.waitForFunction(() => document.getElementById("panels").dataset.sent === "120x90");
+  await settled(page);
+  const old = await revision(page);
+  await page.click("#restart");
+  await finished(page, old);
+  // What is saved is what is rendered.
+  for (const kind of ["png", "exr"]) {
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click(`#save-${kind}`)]);
+    assert.equal(download.suggestedFilename(), `scene.${kind}`);
+    const [saved, rendered] = [studio.path(`saved.${kind}`), studio.path(`rendered.${kind}`)];
+    await download.saveAs(saved);
+    studio.renderTo(rendered);
+    studio.diff(saved, rendered);
+  }
+  assert.throws(() => {
+    studio.renderTo(studio.path("other.png"), ["--light-samples", "1"]);
+    studio.diff(studio.path("saved.png"), studio.path("other.png"));
+  }, "the comparison can fail");
+  await page.click("#pause");
+  await page.locator("#badge", { hasText: "paused" }).waitFor();
+  const before = await revision(page);
+  await canvas(page).focus();
+  await page.keyboard.press("ArrowLeft");
+  await page.waitForFunction((before) => Number(document.getElementById("panels").dataset.revision) > before, before);
+  await settled(page); // nothing more comes of it
+  assert.ok(fs.existsSync(studio.path("saved.png")));
+  await page.keyboard.press("Space");
+  await page.locator("#samples", { hasText: /^64 of 64$/ }).waitFor();
+});
+
+// The contrast of a colour against another, as WCAG 2.1 defines it.
+const CONTRASTS = () => {
+  const context = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
+  const over = (colors) => {
+    context.clearRect(0, 0, 1, 1);
+    for (const color of colors) {
+      context.fillStyle = color;
+      context.fillRect(0, 0, 1, 1);
+    }
+    return [...context.getImageData(0, 0, 1, 1).data.slice(0, 3)];
+  };
+  const light = (rgb) => rgb.map((v) => v / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)).reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+  const faults = [];
+  for (const node of document.querySelectorAll("body *")) {
+    const own = [...node.childNodes].some((child) => child.nodeType === 3 && child.textContent.trim());
+    if (!own || !node.checkVisibility() || node.closest(":disabled, [aria-disabled=true], .live")) continue;
+    const grounds = [];
+    for (let at = node; at; at = at.parentElement) grounds.unshift(getComputedStyle(at).backgroundColor);
+    const ground = ["#fff", ...grounds];
+    const [a, b] = [light(over([...ground, getComputedStyle(node).color])), light(over(ground))];
+    const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    if (contrast < 4.5) faults.push(`${node.tagName} ${node.id} ${node.textContent.trim().slice(0, 30)}: ${contrast.toFixed(2)}`);
+  }
+  return faults;
+};
+
+test("texts have contrast in both themes, controls have names, forced colours show what is chosen", async () => {
+  for (const colorScheme of ["light", "dark"]) {
+    const page = await open(browser, studio, { colorScheme });
+    await page.evaluate(() => document.querySelectorAll("details").forEach((details) => (details.open = true)));
+    studio.breakShader();
+    await page.locator("#problems h2").waitFor();
+    assert.deepEqual(await page.evaluate(CONTRASTS), [], colorScheme);
+    await page.evaluate(() => document.documentElement.style.setProperty("--quiet", "#777"));
+    assert.notDeepEqual(await page.evaluate(CONTRASTS), [], "the measure can fail");
+    studio.mendShader();
+    await page.locator("#problems").waitFor({ state: "hidden" });
+    const snapshot = await page.locator("body").ariaSnapshot();
+    assert.match(snapshot, /application "Viewport: colour of scene\.toml"/);
+    assert.doesNotMatch(snapshot, /- (button|textbox|slider|spinbutton|combobox|checkbox|radio|application)( \[|:|$)/m, "all have names");
+    await page.context().close();
+  }
+  const page = await open(browser, studio, { forcedColors: "active" });
+  const grounds = await page.evaluate(() => ["input[value=color] + span", "input[value=normal] + span"].map((span) => getComputedStyle(document.querySelector(span)).backgroundColor));
+  assert.notEqual(...grounds);
+});
+
+test("a drag is shown at 20 pictures a second", async (t) => {
+  studio.edit("scene.toml", "width = 120\nheight = 90", "width = 640\nheight = 480");
+  const page = await open(browser, studio);
+  const [x, y] = await at(page, 0.5, 0.5);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.evaluate(() => {
+    window.seen = [];
+    new MutationObserver(() => {
+      const { revision } = document.getElementById("panels").dataset;
+      if (revision !== window.seen.at(-1)?.[0]) window.seen.push([revision, performance.now()]);
+    }).observe(document.getElementById("panels"), { attributes: true, attributeFilter: ["data-revision"] });
+  });
+  const start = Date.now();
+  for (let i = 0; Date.now() - start < 2000; i++) await page.mouse.move(x + 60 * Math.sin(i / 20), y + 10 * Math.cos(i / 20));
+  const times = await page.evaluate(() => window.seen.map(([, time]) => time));
+  await page.mouse.up();
+  const gaps = times.slice(1).map((time, i) => time - times[i]).sort((a, b) => a - b);
+  const median = gaps[gaps.length >> 1];
+  t.diagnostic(`${(1000 / median).toFixed(1)} pictures a second, the slowest in twenty after ${Math.round(gaps[Math.floor(gaps.length * 0.95)])} ms`);
+  // A machine that has other work is slower; much slower is a fault.
+  assert.ok(gaps.length > 10 && median < 150, `${median} ms between two pictures`);
+});
