@@ -29,7 +29,7 @@ pub struct Args {
     scene: PathBuf,
 
     /// Where the page is. Who can reach this address can look, and can change values of the
-    /// scene file
+    /// scene file and marked constants of the shaders
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7878", value_parser = NonEmptyStringValueParser::new())]
     listen: String,
 
@@ -142,7 +142,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !address.ip().is_loopback() {
         let told = format!(
             "{address} is no loopback address: everybody who can reach it can look, and can change values \
-             of the scene file"
+             of the scene file and marked constants of the shaders"
         );
         log::say(Level::Warning, &told);
     }

@@ -139,13 +139,13 @@ fn a_layer_of_normals_is_what_the_first_hits_say() {
 #[test]
 fn layers_follow_edits_and_those_that_are_not_there_are_told() {
     let files = Files::new(SCENE);
-    with_seen(&files, "f32", "seen = place.x / (f32(sample) * 0.0);");
+    with_seen(&files, "f32", "seen = bitcast<f32>(0x7f800000u + (sample >> 8u));");
     let running = files.start();
     running.wait_rendered(&files);
     running.session.send(Command::View(layer("seen")));
     let (_, frame) = wait_layer(&running, "seen");
     assert_eq!(frame.header.faults[0].1.infinite, 1200, "what is no number is counted");
-    files.edit(PIXEL, "place.x / (f32(sample) * 0.0);", "0.25;");
+    files.edit(PIXEL, "bitcast<f32>(0x7f800000u + (sample >> 8u));", "0.25;");
     running.wait("a quarter", |running| {
         let frame = running.frame().filter(|frame| frame.header.done)?;
         let Content::Layer(pixels, 1) = &frame.content else {
