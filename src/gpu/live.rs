@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::compile::check;
 use super::compose::{ADAPTIVE, FIRST_HITS, Kernel, RENDER, Shaders, Source};
-use super::functions::{FunctionText, functions};
+use super::functions::{FunctionText, functions, without_comments};
 use super::marks::{Kind, Layer, Marks, Slider, edited};
 use super::pipeline::{CALL, GROUPS};
 use crate::error::ShaderError;
@@ -17,9 +17,9 @@ const _: () = assert!(BINDING == GROUPS[CALL].len());
 
 /// What the constants' values are called in a kernel.
 const VALUES: &str = "values_of_sliders";
-/// What gives a sample's light, where a layer takes the place of it.
-const LIGHT: &str = "path_value";
-const LIGHT_ASIDE: &str = "path_value_of_light";
+/// How a kernel adds a sample's light, where a layer takes the place of it, and what it then adds.
+const ADDED: &str = "sum +=";
+const HELD: &str = "held_in_place_of_light";
 
 /// What is not as the files say, in kernels that are made of them.
 #[derive(Clone, Debug, Default)]
@@ -73,7 +73,7 @@ impl Live {
     ///
     /// # Errors
     ///
-    /// A kernel that the layer does not fit: it has no function that says what light a sample has.
+    /// A kernel that the layer does not fit: it does not add light where that can be seen.
     pub fn applied(&self, kernel: &Kernel, source: Source) -> Result<Source, ShaderError> {
         let layer = self.layer.as_ref().filter(|_| kernel.integrates);
         if self.sliders.is_empty() && layer.is_none() {
@@ -99,17 +99,18 @@ impl Live {
             edits.push((start..start, set));
         }
         if let Some(layer) = layer {
-            let light = find(LIGHT).ok_or_else(|| {
+            let added = find(kernel.entry_point).and_then(|entry| added_light(&source.text, &entry.body));
+            let added = added.ok_or_else(|| {
                 let start = source.start_of(&layer.file).unwrap_or(0);
                 let span = naga::Span::from(start + layer.at.start..start + layer.at.end);
                 let message = format!(
-                    "`{}` cannot be shown: no `fn {LIGHT}(path: PathState) -> vec4f` says what a sample adds",
-                    layer.name
+                    "`{}` cannot be shown: `{}` must add each sample's light, and its weight, in one place by `{ADDED} ...;`",
+                    layer.name, kernel.entry_point
                 );
                 ShaderError::at(&source, Some(span), message)
             })?;
-            let start = light.start + source.text[light.start..].find(LIGHT).unwrap_or(0);
-            edits.push((start..start + LIGHT.len(), LIGHT_ASIDE.to_string()));
+            edits.push((added.start..added.start, format!("{HELD}(")));
+            edits.push((added.end..added.end, ")".to_string()));
         }
         edits.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
         let mut source = edits
@@ -139,7 +140,19 @@ fn value_of(kind: Kind, i: usize) -> String {
     }
 }
 
-/// What gives a sample's light, where a layer takes its place: what it holds at the sample's end, with the sample's weight.
+/// The expression of the light that a function's body adds, if it does so in one place.
+fn added_light(text: &str, body: &Range<usize>) -> Option<Range<usize>> {
+    let plain = without_comments(text);
+    let mut places = plain[body.clone()].match_indices(ADDED);
+    let (at, _) = places
+        .next()
+        .filter(|(at, _)| plain[body.start..body.start + at].ends_with(char::is_whitespace))?;
+    let start = body.start + at + ADDED.len();
+    let end = start + plain[start..body.end].find(';')?;
+    places.next().is_none().then_some(start..end)
+}
+
+/// What is added in place of a sample's light: what the layer holds at its end, with the sample's weight.
 fn in_place_of_light(layer: &Layer) -> String {
     let Layer { name, ty, numbers, .. } = layer;
     let color = match numbers {
@@ -149,7 +162,7 @@ fn in_place_of_light(layer: &Layer) -> String {
         _ => "held.xyz",
     };
     format!(
-        "fn {LIGHT}(path: PathState) -> vec4f {{ let light = {LIGHT_ASIDE}(path); let held = {name}; {name} = {ty}(); \
+        "fn {HELD}(light: vec4f) -> vec4f {{ let held = {name}; {name} = {ty}(); \
          return vec4f({color} * light.w, light.w); }}"
     )
 }
@@ -236,16 +249,20 @@ mod tests {
         let hits = live
             .applied(&FIRST_HITS, own.compose(&FIRST_HITS, PHONG, None))
             .unwrap();
-        assert!(!hits.text.contains(LIGHT_ASIDE) && hits.text.contains(VALUES));
-        let broken = own.compose(&RENDER, PHONG, None);
-        let at = broken.text.find("fn path_value").unwrap();
-        let error = live
-            .applied(&RENDER, broken.replaced(at..at + 13, "fn other"))
-            .unwrap_err();
-        assert!(
-            error.place.starts_with("phong.wgsl:") && error.message.contains("`seen` cannot be shown"),
-            "{error}"
-        );
+        assert!(!hits.text.contains(HELD) && hits.text.contains(VALUES));
+        for (old, new) in [
+            ("sum += path_value(path);", "sum = sum + path_value(path);"),
+            (
+                "sum += path_value(path);",
+                "sum += path_value(path); sum += vec4f(1.0);",
+            ),
+        ] {
+            let at = before.text.find(old).unwrap();
+            let other = before.replaced(at..at + old.len(), new);
+            let error = live.applied(&RENDER, other).unwrap_err();
+            assert!(error.place.starts_with("phong.wgsl:"), "{error}");
+            assert!(error.message.contains("`seen` cannot be shown"), "{error}");
+        }
     }
 
     #[test]
