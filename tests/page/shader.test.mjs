@@ -79,7 +79,7 @@ test("a layer of the shaders is a view, and its numbers are read", async () => {
   await settled(page);
   const [, , bytes] = await shown(page);
   assert.deepEqual([...new Set(bytes.match(/\d+,\d+,\d+/g))], ["64,128,255"]);
-  await page.locator("[data-part=picture] canvas").hover({ position: { x: 60, y: 45 } });
+  await page.locator("[data-part=picture] canvas").hover();
   await page.locator("#values", { hasText: "0.25 0.5 1" }).waitFor();
   assert.deepEqual(page.faults, []);
 });
