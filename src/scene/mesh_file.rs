@@ -109,7 +109,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let files: Vec<PathBuf> = (0..32).map(|i| folder.path().join(format!("{i}.obj"))).collect();
         // So large that all threads read it.
-        let many = SMALL.repeat(2000);
+        let many = SMALL.replace("1 2 3", "-3 -2 -1").repeat(2000);
         files.iter().for_each(|file| fs::write(file, &many).unwrap());
         let read = files
             .par_iter()
