@@ -109,13 +109,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let files: Vec<PathBuf> = (0..32).map(|i| folder.path().join(format!("{i}.obj"))).collect();
         // So large that all threads read it.
-        let many = SMALL.repeat(2000);
+        let many = SMALL.replace("1 2 3", "-3 -2 -1").repeat(2000);
         files.iter().for_each(|file| fs::write(file, &many).unwrap());
-        let read = files
-            .par_iter()
-            .chain(&files)
-            .map(|file| load(file, None).unwrap().triangles.len());
-        assert_eq!(read.sum::<usize>(), 64 * 2000);
+        let read = files.par_iter().chain(&files).map(|file| load(file, None).unwrap());
+        let read: Vec<Arc<Mesh>> = read.collect();
+        assert!(read.iter().all(|mesh| mesh.positions == read[0].positions));
+        let is_one = |file| read.iter().any(|mesh| Arc::ptr_eq(mesh, &load(file, None).unwrap()));
+        assert!(files.iter().all(|file| is_one(file)));
     }
 
     #[test]

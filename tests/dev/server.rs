@@ -55,7 +55,7 @@ fn the_server_answers_its_own_pages_only() {
     std::thread::spawn(move || listener.serve(&session.session).unwrap());
     let (own, port) = (address.to_string(), address.port());
 
-    for path in ["/", "/style.css", "/page.js", "/picture.js"] {
+    for path in ["/", "/style.css", "/page.js", "/picture.js", "/link.js", "/object.js"] {
         let (status, text) = ask(address, &get(path, &own, ""));
         assert_eq!(status, "HTTP/1.1 200 OK", "{path}");
         assert!(
@@ -140,6 +140,42 @@ fn the_server_answers_its_own_pages_only() {
     session.wait("a free place", |_| {
         (ask(address, &request).0 == "HTTP/1.1 101 Switching Protocols").then_some(())
     });
+}
+
+#[test]
+fn pictures_are_given_to_who_asks_and_taken_from_the_page_alone() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let listener = Listener::open("127.0.0.1:0").unwrap();
+    let address = listener.address().unwrap();
+    // It serves as long as the program runs.
+    let session: &'static Running = Box::leak(Box::new(running));
+    std::thread::spawn(move || listener.serve(&session.session).unwrap());
+    let own = address.to_string();
+    for (path, kind) in [("/picture.png", "image/png"), ("/picture.exr", "image/x-exr")] {
+        let (status, text) = ask(address, &get(path, &own, ""));
+        assert_eq!(status, "HTTP/1.1 200 OK", "{path}");
+        assert!(text.contains(kind) && text.contains("same-origin"), "{path}");
+        let foreign = get(path, &own, "Origin: http://evil.example\r\n");
+        assert_eq!(ask(address, &foreign).0, "HTTP/1.1 403 Forbidden");
+    }
+    let give = |origin: &str| {
+        let head = format!("POST /reference/a%20b.png HTTP/1.1\r\nHost: {own}\r\n{origin}Content-Length: 10\r\n\r\n");
+        ask(address, &(head + "no picture"))
+    };
+    let page = format!("Origin: http://{own}\r\n");
+    for origin in ["", "Origin: null\r\n", "Origin: http://evil.example\r\n"] {
+        assert_eq!(give(origin).0, "HTTP/1.1 403 Forbidden", "{origin}");
+    }
+    let (status, text) = give(&page);
+    assert_eq!(status, "HTTP/1.1 422 Unprocessable Entity");
+    assert!(text.contains("a b.png: "), "{text}");
+    assert_eq!(session.state().comparable, (false, None));
+    assert_eq!(
+        ask(address, &get("/reference/a", &own, "")).0,
+        "HTTP/1.1 405 Method Not Allowed"
+    );
 }
 
 #[test]
