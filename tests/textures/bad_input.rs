@@ -160,7 +160,7 @@ fn all_images_together_must_fit() {
         &folder.path().join("a.png"),
         &folder.path().join("fits.png"),
         16_384,
-        10_000,
+        4_000,
     );
     let texture = |name: &str, file: &str, filter: &str| {
         format!("[textures.{name}]\ntype = 'image'\nfilter = '{filter}'\nfile = '{file}'\n")
