@@ -14,6 +14,7 @@ use crate::image::{Channel, Pixels};
 pub fn png_file(frame: &Frame) -> Vec<u8> {
     match &frame.content {
         Content::Color(pixels) | Content::Compare(pixels, _) => png_of(pixels, frame.look),
+        Content::Film(layer) => png(layer.values.width, layer.values.height, &layer.bytes(&frame.look)),
         content => {
             let [width, height] = frame.header.sent;
             png(width, height, &content.plain_bytes([width, height]))
@@ -29,7 +30,12 @@ pub fn png_file(frame: &Frame) -> Vec<u8> {
 pub fn exr_file(frame: &Frame) -> io::Result<Vec<u8>> {
     let [width, height] = frame.header.sent;
     let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = match &frame.content {
-        Content::Color(pixels) | Content::Compare(pixels, _) | Content::Layer(pixels, _) => colors(pixels),
+        Content::Color(pixels) | Content::Compare(pixels, _) | Content::Layer(pixels, _) => colors(pixels, ["R", "G", "B"]),
+        Content::Film(layer) => {
+            let channels = layer.aov.channels();
+            let names = channels.iter().map(Channel::name).collect::<Vec<_>>();
+            colors(&layer.values, names)
+        }
         Content::Samples(counts, _) => [AnyChannel::new("sample_count.N", FlatSamples::U32(counts.clone()))]
             .into_iter()
             .collect(),
@@ -62,12 +68,12 @@ pub fn exr_file(frame: &Frame) -> io::Result<Vec<u8>> {
     Ok(file.into_inner())
 }
 
-fn colors(pixels: &Pixels) -> SmallVec<[AnyChannel<FlatSamples>; 4]> {
+fn colors(pixels: &Pixels, names: impl IntoIterator<Item = &'static str>) -> SmallVec<[AnyChannel<FlatSamples>; 4]> {
     let channel = |(name, i): (&'static str, usize)| {
         AnyChannel::new(
             name,
             FlatSamples::F32(pixels.colors.iter().map(|color| color[i]).collect()),
         )
     };
-    [("R", 0), ("G", 1), ("B", 2)].into_iter().map(channel).collect()
+    names.into_iter().zip(0..3).map(channel).collect()
 }

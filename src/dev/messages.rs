@@ -206,6 +206,8 @@ pub struct State {
     pub sliders_undo: bool,
     /// The layers of the shaders that can be shown.
     pub layers: Vec<LayerName>,
+    /// The views that the scene does not have, and why.
+    pub missing_views: Vec<(View, &'static str)>,
     /// The form of links that open an editor, with `{file}`, `{line}` and `{column}`; none if there are no such links.
     pub editor: Option<String>,
     /// Whether a kernel is being compiled.

@@ -7,8 +7,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use super::diagnostic::Diagnostic;
-use super::picture::LayerName;
+use super::picture::{LayerName, View};
 use crate::gpu::compose::{self, Shaders};
+use crate::image::AovSource;
 use crate::pack::{Packed, Specialization, pack};
 use crate::scene::{
     CameraDescription, Description, Draft, Integrator, Overrides, Scene, folder_of, is_gltf, read_text,
@@ -43,7 +44,7 @@ pub struct Loaded {
 impl Loaded {
     /// A scene that was read from a text, and packed.
     pub fn new(text: String, scene: Scene, description: Description) -> Loaded {
-        let packed = pack(&scene).without_layers(); // no view shows them
+        let packed = pack(&scene).without_layers(); // views that show them have kernels of their own
         Loaded {
             text,
             camera: description.camera.clone(),
@@ -58,10 +59,47 @@ impl Loaded {
 /// place of light.
 pub type Constants = (Specialization, Integrator, bool, Option<LayerName>);
 
-/// What a scene's kernel is compiled for. A layer's samples are not adaptive: what they say of light's errors is nothing.
-pub fn constants(packed: &Packed, layer: Option<LayerName>) -> Constants {
+/// What a scene's kernel is compiled for, to show a view, and a layer of the shaders in place of light. Such a layer's samples are
+/// not adaptive: what they say of light's errors is nothing.
+pub fn constants(packed: &Packed, view: View, layer: Option<LayerName>) -> Constants {
     let adaptive = packed.adaptive && layer.is_none();
-    (packed.specialization, packed.integrator, adaptive, layer)
+    let integrator = packed.integrator;
+    let of_samples = view.aov().is_some_and(|aov| aov.source(integrator) == AovSource::Samples);
+    let specialization = Specialization {
+        layers: (of_samples && integrator == Integrator::Path).into(),
+        ..packed.specialization
+    };
+    (specialization, integrator, adaptive, layer)
+}
+
+/// What a kernel shows when a view is asked for: light, if it takes another one. A kernel that has a layer in place of light shows
+/// nothing else.
+pub fn shown(constants: &Constants, view: View) -> View {
+    let (specialization, integrator, adaptive, layer) = constants;
+    match (layer, view) {
+        (Some(layer), _) => View::Layer(*layer),
+        (None, View::Layer(_)) => View::Color,
+        (None, view) => match view.aov().map(|aov| aov.source(*integrator)) {
+            Some(AovSource::Samples) if specialization.layers == 0 => View::Color,
+            Some(AovSource::Adaptive) if !adaptive => View::Color,
+            _ => view,
+        },
+    }
+}
+
+/// Whether two kernels differ at most in what views they are for.
+pub fn are_of_one_scene(a: &Constants, b: &Constants) -> bool {
+    let of_scene = |(specialization, integrator, ..): &Constants| {
+        let layers = 0;
+        (
+            Specialization {
+                layers,
+                ..*specialization
+            },
+            *integrator,
+        )
+    };
+    of_scene(a) == of_scene(b)
 }
 
 /// What the files say at one moment.

@@ -25,25 +25,7 @@ impl Painter {
             Command::Set(set) => self.set(&set),
             Command::UndoWrite => self.turn(false),
             Command::RedoWrite => self.turn(true),
-            Command::View(view) => {
-                let old = std::mem::replace(&mut self.view, view);
-                self.keep_view();
-                let other_layer = self.view.layer() != old.layer();
-                let view = self.seen();
-                if let Some(running) = &mut self.running {
-                    running.halted = false;
-                    match guarded(|| running.canvas.change_view(view)) {
-                        Ok(()) => self.changed((Instant::now(), false)), // the camera may have moved meanwhile
-                        Err(error) => return self.fail(&error),
-                    }
-                    if self.is_done() {
-                        self.show();
-                    }
-                }
-                if other_layer {
-                    self.settle((Instant::now(), false)); // it takes a kernel of its own
-                }
-            }
+            Command::View(view) => self.choose_view(view),
             Command::Gain(gain) => {
                 self.gain = gain.clamp(1.0, 1e9);
                 if matches!(self.view, View::Compare(_)) {
@@ -127,17 +109,17 @@ impl Painter {
 
     /// What a scene's kernel is compiled for, to show what is asked for.
     pub(super) fn constants(&self, loaded: &Loaded) -> Constants {
-        constants(
-            &loaded.packed,
-            self.layer().and_then(|layer| LayerName::new(&layer.name)),
-        )
+        let layer = self.layer().and_then(|layer| LayerName::new(&layer.name));
+        constants(&loaded.packed, self.view, layer)
     }
 
     /// A scene with the camera that is looked through, sampled as what is asked for needs it.
     pub(super) fn packed(&self, loaded: &Loaded) -> Packed {
+        let (specialization, _, adaptive, _) = self.constants(loaded);
         Packed {
             camera: self.packed_camera(loaded),
-            adaptive: self.constants(loaded).2,
+            adaptive,
+            specialization,
             ..loaded.packed.clone()
         }
     }

@@ -7,8 +7,7 @@ use super::{ATTEMPTS, Painter, Running};
 use crate::dev::build::{Built, guarded};
 use crate::dev::canvas::Canvas;
 use crate::dev::diagnostic::Diagnostic;
-use crate::dev::picture::View;
-use crate::dev::source::Constants;
+use crate::dev::source::{Constants, are_of_one_scene, shown};
 use crate::error::{RenderError, ShaderError};
 use crate::gpu::Gpu;
 use crate::gpu::compose::Shaders;
@@ -71,7 +70,7 @@ impl Painter {
         self.state.device = format!("{}, {}", info.name, info.driver);
         self.device = Some(gpu.device().clone());
         let (packed, limits) = (self.packed(&loaded), self.limits);
-        let view = if constants.3.is_some() { View::Color } else { self.view };
+        let view = shown(&constants, self.view);
         self.sliders.runs(gpu.live().sliders());
         let sliders = self.sliders.values(gpu.live().sliders());
         self.park(&shaders, &constants);
@@ -173,23 +172,19 @@ impl Painter {
         drop_contained(self.running.take());
     }
 
-    /// Another kernel comes. The running one is kept where it differs from that by the layer alone: whoever looks at one
-    /// will look at the other again.
+    /// Another kernel comes. Of those that differ from it by layers alone one is kept, that of light if it is there: whoever looks at
+    /// a layer will look at that again.
     fn park(&mut self, shaders: &Arc<Shaders>, constants: &Constants) {
-        let running = self.running.take();
-        let sibling = |running: &Running| {
-            let layer = running.constants.3;
-            let same_scene = constants.0 == running.constants.0 && constants.1 == running.constants.1;
-            running.shaders == *shaders && same_scene && layer != constants.3
+        let is_sibling = |known: &Running| {
+            let same_scene = are_of_one_scene(&known.constants, constants);
+            known.shaders == *shaders && same_scene && known.constants != *constants
         };
-        let parked = match running {
-            Some(running) if sibling(&running) => self.parked.replace(running),
-            other => {
-                drop_contained(other);
-                self.parked.take()
-            }
-        };
-        drop_contained(parked);
+        let is_of_light = |known: &Running| known.constants.3.is_none() && known.constants.0.layers == 0;
+        let known = [self.parked.take(), self.running.take()].into_iter().flatten();
+        let (mut siblings, others): (Vec<Running>, Vec<Running>) = known.partition(is_sibling);
+        siblings.sort_by_key(is_of_light);
+        self.parked = siblings.pop();
+        siblings.into_iter().chain(others).map(Some).for_each(drop_contained);
     }
 }
 

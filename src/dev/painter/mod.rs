@@ -5,6 +5,7 @@ mod comparison;
 mod kernels;
 mod shader;
 mod show;
+mod view;
 mod walk;
 mod writing;
 
@@ -70,7 +71,7 @@ pub struct Painter {
     cut: Option<(Arc<Shaders>, Constants)>,
     device: Option<Device>,
     running: Option<Running>,
-    /// The kernel that ran before, where that was for a layer and this is not, or the other way.
+    /// The kernel of light where the running one is for layers; else the one for layers that ran before, if any.
     parked: Option<Running>,
     pending: Option<Pending>,
     requests: u64,

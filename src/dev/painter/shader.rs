@@ -117,34 +117,6 @@ impl Painter {
         names
     }
 
-    /// A view that the shaders do not have is colour's.
-    pub(super) fn keep_view(&mut self) {
-        if let (View::Layer(name), Some(_), None) = (self.view, &self.loaded, self.layer()) {
-            self.view = View::Color;
-            let there = self.layers();
-            let there = match there.is_empty() {
-                true => "there is none".to_string(),
-                false => format!(
-                    "there are {}",
-                    there.iter().map(LayerName::as_str).collect::<Vec<_>>().join(", ")
-                ),
-            };
-            let told = format!("the shaders have no layer `{}`: {there}", name.as_str());
-            self.notice(&Err(told), String::new());
-        }
-    }
-
-    /// What the running kernel can show: what is asked for, unless another kernel is compiled for that.
-    pub(super) fn seen(&self) -> View {
-        let shown = self.running.as_ref().and_then(|running| running.constants.3);
-        match (self.view, shown) {
-            (View::Layer(asked), Some(shown)) if asked == shown => self.view,
-            (_, Some(shown)) => View::Layer(shown),
-            (View::Layer(_), None) => View::Color,
-            (view, None) => view,
-        }
-    }
-
     /// Goes back to the kernel that ran before, if that is what is wanted: a layer's, or that of light.
     pub(super) fn take_parked(&mut self, shaders: &Arc<Shaders>, constants: &Constants) -> bool {
         let fits = |parked: &Running| parked.shaders == *shaders && parked.constants == *constants;
@@ -158,18 +130,21 @@ impl Painter {
     /// The kernel that runs is shown from now on, with what it has.
     pub(super) fn show_parked(&mut self, since: (Instant, bool)) {
         let (view, limits) = (self.seen(), self.limits);
+        let packed = self.loaded.as_ref().map(|loaded| self.packed(loaded));
         let Some(running) = &mut self.running else { return };
         running.halted = false;
         let shown = guarded(|| {
             running.canvas.set_limits(limits, view)?;
             running.canvas.change_view(view)
         });
+        // Of another scene, or seen from elsewhere, it is begun again at once.
+        let is_current = packed.is_some_and(|packed| running.canvas.shows(&packed));
         match shown {
             Ok(()) => {
                 self.changed(since);
                 self.upload_sliders(since);
-                if self.is_done() {
-                    self.show();
+                if is_current {
+                    self.show_what_is_there();
                 }
             }
             Err(error) => self.fail(&error),

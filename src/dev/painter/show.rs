@@ -211,6 +211,7 @@ impl Painter {
         self.state.sliders = self.sliders.told(self.sources.shaders.as_deref(), integrator);
         self.state.sliders_undo = self.sliders.can_take_back();
         self.state.layers = self.layers();
+        self.state.missing_views = self.missing_views();
         if **self.state_sender.borrow() != self.state {
             self.state_sender.send_replace(Arc::new(self.state.clone()));
         }
