@@ -64,7 +64,9 @@ pub type Constants = (Specialization, Integrator, bool, Option<LayerName>);
 pub fn constants(packed: &Packed, view: View, layer: Option<LayerName>) -> Constants {
     let adaptive = packed.adaptive && layer.is_none();
     let integrator = packed.integrator;
-    let of_samples = view.aov().is_some_and(|aov| aov.source(integrator) == AovSource::Samples);
+    let of_samples = view
+        .aov()
+        .is_some_and(|aov| aov.source(integrator) == AovSource::Samples);
     let specialization = Specialization {
         layers: (of_samples && integrator == Integrator::Path).into(),
         ..packed.specialization

@@ -2,6 +2,7 @@
 //! what they say last, or the last good one with the error beside it.
 
 mod faults;
+mod film_layers;
 mod gltf;
 mod kernels;
 mod large;
