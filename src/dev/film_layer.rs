@@ -79,13 +79,13 @@ impl FilmLayer {
             Aov::ShadingNormal => "shading normal",
             aov => aov.name(),
         };
-        let mut known = vec![(name, numbers(value)), ("bits", bits(value))];
-        match self.aov {
-            Aov::ShadingNormal => {}
-            Aov::Variance => known.push(("standard error", numbers(standard_error(value)))),
-            _ => known.push(("shown", self.shown(value, look).map(|byte| byte.to_string()).join(" "))),
-        }
-        Some(known)
+        let numbers_and_bits = [(name, numbers(value)), ("bits", bits(value))];
+        let more = match self.aov {
+            Aov::ShadingNormal => None,
+            Aov::Variance => Some(("standard error", numbers(standard_error(value)))),
+            _ => Some(("shown", self.shown(value, look).map(|byte| byte.to_string()).join(" "))),
+        };
+        Some(numbers_and_bits.into_iter().chain(more).collect())
     }
 }
 

@@ -271,6 +271,8 @@ pub struct Header {
     pub total: u32,
     /// Whether nothing will be added.
     pub done: bool,
+    /// Whether it shows the first hits, one ray a pixel.
+    pub first_hits: bool,
     /// Samples of pixels per second.
     pub speed: Option<f64>,
     /// Seconds from the last change to the first frame that showed it.
@@ -316,7 +318,7 @@ pub struct Names {
 }
 
 impl Frame {
-    /// Makes the pictures of `content`; the header's last three fields are found here.
+    /// Makes the pictures of `content`; what the header says of that is found here.
     pub fn new(mut header: Header, content: Content, names: Names, look: Look) -> Frame {
         let [width, height] = header.sent;
         let mut found = Vec::new();
@@ -367,6 +369,7 @@ impl Frame {
             }
         };
         header.faults = found;
+        header.first_hits = matches!(content, Content::Hits(..));
         header.histogram = match &content {
             Content::Color(pixels) | Content::Compare(pixels, _) => Some(Histogram::of(&pixels.colors)),
             Content::Film(layer) if layer.is_light() => Some(Histogram::of(&layer.values.colors)),

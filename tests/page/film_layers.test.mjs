@@ -45,6 +45,7 @@ test("layers of the film are views, with the pictures and the files of a render"
     assert.match(header, new RegExp(`\\0chlist\\0....${name}\\.B\\0`, "s"), "its first channel");
   }
   assert.equal(seen.size, 5, "all differ");
+  assert.equal(await page.locator("#samples").innerText(), "4 of 4");
   await page.locator("[data-part=picture] canvas").hover();
   await page.locator("#values", { hasText: /albedo [\d.]+ +[\d.]+ +[\d.]+.*bits.*shown/ }).waitFor();
   const one = await compiled();

@@ -65,7 +65,12 @@ function showState(state, heard) {
   const layers = element("layers");
   layers.value = name === "layer" ? `layer:${state.view.layer}` : name;
   if (layers.selectedIndex < 0) layers.value = "";
-  layers.classList.toggle("chosen", layers.value !== "");
+  const chosen = layers.value !== "";
+  if (chosen && !layers.classList.contains("chosen")) {
+    const bar = element("toolbar"); // on a narrow screen the list may lie beyond its end
+    bar.scrollLeft = Math.max(bar.scrollLeft, layers.offsetLeft + layers.offsetWidth - bar.clientWidth);
+  }
+  layers.classList.toggle("chosen", chosen);
 
   choice = state.look;
   const [exposure, transform] = state.scene_look;
