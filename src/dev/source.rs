@@ -110,7 +110,7 @@ pub struct Snapshot {
     /// The scene, or what is wrong with it.
     pub scene: Result<Arc<Loaded>, Diagnostic>,
     /// The shaders, or what is wrong with them.
-    pub shaders: Result<Arc<Shaders>, Diagnostic>,
+    pub shaders: Result<Arc<Shaders>, Box<Diagnostic>>,
     /// How long it took to read the files, and to pack the scene.
     pub took: [Duration; 2],
     /// The scene file and the files that the scene uses, and their state: what decides whether to read again.
@@ -170,15 +170,17 @@ impl Sources {
         }
     }
 
-    fn read_shaders(&self) -> Result<Arc<Shaders>, Diagnostic> {
+    fn read_shaders(&self) -> Result<Arc<Shaders>, Box<Diagnostic>> {
         let shaders = match &self.shaders {
-            Some(folder) => Shaders::read(folder).map_err(|error| Diagnostic::plain("file", error.to_string()))?,
+            Some(folder) => {
+                Shaders::read(folder).map_err(|error| Box::new(Diagnostic::plain("file", error.to_string())))?
+            }
             None => Shaders::built_in(),
         };
         Ok(Arc::new(shaders))
     }
 
-    fn read_scene(&self, shaders: Result<Arc<Shaders>, Diagnostic>) -> Snapshot {
+    fn read_scene(&self, shaders: Result<Arc<Shaders>, Box<Diagnostic>>) -> Snapshot {
         let start = Instant::now();
         // The stamps are taken first: a file that changes while it is read is read again.
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];

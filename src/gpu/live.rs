@@ -79,7 +79,7 @@ impl Live {
         if self.sliders.is_empty() && layer.is_none() {
             return Ok(source);
         }
-        let mut edits: Vec<(Range<usize>, String)> = Vec::new();
+        let mut edits = Edits::new();
         let mut set = String::new();
         for (i, slider) in self.sliders.iter().enumerate() {
             let Some(start) = source.start_of(&slider.file) else {
@@ -167,11 +167,14 @@ fn in_place_of_light(layer: &Layer) -> String {
     )
 }
 
+/// What takes the place of parts of a text.
+pub type Edits = Vec<(Range<usize>, String)>;
+
 /// Shaders with edits of constants' numbers.
-pub fn with_edits(shaders: &Shaders, edits: &dyn Fn(&Slider, &str) -> Vec<(Range<usize>, String)>) -> Shaders {
+pub fn with_edits(shaders: &Shaders, edits: &dyn Fn(&Slider, &str) -> Edits) -> Shaders {
     shaders.changed(|file, text| {
         let marks = Marks::of_file(file, text);
-        let edits: Vec<_> = marks.sliders.iter().flat_map(|slider| edits(slider, text)).collect();
+        let edits: Edits = marks.sliders.iter().flat_map(|slider| edits(slider, text)).collect();
         (!edits.is_empty()).then(|| edited(text, edits))
     })
 }

@@ -297,16 +297,17 @@ impl Line<'_> {
             _ => return Err(format!("`{name}` is of type `{ty}`: {RULE}")),
         };
         let place = self.at + place;
+        let whole = || std::iter::once(place..place + written.len()).collect();
         let wrong = || format!("`{name}`: `{written}` must be a number by itself, or true or false: {RULE}");
         let (value, literals) = match kind {
             Kind::Bool => {
                 let on = written.parse().map_err(|_| wrong())?;
-                (Value::Bool(on), vec![place..place + written.len()])
+                (Value::Bool(on), whole())
             }
             Kind::Color => color(written, place).ok_or_else(wrong)?,
             _ => {
                 let x = number(written, kind).ok_or_else(wrong)?;
-                (Value::Number(x), vec![place..place + written.len()])
+                (Value::Number(x), whole())
             }
         };
         let [mut min, mut max, mut step] = [0.0, 1.0, f64::NAN];

@@ -284,7 +284,7 @@ impl Painter {
                 }
                 self.read_shaders(shaders);
             }
-            Err(problem) => self.problems.files = Some(problem),
+            Err(problem) => self.problems.files = Some(*problem),
         }
         self.show_files(noticed, shown_otherwise);
     }
@@ -365,7 +365,7 @@ impl Painter {
     }
 
     fn request(&mut self, loaded: &Loaded, shaders: Arc<Shaders>) {
-        let constants = self.constants(&loaded);
+        let constants = self.constants(loaded);
         // A running kernel that fits the scene stays if the new one is wrong; else the last good shaders are compiled.
         let running = self.running.as_ref();
         let stays = running.is_some_and(|running| running.constants == constants);
