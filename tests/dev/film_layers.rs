@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use wgray::dev::{Command, Content, FilmLayer, Frame, View};
+use wgray::dev::{Command, Content, FilmLayer, Frame, LayerName, View};
 use wgray::film::{Film, Layer};
 
 use super::running::{Files, KERNEL, RADIANCE, Running, SCENE};
@@ -116,6 +116,39 @@ fn layers_are_those_that_render_gives_and_light_is_their_sum() {
         }
         assert_eq!(running.state().problems, []);
     }
+}
+
+#[test]
+fn the_kernel_of_light_is_kept_whatever_layers_are_looked_at() {
+    let files = Files::new(&path());
+    files.write(
+        "shaders/pixel.wgsl",
+        &format!(
+            "{}\nvar<private> seen: f32; // layer\n",
+            files.read("shaders/pixel.wgsl")
+        ),
+    );
+    let running = files.start();
+    running.wait_rendered(&files);
+    let colors = running.colors();
+    let seen = View::Layer(LayerName::new("seen").unwrap());
+    let mut compiled = running.state().compile_seconds;
+    for view in [View::Direct, seen] {
+        running.session.send(Command::View(view));
+        running.wait("the view", |running| {
+            running
+                .frame()
+                .filter(|frame| frame.header.done && frame.header.view == view)
+        });
+        let last = std::mem::replace(&mut compiled, running.state().compile_seconds);
+        assert_ne!(compiled, last, "{view:?} takes a kernel");
+    }
+    running.session.send(Command::View(View::Color));
+    running.wait("light", |running| {
+        let frame = running.frame()?;
+        matches!(&frame.content, Content::Color(pixels) if frame.header.done && *pixels == colors).then_some(())
+    });
+    assert_eq!(running.state().compile_seconds, compiled);
 }
 
 #[test]
