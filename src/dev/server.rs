@@ -131,11 +131,12 @@ struct Shared {
 }
 
 /// The page's modules.
-const MODULES: [(&str, &str); 9] = [
+const MODULES: [(&str, &str); 10] = [
     ("/camera.js", include_str!("page/camera.js")),
     ("/compare.js", include_str!("page/compare.js")),
     ("/object.js", include_str!("page/object.js")),
     ("/link.js", include_str!("page/link.js")),
+    ("/numbers.js", include_str!("page/numbers.js")),
     ("/page.js", include_str!("page/page.js")),
     ("/picture.js", include_str!("page/picture.js")),
     ("/probes.js", include_str!("page/probes.js")),

@@ -3,10 +3,12 @@
 
 mod faults;
 mod gltf;
+mod hostile;
 mod kernels;
 mod large;
 mod measure;
 mod pauses;
+mod picking;
 mod reload;
 mod responsive;
 mod running;
