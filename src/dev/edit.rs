@@ -17,7 +17,16 @@ type Edit = (Range<usize>, String);
 ///
 /// Why there is no place for it.
 pub fn edited(text: &str, path: &KeyPath, value: Option<&Value>) -> Result<String, String> {
-    let piece = Pieces::of(text).find(path);
+    edited_in(&Pieces::of(text), path, value)
+}
+
+/// The same of a text whose pieces are known.
+///
+/// # Errors
+///
+/// Why there is no place for it.
+pub fn edited_in(pieces: &Pieces, path: &KeyPath, value: Option<&Value>) -> Result<String, String> {
+    let piece = pieces.find(path);
     let edits = edits(&piece.text, &piece.path, value).map_err(|why| format!("{path}: {why}"))?;
     let mut whole: Vec<Edit> = Vec::with_capacity(edits.len());
     for (range, new) in edits {
@@ -27,7 +36,7 @@ pub fn edited(text: &str, path: &KeyPath, value: Option<&Value>) -> Result<Strin
     }
     // From the end: what comes before a change stays where it is.
     whole.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
-    let mut text = text.to_string();
+    let mut text = pieces.whole().to_owned();
     for (range, new) in whole {
         text.replace_range(range, &new);
     }

@@ -1,4 +1,4 @@
-//! How long it takes from a save to the picture: saves copies of a scene and of the shaders, and looks at the clock.
+//! How long it takes from a change to the picture: saves copies of a scene and of the shaders, and looks at the clock.
 
 use std::fs;
 use std::path::Path;
@@ -9,16 +9,18 @@ use std::time::{Duration, Instant, SystemTime};
 use toml_edit::{DocumentMut, value};
 
 use super::camera::Move;
-use super::messages::Command;
+use super::messages::{Command, Set};
 use super::picture::Frame;
 use super::session::{Session, Settings};
 use super::source::Sources;
 use crate::gpu::Choice;
 use crate::gpu::compose::{self, Shaders};
-use crate::scene::{is_course, is_gltf};
+use crate::scene::{Overrides, is_course, is_gltf};
 
 /// Saves of each kind.
 const ROUNDS: usize = 7;
+/// The first seed, one that hardly any scene has.
+const SEEDS: i64 = 7_361_000;
 /// No picture takes so long.
 const LONGEST: Duration = Duration::from_secs(120);
 /// The expression in `kernels/render.wgsl` that is changed, so that the picture changes and no cache knows the kernel.
@@ -37,7 +39,7 @@ pub struct Measured {
     pub whole: Vec<Duration>,
 }
 
-/// Measures saves of a scene, moves of its camera and saves of a shader. Copies are saved, the scene's beside it.
+/// Measures a value of a scene that is set as on the page, saves of the scene, moves of its camera and saves of a shader. Copies are saved, the scene's beside it.
 ///
 /// # Errors
 ///
@@ -76,7 +78,10 @@ pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Resul
     let session = Session::start(Settings {
         sources: Sources {
             scene: scene.path().to_owned(),
-            overrides: sources.overrides.clone(),
+            overrides: Overrides {
+                seed: None, // it is what changes
+                ..sources.overrides.clone()
+            },
             shaders: Some(copies.path().to_owned()),
         },
         device,
@@ -100,8 +105,16 @@ pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Resul
         .duration_since(SystemTime::UNIX_EPOCH)
         .map_or(0, |time| time.as_millis() % 65_536);
     Ok(vec![
+        clock.all("value set", &mut |i, session| {
+            session.send(Command::Set(Set {
+                path: "render.seed".to_owned(),
+                value: (SEEDS + i as i64).into(),
+                gesture: None,
+            }));
+            Ok(())
+        })?,
         clock.all("scene save", &mut |i, _| {
-            fs::write(scene.path(), brighter(&text, i)).map_err(told)
+            fs::write(scene.path(), reseeded(&text, i)).map_err(told)
         })?,
         clock.all("camera move", &mut |_, session| {
             session.send(Command::Move(Move::Orbit(0.05, 0.0)));
@@ -118,11 +131,10 @@ pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Resul
     ])
 }
 
-/// The scene with another ambient light.
-fn brighter(text: &str, i: usize) -> String {
+/// The scene with other random numbers: whatever it is made of, that is another picture.
+fn reseeded(text: &str, i: usize) -> String {
     let mut document: DocumentMut = text.parse().unwrap_or_default();
-    let light = 0.1 + 0.001 * (i + 1) as f64;
-    document["render"]["ambient"] = value([light; 3].into_iter().collect::<toml_edit::Array>());
+    document["render"]["seed"] = value(SEEDS + (ROUNDS + i) as i64);
     document.to_string()
 }
 
@@ -169,6 +181,9 @@ impl Clock<'_> {
             }
             if let Some(problem) = self.session.state.borrow().problems.first() {
                 return Err(Some(format!("{change}: {}", problem.message)));
+            }
+            if let Some(refused) = self.session.state.borrow().notice.as_ref().filter(|notice| notice.bad) {
+                return Err(Some(format!("{change}: {}", refused.text)));
             }
             if self.session.state.borrow().compiling {
                 stopped.get_or_insert(start.elapsed());

@@ -158,7 +158,7 @@ impl Seen {
     /// The values of the table that a path leads into, if it leads to a value that can be told.
     pub(super) fn field(&self, path: &KeyPath) -> Option<Field> {
         let object = object_of(path)?;
-        let pieces = Pieces::of(&self.loaded.text);
+        let pieces = self.loaded.pieces();
         let group = self.group(&pieces, &object, &self.names())?;
         let exact = path.exact();
         group.fields.into_iter().find(|field| field.path == exact)
@@ -185,7 +185,7 @@ impl Seen {
             scene if is_gltf(scene) => "glTF",
             scene if is_course(scene) => "JSON",
             _ => {
-                let pieces = Pieces::of(&self.loaded.text);
+                let pieces = self.loaded.pieces();
                 let names = self.names();
                 let mut groups: Vec<Group> = self.group(&pieces, &path, &names).into_iter().collect();
                 let mut wanted: Vec<KeyPath> = material.map(|name| named("materials", name)).into_iter().collect();

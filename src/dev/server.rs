@@ -137,12 +137,13 @@ struct Shared {
 }
 
 /// The page's modules.
-const MODULES: [(&str, &str); 12] = [
+const MODULES: [(&str, &str); 13] = [
     ("/camera.js", include_str!("page/camera.js")),
     ("/compare.js", include_str!("page/compare.js")),
     ("/object.js", include_str!("page/object.js")),
     ("/editor.js", include_str!("page/editor.js")),
     ("/link.js", include_str!("page/link.js")),
+    ("/numbers.js", include_str!("page/numbers.js")),
     ("/page.js", include_str!("page/page.js")),
     ("/picture.js", include_str!("page/picture.js")),
     ("/probes.js", include_str!("page/probes.js")),

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant, SystemTime};
 
 use super::diagnostic::Diagnostic;
@@ -12,7 +12,7 @@ use crate::gpu::compose::{self, Shaders};
 use crate::image::AovSource;
 use crate::pack::{Packed, Specialization, pack};
 use crate::scene::{
-    CameraDescription, Description, Draft, Integrator, Overrides, Scene, folder_of, is_gltf, read_text,
+    CameraDescription, Description, Draft, Integrator, Overrides, Pieces, Places, Scene, folder_of, is_gltf, read_text,
 };
 
 /// Where the files are.
@@ -39,6 +39,8 @@ pub struct Loaded {
     pub scene: Scene,
     /// What the backends read.
     pub packed: Packed,
+    /// Where the parts of the text are, once anybody has asked.
+    places: OnceLock<Places>,
 }
 
 impl Loaded {
@@ -51,7 +53,20 @@ impl Loaded {
             description,
             scene,
             packed,
+            places: OnceLock::new(),
         }
+    }
+
+    /// The same, where the parts of the text are known.
+    #[must_use]
+    pub(crate) fn with_places(mut self, places: Option<Places>) -> Loaded {
+        self.places = places.map_or_else(OnceLock::new, OnceLock::from);
+        self
+    }
+
+    /// The pieces of the text. A large one is looked through once.
+    pub(crate) fn pieces(&self) -> Pieces<'_> {
+        Pieces::known(&self.text, self.places.get_or_init(|| Places::of(&self.text)))
     }
 }
 

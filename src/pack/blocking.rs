@@ -1,6 +1,8 @@
 //! Which primitives can cast a shadow at all: a flat one with the whole scene on one side of its plane cannot, as no
 //! segment from a surface to a light crosses it. The walls of a room are such.
 
+use std::cell::LazyCell;
+
 use glam::DVec3;
 
 use super::extent_tree::{Extent, ExtentTree};
@@ -15,9 +17,9 @@ const MOST_NODES: u32 = 1024;
 
 /// For each primitive, whether it can hide a point of a surface from a light.
 pub fn can_cast_shadow(scene: &Scene, primitives: &[Primitive]) -> Vec<bool> {
-    let things = Things::of(scene);
+    let things = LazyCell::new(|| Things::of(scene)); // where nothing is flat nothing asks
     let blocking = primitives.iter().map(|p| match scene.shapes.get(p.shape as usize) {
-        Some(shape) => casts_shadow(scene, shape.material) && things.blocks(p, MOST_NODES),
+        Some(shape) => casts_shadow(scene, shape.material) && (p.kind == ELLIPSOID || things.blocks(p, MOST_NODES)),
         // A light: under the path tracer it hides what is behind it.
         None => scene.render.integrator == Integrator::Path && things.blocks(p, MOST_NODES),
     });
@@ -63,7 +65,7 @@ impl<'a> Things<'a> {
     }
 
     fn blocks(&self, primitive: &Primitive, most_nodes: u32) -> bool {
-        if primitive.kind == ELLIPSOID || self.all_around {
+        if self.all_around {
             return true;
         }
         let mut range = Range {

@@ -44,31 +44,39 @@ impl ExtentTree {
             nodes: Vec::new(),
             things,
         };
-        if !tree.things.is_empty() {
-            tree.build(0, tree.things.len(), extents);
+        if let Some(most) = tree.things.iter().max() {
+            let mut boxes = vec![(DVec3::ZERO, DVec3::ZERO); most + 1];
+            for i in &tree.things {
+                let [x, y, z] = DVec3::AXES.map(|axis| extents.extent(*i, axis));
+                boxes[*i] = (DVec3::new(x.0, y.0, z.0), DVec3::new(x.1, y.1, z.1));
+            }
+            tree.build(0, tree.things.len(), extents, &boxes);
         }
         tree
     }
 
-    fn build(&mut self, start: usize, end: usize, extents: &impl Extent) {
+    /// `boxes` has where each thing reaches along the axes.
+    fn build(&mut self, start: usize, end: usize, extents: &impl Extent, boxes: &[(DVec3, DVec3)]) {
         let things = &mut self.things[start..end];
-        let along = |things: &[usize], direction: DVec3| {
-            let all = things.iter().map(|i| extents.extent(*i, direction));
-            all.fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)))
-        };
-        let [x, y, z] = DVec3::AXES.map(|axis| along(things, axis));
-        let (low, high) = (DVec3::new(x.0, y.0, z.0), DVec3::new(x.1, y.1, z.1));
+        let nowhere = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (low, high) = things.iter().fold(nowhere, |(low, high), i| {
+            let own = &boxes[*i];
+            (low.min(own.0), high.max(own.1))
+        });
         let normal = extents.normal(things[things.len() / 2]).normalize_or_zero();
-        let slab = along(things, normal);
+        let slab = match normal == DVec3::ZERO {
+            true => (0.0, 0.0),
+            false => {
+                let all = things.iter().map(|i| extents.extent(*i, normal));
+                all.fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)))
+            }
+        };
         let node = self.nodes.len();
         let half = things.len() / 2;
         let is_leaf = things.len() <= LEAF;
         if !is_leaf {
-            let axis = DVec3::AXES[(high - low).max_position()];
-            let middle = |i: &usize| {
-                let (low, high) = extents.extent(*i, axis);
-                low + high
-            };
+            let axis = (high - low).max_position();
+            let middle = |i: &usize| boxes[*i].0[axis] + boxes[*i].1[axis];
             things.select_nth_unstable_by(half, |a, b| middle(a).total_cmp(&middle(b)));
         }
         self.nodes.push(Node {
@@ -79,9 +87,9 @@ impl ExtentTree {
             children: Children::Leaf(start, end),
         });
         if !is_leaf {
-            self.build(start, start + half, extents);
+            self.build(start, start + half, extents, boxes);
             self.nodes[node].children = Children::Halves(self.nodes.len());
-            self.build(start + half, end, extents);
+            self.build(start + half, end, extents, boxes);
         }
     }
 

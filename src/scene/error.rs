@@ -127,7 +127,7 @@ const LONGEST_MESSAGE: usize = 1000;
 const MOST_SEGMENTS: usize = 20;
 
 /// A value or a key for a message: where it is long, its start and its end.
-pub(super) fn cut(text: &str) -> Cow<'_, str> {
+pub(crate) fn cut(text: &str) -> Cow<'_, str> {
     cut_to(LONGEST, text)
 }
 

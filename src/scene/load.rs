@@ -12,6 +12,8 @@ use super::define::{Define, Defines};
 use super::error::KeyPath;
 use super::error::{At, Problem, SceneError};
 use super::gltf::{GltfChoice, describe, is_gltf};
+#[cfg(feature = "dev")]
+use super::parse::Places;
 use super::parse::{NOT_UTF8, invalid, line_of_path, syntax_error};
 use super::turntable::turning;
 use super::validate::{LIGHT_SAMPLES, adaptive, adaptive_error, max_depth, sample_count, side};
@@ -296,7 +298,7 @@ impl<'a> Draft<'a> {
     }
 
     /// Reads a text that differs from one that was read as `before` inside of one table alone, that at the first two steps of a path.
-    /// Where that table has a header of its own nothing else is read again.
+    /// Where that table has a header of its own nothing else is read again. Also where the text's parts are, if that was found.
     #[cfg(feature = "dev")]
     pub fn change(
         text: &'a str,
@@ -304,21 +306,24 @@ impl<'a> Draft<'a> {
         folder: &'a Path,
         overrides: &'a Overrides,
         (before, at): (&Description, &KeyPath),
-    ) -> Result<Draft<'a>, SceneError> {
+    ) -> Result<(Draft<'a>, Option<Places>), SceneError> {
         let mut defines = Defines::new(&overrides.define);
-        let Some((description, is_rest)) = Description::parse_change(text, origin, &mut defines, before, at)? else {
-            return Draft::read(text, origin, folder, overrides);
+        let Some(change) = Description::parse_change(text, origin, &mut defines, before, at)? else {
+            return Ok((Draft::read(text, origin, folder, overrides)?, None));
         };
-        let draft = Draft {
+        let mut draft = Draft {
             text,
             origin,
             folder,
             overrides,
             defines,
-            description,
+            description: change.description,
         };
         // The options stand in for values outside of the parts, and are in their places still where these were not read again.
-        if is_rest { draft.overridden() } else { Ok(draft) }
+        if change.is_rest {
+            draft = draft.overridden()?;
+        }
+        Ok((draft, Some(change.places)))
     }
 
     fn overridden(mut self) -> Result<Draft<'a>, SceneError> {

@@ -48,9 +48,9 @@ pub use camera_path::CameraPath;
 pub(crate) use course::is_course;
 pub use define::Define;
 pub use description::*;
-#[cfg(feature = "dev")]
-pub(crate) use error::Segment;
 pub use error::{ErrorPlace, KeyPath, Problem, SceneError};
+#[cfg(feature = "dev")]
+pub(crate) use error::{Segment, cut};
 pub use framing::{Framing, View, framed};
 pub use gltf::{GltfChoice, is_gltf};
 pub use image_file::Assets;
@@ -59,7 +59,7 @@ pub use load::Overrides;
 pub(crate) use load::{Draft, folder_of, read_text};
 pub use metals::MetalIndex;
 #[cfg(feature = "dev")]
-pub(crate) use parse::Pieces;
+pub(crate) use parse::{Pieces, Places};
 #[cfg(all(test, feature = "dev"))]
 pub(crate) use schema::fields::Kind as FieldKind;
 #[cfg(feature = "dev")]

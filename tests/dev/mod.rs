@@ -4,10 +4,12 @@
 mod faults;
 mod film_layers;
 mod gltf;
+mod hostile;
 mod kernels;
 mod large;
 mod measure;
 mod pauses;
+mod picking;
 mod reload;
 mod responsive;
 mod running;

@@ -55,7 +55,15 @@ fn the_server_answers_its_own_pages_only() {
     std::thread::spawn(move || listener.serve(&session.session).unwrap());
     let (own, port) = (address.to_string(), address.port());
 
-    for path in ["/", "/style.css", "/page.js", "/picture.js", "/link.js", "/object.js"] {
+    for path in [
+        "/",
+        "/style.css",
+        "/page.js",
+        "/picture.js",
+        "/link.js",
+        "/object.js",
+        "/numbers.js",
+    ] {
         let (status, text) = ask(address, &get(path, &own, ""));
         assert_eq!(status, "HTTP/1.1 200 OK", "{path}");
         assert!(

@@ -120,3 +120,128 @@ test("the object outlives reloads, and is told when it has gone", async () => {
   studio.write("scene.toml", SCENE);
   await box(page, "shapes[1].point").waitFor();
 });
+
+test("boxes of numbers are dragged and stepped, and each way is one step back", async () => {
+  const page = await open(browser, studio);
+  await choose(page, "camera");
+  const x = box(page, "camera.position", 0);
+  await x.scrollIntoViewIfNeeded();
+  const area = await x.boundingBox();
+  const [left, top] = [area.x + area.width / 2, area.y + area.height / 2];
+  // Ten pixels are one step, a tenth of the position's size; with Shift a hundred are.
+  await page.mouse.move(left, top);
+  await page.mouse.down();
+  for (const way of [5, 20, 60, 100]) await page.mouse.move(left + way, top);
+  await page.keyboard.down("Shift");
+  await page.mouse.move(left + 150, top);
+  await page.keyboard.up("Shift");
+  await page.mouse.up();
+  await holds("position = [1.05, -4, 1] # a comment");
+  assert.equal(await x.inputValue(), "1.05");
+  assert.equal(await x.evaluate((box) => box === document.activeElement), false);
+  await settled(page);
+  await page.locator("#undo-write", { hasText: "camera.position" }).click();
+  await page.locator("#redo-write", { hasText: "camera.position" }).waitFor();
+  assert.equal(studio.read("scene.toml"), SCENE);
+  await page.waitForFunction(() => document.querySelector('[data-control="camera.position 0"]').value === "0");
+  // Escape gives the drag up.
+  await page.mouse.move(left, top);
+  await page.mouse.down();
+  await page.mouse.move(left + 40, top);
+  await holds("position = [0.4, -4, 1]");
+  await page.keyboard.press("Escape");
+  await holds("position = [0, -4, 1]");
+  await page.mouse.up();
+  await page.waitForFunction(() => document.getElementById("undo-write").disabled);
+  // A click types, and the pointer then belongs to the text.
+  await page.mouse.click(left, top);
+  assert.equal(await x.evaluate((box) => box === document.activeElement), true);
+  // A key that is held down is one step back, too.
+  for (let i = 0; i < 4; i++) await page.keyboard.down("ArrowUp");
+  await page.keyboard.up("ArrowUp");
+  await holds("position = [0.4, -4, 1]");
+  await page.keyboard.press("PageDown");
+  await holds("position = [-0.6, -4, 1]");
+  await page.keyboard.press("Shift+ArrowUp");
+  await holds("position = [-0.59, -4, 1]");
+  for (const text of ["-0.6", "0.4", "0"]) {
+    await page.click("#undo-write");
+    await holds(`position = [${text}, -4, 1]`);
+    await settled(page);
+  }
+  assert.equal(studio.read("scene.toml"), SCENE);
+  assert.deepEqual(page.faults, []);
+});
+
+test("nothing out of range is sent by a drag, a key or a slider", async () => {
+  const page = await open(browser, studio);
+  await page.evaluate(() => {
+    const send = WebSocket.prototype.send;
+    window.sent = [];
+    WebSocket.prototype.send = function (text) {
+      const { set } = JSON.parse(text);
+      if (set) window.sent.push(set);
+      return send.call(this, text);
+    };
+  });
+  await choose(page, "shapes[0]");
+  await box(page, "shapes[0].radius", 1).focus();
+  for (let i = 0; i < 12; i++) await page.keyboard.press("PageDown");
+  await page.locator("#undo-write", { hasText: "shapes[0].radius" }).waitFor();
+  await choose(page, "lights[0]");
+  const red = box(page, "lights[0].color", 1);
+  await red.scrollIntoViewIfNeeded();
+  const area = await red.boundingBox();
+  await page.mouse.move(area.x + area.width / 2, area.y + area.height / 2);
+  await page.mouse.down();
+  for (let i = 1; i < 6; i++) await page.mouse.move(area.x + area.width / 2 - 60 * i, area.y + area.height / 2);
+  await page.mouse.up();
+  await page.waitForFunction(() => document.querySelector('[data-control="lights[0].color 1"]').value === "0.5");
+  await red.focus();
+  for (let i = 0; i < 7; i++) await page.keyboard.press("PageDown");
+  await holds("color = [0, 0.8, 0.8]");
+  await settled(page);
+  const sent = await page.evaluate(() => window.sent);
+  assert.ok(sent.length >= 4); // of each burst the first and the last at least
+  for (const { path, value } of sent) {
+    const [low, high] = path.endsWith("radius") ? [1e-9, 1e9] : [0, 1e6];
+    for (const x of [value].flat()) assert.ok(x >= low && x <= high, `${path}: ${x}`);
+  }
+  // A number that is typed goes to the scene's own reader, which says what is wrong.
+  await red.fill("-1");
+  await page.keyboard.press("Enter");
+  await page.locator('[data-path="lights[0].color"] .bad', { hasText: "-1 must be finite, from 0 to" }).waitFor();
+  assert.ok(studio.read("scene.toml").includes("color = [0, 0.8, 0.8]"));
+});
+
+test("one slider makes a light stronger and weaker, and its tint stays", async () => {
+  studio.edit("scene.toml", "color = [0.8, 0.8, 0.8]", "color = [2, 1, 0.5]");
+  const page = await open(browser, studio);
+  await choose(page, "lights[0]");
+  const [slider, strength] = [4, 5].map((nth) => box(page, "lights[0].color", nth));
+  assert.equal(await strength.inputValue(), "2");
+  assert.ok(Number(await slider.getAttribute("max")) >= 4, "it goes well above what is there");
+  assert.equal(await slider.getAttribute("min"), "0");
+  await slider.fill("4");
+  await holds("color = [4, 2, 1]");
+  await page.locator("#undo-write", { hasText: "lights[0].color" }).waitFor();
+  await slider.focus();
+  await page.keyboard.press("Home");
+  await holds("color = [0, 0, 0]");
+  await settled(page);
+  await strength.fill("30");
+  await page.keyboard.press("Enter");
+  await holds("color = [30, 15, 7.5]");
+  await settled(page);
+  assert.ok(Number(await slider.getAttribute("max")) >= 60, "there is always room above");
+  for (const text of ["[0, 0, 0]", "[4, 2, 1]", "[2, 1, 0.5]"]) {
+    await page.click("#undo-write");
+    await holds(`color = ${text}`);
+    await settled(page);
+  }
+  // What reflects has a share of light, and no strength.
+  await choose(page, "materials.red");
+  assert.equal(await box(page, "materials.red.color", 3).count(), 1);
+  assert.equal(await box(page, "materials.red.color", 4).count(), 0);
+  assert.deepEqual(page.faults, []);
+});

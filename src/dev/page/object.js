@@ -1,8 +1,10 @@
 // The object that was clicked: its lines in the scene file, and its values as controls that write into it.
 
 import { ask, element, lastState, onLink, onMessage, onState, put } from "/link.js";
+import { digits, fit, say, steppable } from "/numbers.js";
 
 const STEPS = 1000; // of a slider that goes by factors
+const MOVING = /^(Arrow|Page|Home$|End$)/; // keys that move a control
 const LISTED = 250; // milliseconds without a key before names are asked for
 
 let asked = null; // the pixel, or the name and the material, that was asked for
@@ -11,7 +13,8 @@ let signature = ""; // of the controls that are there
 let controls = new Map(); // by their paths
 let gesture = Math.floor(Math.random() * 2 ** 40); // changes of one gesture are one step of undo
 let held = null; // the path whose control is being moved
-let stale = false; // whether controls must be made anew once it is let go
+let [pointer, key] = [false, false]; // whether it is by the pointer, and by a key that is down
+let stale = false; // whether controls must be shown anew once it is let go
 let sending = null; // the change that waits for the program
 let waiting = null; // the newest one after it
 
@@ -135,7 +138,10 @@ function showObject(object) {
   if (next === signature) {
     object.groups.forEach((group, i) => {
       showLines(element("object-groups").children[i].querySelector("pre"), group, object.file);
-      for (const field of group.fields) if (!isBusy(field.path)) controls.get(field.path)?.(field);
+      for (const field of group.fields) {
+        if (field.path === held) stale = true;
+        if (!isBusy(field.path)) controls.get(field.path)?.(field);
+      }
     });
     return;
   }
@@ -212,10 +218,31 @@ function fieldOf(field) {
   }
   made.inputs.forEach((input, i) => {
     input.dataset.control = `${field.path} ${i}`;
-    input.addEventListener("pointerdown", () => (held = field.path));
-    input.addEventListener("pointerup", () => setTimeout(() => held === field.path && letGo()));
-    input.addEventListener("change", letGo);
-    input.addEventListener("blur", () => held === field.path && letGo());
+    input.addEventListener("pointerdown", () => {
+      held = field.path;
+      pointer = true;
+    });
+    for (const end of ["pointerup", "pointercancel"]) {
+      input.addEventListener(end, () => setTimeout(() => {
+        pointer = false;
+        if (held === field.path) letGo();
+      }));
+    }
+    // A key that is held down is one gesture, like a drag.
+    input.addEventListener("keydown", (event) => {
+      if (!MOVING.test(event.key)) return;
+      held = field.path;
+      key = true;
+    });
+    input.addEventListener("keyup", () => {
+      key = false;
+      if (!pointer) letGo();
+    });
+    input.addEventListener("change", () => key || letGo());
+    input.addEventListener("blur", () => {
+      key = false;
+      if (held === field.path) letGo();
+    });
   });
   box.append(...made.elements, error);
   controls.set(field.path, (next) => {
@@ -226,8 +253,6 @@ function fieldOf(field) {
 }
 
 const valueOf = (field) => field.value ?? field.default;
-const digits = (x, count) => Number(x.toPrecision(count));
-const say = (x) => (x === undefined || x === null ? "" : String(x));
 
 function numberBox(field, label) {
   const box = make("input", { type: "number", step: field.kind === "whole" ? "1" : "any" });
@@ -240,38 +265,53 @@ function numberBox(field, label) {
 // A box takes a number when it is left or stepped, unless it is empty or none.
 const onNumber = (box, use) => box.addEventListener("change", () => box.value !== "" && Number.isFinite(box.valueAsNumber) && use(box.valueAsNumber));
 
-function numberOf(field, change) {
-  const box = numberBox(field, field.name);
-  onNumber(box, change);
-  const inputs = [box];
-  let range = null;
-  let slider = field.slider;
+// A box, and a slider beside it if there is one, for a number of a field.
+function pairOf(field, label, slider, change) {
+  const box = numberBox(field, label);
+  let now;
+  const range = slider ? make("input", { type: "range" }) : null;
   const place = (x) => (slider.logarithmic ? (STEPS * Math.log(x / slider.from)) / Math.log(slider.to / slider.from) : x);
-  const number = (at) => (slider.logarithmic ? digits(slider.from * (slider.to / slider.from) ** (at / STEPS), 3) : digits(at, 12));
-  if (slider) {
-    range = make("input", { type: "range" });
-    range.setAttribute("aria-label", `${field.name}, slider`);
-    range.addEventListener("input", () => {
-      held = field.path;
-      const rough = number(range.valueAsNumber);
-      const x = field.kind === "whole" ? Math.round(rough) : rough;
-      box.value = say(x);
-      range.setAttribute("aria-valuetext", say(x));
-      change(x);
-    });
-    inputs.unshift(range);
-  }
-  const update = (next) => {
-    const x = valueOf(next);
-    if (document.activeElement !== box) box.value = say(x);
+  const number = (at) => (slider.logarithmic ? digits(slider.from * (slider.to / slider.from) ** (at / STEPS), 3) : at);
+  const take = (x) => {
+    now = x;
     if (!range) return;
-    slider = next.slider ?? slider;
-    const [low, high, step] = slider.logarithmic ? [0, STEPS, 1] : [slider.from, slider.to, slider.step];
-    Object.assign(range, { min: say(low), max: say(high), step: say(step), value: say(x === undefined ? low : place(x)) });
+    range.value = say(x === undefined ? range.min : place(x));
     range.setAttribute("aria-valuetext", say(x));
   };
+  const use = (x) => {
+    take(x);
+    change(x);
+  };
+  onNumber(box, use);
+  steppable(box, field, () => [now], use);
+  if (range) {
+    range.setAttribute("aria-label", `${label}, slider`);
+    range.addEventListener("input", () => {
+      held = field.path;
+      now = fit(field, number(range.valueAsNumber), now ?? 0);
+      box.value = say(now);
+      range.setAttribute("aria-valuetext", say(now));
+      change(now);
+    });
+  }
+  const update = (x, next) => {
+    if (document.activeElement !== box) box.value = say(x);
+    slider = next ?? slider;
+    if (range) {
+      const [low, high, step] = slider.logarithmic ? [0, STEPS, 1] : [slider.from, slider.to, slider.step];
+      Object.assign(range, { min: say(low), max: say(high), step: say(step) });
+    }
+    take(x);
+  };
+  const inputs = range ? [range, box] : [box];
+  return { inputs, element: make("div", { className: range ? "pair" : "single" }, ...inputs), update };
+}
+
+function numberOf(field, change) {
+  const pair = pairOf(field, field.name, field.slider, change);
+  const update = (next) => pair.update(valueOf(next), next.slider);
   update(field);
-  return { inputs, elements: [make("div", { className: range ? "pair" : "single" }, ...inputs)], update };
+  return { inputs: pair.inputs, elements: [pair.element], update };
 }
 
 const encode = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
@@ -288,41 +328,60 @@ function colorOf(field, change) {
   const picker = make("input", { type: "color", title: "As a display shows it (sRGB)" });
   picker.setAttribute("aria-label", `${field.name}, as a display shows it (sRGB)`);
   let now = [0, 0, 0];
+  let tint = [1, 1, 1]; // the colour at strength 1: it stays when the strength is 0
+  const take = (list) => {
+    now = list;
+    const most = Math.max(...now);
+    if (most > 0) tint = now.map((x) => x / most);
+  };
   picker.addEventListener("input", () => {
     held = field.path;
     if (picker.value === hexOf(now)) return;
     const most = Math.max(1, ...now);
-    now = [1, 3, 5].map((at) => digits(decode(parseInt(picker.value.slice(at, at + 2), 16) / 255) * most, 4));
+    take([1, 3, 5].map((at) => digits(decode(parseInt(picker.value.slice(at, at + 2), 16) / 255) * most, 4)));
     parts.show(now);
     change(now);
   });
   const parts = numbersOf(field, ["red", "green", "blue"].map((name) => `${field.name}, linear ${name}`), (list) => {
-    now = list;
+    take(list);
     picker.value = hexOf(now);
+    change(now);
+  });
+  // Light has no natural end: one slider makes it stronger and weaker, and the tint stays.
+  const strength = field.slider && pairOf({ ...field, kind: "number" }, `${field.name}, strength`, field.slider, (most) => {
+    now = tint.map((x) => digits(x * most, 6));
+    picker.value = hexOf(now);
+    parts.show(now);
     change(now);
   });
   const legend = make("small", { className: "quiet" });
   const update = (next) => {
-    now = valueOf(next) ?? [0, 0, 0];
+    take(valueOf(next) ?? [0, 0, 0]);
     picker.value = hexOf(now);
     parts.update(next);
     const most = Math.max(...now);
+    strength?.update(most, next.slider);
     legend.textContent = most > 1 ? `sRGB of the colour over ${digits(most, 4)}; linear red, green, blue` : "sRGB; linear red, green, blue";
   };
   update(field);
   const elements = [make("div", { className: "color" }, picker, ...parts.inputs), legend];
-  return { inputs: [picker, ...parts.inputs], elements, update };
+  if (strength) elements.push(make("small", { className: "strength", textContent: "strength, the largest of them" }), strength.element);
+  return { inputs: [picker, ...parts.inputs, ...(strength?.inputs ?? [])], elements, update };
 }
 
 // Number boxes for a list.
 function numbersOf(field, labels, change) {
   let now = [];
   const boxes = labels.map((label) => numberBox(field, label));
-  boxes.forEach((box, i) => onNumber(box, (x) => {
-    now = boxes.map((other, j) => now[j] ?? (Number.isFinite(other.valueAsNumber) ? other.valueAsNumber : 0));
-    now[i] = x;
-    change([...now]);
-  }));
+  boxes.forEach((box, i) => {
+    const use = (x) => {
+      now = boxes.map((other, j) => now[j] ?? (Number.isFinite(other.valueAsNumber) ? other.valueAsNumber : 0));
+      now[i] = x;
+      change([...now]);
+    };
+    onNumber(box, use);
+    steppable(box, field, () => now, use);
+  });
   const show = (list) => {
     now = [...list];
     boxes.forEach((box, i) => {

@@ -151,6 +151,7 @@ function seconds(s) {
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
   if (event.target.matches("select, textarea, input:not([type=radio], [type=checkbox], [type=range])")) return;
+  if (event.target.matches("input[type=range]") && /^(Arrow|Page|Home$|End$)/.test(event.key)) return; // they move the slider
   if (event.key === " " && event.target.matches("button, summary, input, a, label")) return;
   const act = actions.get(event.key) ?? actions.get(event.shiftKey ? `Shift+${event.key.toLowerCase()}` : event.key.toLowerCase());
   if (act && act(event) !== false) event.preventDefault();

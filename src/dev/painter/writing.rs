@@ -8,24 +8,26 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use super::Painter;
-use crate::dev::edit::edited;
+use crate::dev::edit::edited_in;
 use crate::dev::history::Step;
 use crate::dev::messages::{Report, Set};
 use crate::dev::object::{Seen, object_of};
 use crate::dev::save::{replace, with_camera};
 use crate::dev::source::{Loaded, Stamp};
-use crate::scene::{Draft, KeyPath, Segment, folder_of, is_course, is_gltf, read_text};
+use crate::scene::{Draft, KeyPath, Segment, cut, folder_of, is_course, is_gltf, read_text};
+use crate::visible::visible;
 
 impl Painter {
     /// Writes a value into the scene file.
     pub(super) fn set(&mut self, set: &Set) {
-        let result = self.try_set(set);
+        // Who looks may send anything, and the terminal shows what is told.
+        let result = self.try_set(set).map_err(|why| visible(&why).into_owned());
         if result.is_err() {
             self.notice(&result, String::new()); // what is written is seen
         }
         // A slider that is drawn writes many times, and the terminal is told of none but what goes wrong.
         if result.is_err() || set.gesture.is_none() {
-            (self.report)(Report::Wrote(set.path.clone(), result));
+            (self.report)(Report::Wrote(visible(&cut(&set.path)).into_owned(), result));
         }
     }
 
@@ -49,7 +51,7 @@ impl Painter {
         };
         let value = value.map_err(|why| format!("{path}: {why}"))?;
         let origin = self.sources.scene.display();
-        let after = edited(&before, &path, value.as_ref()).map_err(|why| format!("{origin}: {why}"))?;
+        let after = edited_in(&loaded.pieces(), &path, value.as_ref()).map_err(|why| format!("{origin}: {why}"))?;
         let step = Step::new(path.to_string(), object, set.gesture);
         self.write(&file, (&loaded, &before), after, step)
     }
@@ -147,9 +149,9 @@ impl Painter {
         let folder = folder_of(&self.sources.scene);
         let known = (&known.description, at);
         let read = Draft::change(&text, &origin, folder, &self.sources.overrides, known);
-        let read = read.and_then(|draft| draft.check(&mut BTreeSet::new()));
-        let (scene, description) = read.map_err(|error| error.to_string())?;
-        Ok(Arc::new(Loaded::new(text, scene, description)))
+        let read = read.and_then(|(draft, places)| Ok((draft.check(&mut BTreeSet::new())?, places)));
+        let ((scene, description), places) = read.map_err(|error| error.to_string())?;
+        Ok(Arc::new(Loaded::new(text, scene, description).with_places(places)))
     }
 
     /// Writes a text that is a scene, and shows it.

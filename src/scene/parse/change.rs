@@ -12,15 +12,15 @@ use crate::scene::error::{At, KeyPath, SceneError, Segment};
 use crate::scene::{CameraDescription, Description};
 
 impl Description {
-    /// What a text says after a change inside of the table at the first two steps of a path; `before` is what it said. Also
-    /// whether that was read again which is outside of the parts. `None` if all of it has to be read.
+    /// What a text says after a change inside of the table at the first two steps of a path; `before` is what it said.
+    /// `None` if all of it has to be read.
     pub(in crate::scene) fn parse_change(
         text: &str,
         origin: &str,
         defines: &mut Defines,
         before: &Description,
         at: &KeyPath,
-    ) -> Result<Option<(Self, bool)>, SceneError> {
+    ) -> Result<Option<Change>, SceneError> {
         if course::is_course(Path::new(origin)) {
             return Ok(None);
         }
@@ -29,12 +29,18 @@ impl Description {
         if let Some(large) = parts.too_large() {
             return Err(broken(large));
         }
-        let read = match parts.find(at) {
-            Some((part, _)) => read_changed_part(&parts, part, at, defines, before).map_err(broken)?,
+        let part = parts.find(at).map(|(part, _)| part);
+        let is_rest = part.is_none();
+        let read = match part {
+            Some(part) => read_changed_part(&parts, part, at, defines, before).map_err(broken)?,
             None => read_changed_rest(&parts, defines, before).map_err(broken)?,
         };
         match read {
-            Some(Ok(description)) => Ok(Some((description, parts.find(at).is_none()))),
+            Some(Ok(description)) => Ok(Some(Change {
+                description,
+                is_rest,
+                places: Places(parts.parts.into_owned()),
+            })),
             Some(Err(problem)) => Err(invalid(text, origin, problem, defines)),
             None => Ok(None),
         }
@@ -53,6 +59,27 @@ impl Description {
             .unwrap_or_default();
         let read = read_camera(camera).at("camera");
         read.map_err(|problem| invalid(text, origin, problem, &Defines::new(&[])))
+    }
+}
+
+/// What was read again of a text.
+pub(in crate::scene) struct Change {
+    /// What the text says.
+    pub description: Description,
+    /// Whether that was read again which is outside of the parts.
+    pub is_rest: bool,
+    /// Where the parts are.
+    pub places: Places,
+}
+
+/// Where the parts of a text are, once it has been looked through.
+#[derive(Debug)]
+pub(crate) struct Places(Vec<Part>);
+
+impl Places {
+    /// Those of a text.
+    pub fn of(text: &str) -> Places {
+        Places(Parts::of(text).parts.into_owned())
     }
 }
 
@@ -141,6 +168,17 @@ impl<'a> Pieces<'a> {
     /// Those of a text.
     pub fn of(text: &'a str) -> Pieces<'a> {
         Pieces(Parts::of(text))
+    }
+
+    /// Those of a text whose parts are known.
+    pub fn known(text: &'a str, places: &'a Places) -> Pieces<'a> {
+        let parts = places.0.as_slice().into();
+        Pieces(Parts { text, parts })
+    }
+
+    /// The whole text.
+    pub fn whole(&self) -> &'a str {
+        self.0.text
     }
 
     /// The piece that a path leads into.

@@ -30,7 +30,7 @@ use super::limits::{BLADES, DEEPEST, MOST, UV_SETS};
 use super::validate::depths;
 
 #[cfg(feature = "dev")]
-pub(crate) use change::Pieces;
+pub(crate) use change::{Pieces, Places};
 pub(super) use syntax::{NOT_UTF8, syntax_error};
 
 impl Description {
@@ -232,7 +232,7 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Read<Descri
     let mut shapes: Read<Vec<ShapeDescription>> = Ok(Vec::new());
     let mut meshes: Read<BTreeMap<String, MeshFileDescription>> = Ok(BTreeMap::new());
     let mut instances: Read<Vec<InstanceDescription>> = Ok(Vec::new());
-    for part in &parts.parts {
+    for part in parts.parts.iter() {
         match &rest {
             // What comes first in the text is told first.
             Err(broken) if broken.at < part.place.start => break,

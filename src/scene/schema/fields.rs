@@ -9,7 +9,7 @@ use toml::Value;
 
 use super::{SPLIT, definition, of_files};
 use crate::scene::CameraDescription;
-use crate::scene::error::{KeyPath, Segment};
+use crate::scene::error::{KeyPath, Segment, cut};
 
 /// A value that can be changed, or is shown.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -34,7 +34,10 @@ pub struct Field {
     /// The smallest and the largest number that it may be.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range: Option<(f64, f64)>,
-    /// A smaller range, around what it is.
+    /// Between these, the ends left out, it may not be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gap: Option<(f64, f64)>,
+    /// A smaller range, around what it is; of a colour that shines around its strength, the largest of its numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slider: Option<Slider>,
     /// What a choice may be; the first of them where they are many.
@@ -326,13 +329,16 @@ impl Found<'_> {
             choices.insert(0, own.clone());
         }
         let unit = unit_of(schema);
-        let range = matches!(kind, Kind::Number | Kind::Whole | Kind::Color | Kind::Vector).then(|| range_of(numbers));
-        let now = [value.as_ref(), place.default]
-            .into_iter()
-            .flatten()
-            .find_map(Json::as_f64);
+        let is_number = matches!(kind, Kind::Number | Kind::Whole | Kind::Color | Kind::Vector);
+        let range = is_number.then(|| range_of(numbers)).flatten();
+        let gap = is_number.then(|| gap_of(numbers)).flatten();
+        let now = value.as_ref().or(place.default);
         let slider = match kind {
-            Kind::Number | Kind::Whole => slider(numbers, kind == Kind::Whole, unit, now),
+            Kind::Number | Kind::Whole => slider(numbers, kind == Kind::Whole, unit, now.and_then(Json::as_f64)),
+            Kind::Color if shines(path) => {
+                let list = now.and_then(Json::as_array).into_iter().flatten();
+                slider(numbers, false, unit, list.filter_map(Json::as_f64).reduce(f64::max))
+            }
             _ => None,
         };
         self.fields.push(Field {
@@ -343,7 +349,8 @@ impl Found<'_> {
             value,
             default: place.default.cloned(),
             unit,
-            range: range.flatten(),
+            range,
+            gap,
             slider,
             choices,
             about: place.about.to_owned(),
@@ -396,7 +403,7 @@ impl Field {
                     .ok_or("one of the names that it may have".to_owned())
             }
         };
-        found.map_err(|rule| format!("{given} must be {rule}"))
+        found.map_err(|rule| format!("{} must be {rule}", cut(&given.to_string())))
     }
 }
 
@@ -458,16 +465,28 @@ fn unit_of(schema: &Json) -> Option<&'static str> {
         .map(|(_, unit)| unit)
 }
 
+/// Whether the colour at a path is light, which has no natural end, and not a share of it.
+fn shines(path: &[Segment]) -> bool {
+    let is_any = |segment: Option<&Segment>, names: &[&str]| match segment {
+        Some(Segment::Key(key)) => names.contains(&key.as_str()),
+        _ => false,
+    };
+    is_any(path.first(), &["lights", "environment", "render"]) || is_any(path.last(), &["emission"])
+}
+
+/// Where a range leaves its ends out, those that are told are inside of it by this part of its width.
+const INSIDE: f64 = 1e-3;
+
 /// The ends of a schema of numbers.
 fn ends(schema: &Json) -> Option<(f64, f64)> {
     if let Some(only) = schema.get("const").and_then(Json::as_f64) {
         return Some((only, only));
     }
-    let end = |names: [&str; 2]| names.into_iter().find_map(|name| schema.get(name)?.as_f64());
-    Some((
-        end(["minimum", "exclusiveMinimum"])?,
-        end(["maximum", "exclusiveMaximum"])?,
-    ))
+    let end = |name: &str| schema.get(name).and_then(Json::as_f64);
+    match (end("exclusiveMinimum"), end("exclusiveMaximum")) {
+        (Some(low), Some(high)) => Some((low + INSIDE * (high - low), high - INSIDE * (high - low))),
+        _ => Some((end("minimum")?, end("maximum")?)),
+    }
 }
 
 /// The ranges that a number may be in.
@@ -482,6 +501,12 @@ fn range_of(schema: &Json) -> Option<(f64, f64)> {
     let all = ranges(schema);
     let ends = all.iter().copied().reduce(|(a, b), (c, d)| (a.min(c), b.max(d)));
     ends.filter(|(low, high)| low < high)
+}
+
+/// What is left out between two ranges.
+fn gap_of(schema: &Json) -> Option<(f64, f64)> {
+    let [a, b] = ranges(schema).try_into().ok()?;
+    Some(if a.0 < b.0 { (a.1, b.0) } else { (b.1, a.0) })
 }
 
 /// The widest range that a linear slider goes over as a whole.

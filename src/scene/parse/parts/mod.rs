@@ -2,6 +2,7 @@
 //! text's memory. A part is a table of `[[shapes]]`, `[[lights]]`, `[materials.NAME]`, `[textures.NAME]`, `[meshes.NAME]` or `[[instances]]`; what is
 //! outside of these is one part.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use toml::de::Error;
@@ -62,8 +63,8 @@ pub struct Part {
 
 /// A text's parts. Each is a TOML document by itself.
 pub struct Parts<'a> {
-    text: &'a str,
-    pub parts: Vec<Part>,
+    pub text: &'a str,
+    pub parts: Cow<'a, [Part]>,
 }
 
 /// What is wrong with a text, and at which byte.
@@ -142,7 +143,10 @@ impl<'a> Parts<'a> {
                 open = Some(header.keys);
             }
         }
-        Parts { text, parts }
+        Parts {
+            text,
+            parts: parts.into(),
+        }
     }
 
     /// What is outside of the parts.

@@ -1,0 +1,261 @@
+//! Messages of viewers that mean no good: each is refused in words, and the scene file stays.
+
+use std::io::{Read as _, Write as _};
+use std::net::{SocketAddr, TcpStream};
+
+use serde_json::{Value, json};
+use wgray::dev::{Command, Listener, Set};
+
+use super::running::{Files, LONGEST, Running, SCENE};
+
+/// A viewer's connection.
+struct Viewer(TcpStream);
+
+impl Viewer {
+    fn new(address: SocketAddr) -> Viewer {
+        let mut stream = TcpStream::connect(address).unwrap();
+        stream.set_read_timeout(Some(LONGEST)).unwrap();
+        let request = format!(
+            "GET /socket HTTP/1.1\r\nHost: {address}\r\nOrigin: http://{address}\r\nConnection: Upgrade\r\n\
+             Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+        );
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut head = Vec::new();
+        while !head.ends_with(b"\r\n\r\n") {
+            let mut byte = [0];
+            stream.read_exact(&mut byte).unwrap();
+            head.push(byte[0]);
+        }
+        assert!(head.starts_with(b"HTTP/1.1 101"));
+        Viewer(stream)
+    }
+
+    /// Sends bytes as a message of text, masked with zeros.
+    fn say(&mut self, text: &[u8]) -> std::io::Result<()> {
+        let mut bytes = vec![0x81, 0x80 | 127];
+        bytes.extend((text.len() as u64).to_be_bytes());
+        bytes.extend([0; 4]);
+        bytes.extend(text);
+        self.0.write_all(&bytes)
+    }
+
+    /// The next message of text; none when the connection has ended.
+    fn hear(&mut self) -> Option<Value> {
+        loop {
+            let mut head = [0; 2];
+            self.0.read_exact(&mut head).ok()?;
+            let length = match head[1] {
+                126 => {
+                    let mut length = [0; 2];
+                    self.0.read_exact(&mut length).ok()?;
+                    u64::from(u16::from_be_bytes(length))
+                }
+                127 => {
+                    let mut length = [0; 8];
+                    self.0.read_exact(&mut length).ok()?;
+                    u64::from_be_bytes(length)
+                }
+                short => u64::from(short),
+            };
+            let mut body = vec![0; length as usize];
+            self.0.read_exact(&mut body).ok()?;
+            match head[0] & 0xf {
+                1 => return Some(serde_json::from_slice(&body).unwrap()),
+                8 => return None,
+                _ => {}
+            }
+        }
+    }
+
+    /// What is said against a message: at once, or by the state that has heard it.
+    #[track_caller]
+    fn refused(&mut self, text: &str) -> String {
+        self.say(text.as_bytes()).unwrap();
+        let mut number = None;
+        loop {
+            let told = self.hear().unwrap();
+            if let Some(refused) = told.get("refused") {
+                return refused.as_str().unwrap().to_owned();
+            }
+            number = told.get("asked").and_then(Value::as_u64).or(number);
+            let notice = &told["state"]["notice"];
+            if number.is_some() && notice["command"].as_u64() == number {
+                assert_eq!(notice["bad"], json!(true), "{text}: {notice}");
+                return notice["text"].as_str().unwrap().to_owned();
+            }
+            let heard = told["state"]["heard"].as_u64();
+            assert!(number.is_none() || heard < number, "{text} was followed");
+        }
+    }
+}
+
+fn set(path: &str, value: &Value) -> String {
+    json!({ "set": { "path": path, "value": value } }).to_string()
+}
+
+#[test]
+fn what_is_no_value_is_refused_and_the_file_stays() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let listener = Listener::open("127.0.0.1:0").unwrap();
+    let address = listener.address().unwrap();
+    // It serves as long as the program runs.
+    let session: &'static Running = Box::leak(Box::new(running));
+    std::thread::spawn(move || listener.serve(&session.session).unwrap());
+    let mut viewer = Viewer::new(address);
+
+    let radius = |value: &str| format!("{{\"set\":{{\"path\":\"shapes[0].radius\",\"value\":{value}}}}}");
+    let nested = |count: usize| radius(&format!("{}1{}", "[".repeat(count), "]".repeat(count)));
+    let number = "must be a number";
+    let nothing = "is nothing that can be changed";
+    let path = "must be a path, such as shapes[2].radius";
+    let unknown = "not understood: ";
+    let mut messages = vec![
+        // values of other types, and numbers that are none
+        (radius("{}"), number),
+        (radius("{\"a\":1}"), number),
+        (radius("[0.5]"), number),
+        (radius("true"), number),
+        (radius("\"0.5\""), number),
+        (radius("\"NaN\""), number),
+        (radius("\"0.5\\n[render]\\nseed = 7\""), number),
+        (radius("NaN"), unknown),
+        (radius("Infinity"), unknown),
+        (radius("1e999"), unknown),
+        (radius("-1e999"), unknown),
+        (radius(&"9".repeat(400)), unknown),
+        (radius("1e308"), "1e308 must be"),
+        (radius("18446744073709551615"), "1.8446744073709552e19 must be"),
+        (radius("-0.0"), "must be"),
+        (radius("5e-324"), "5e-324 must be"),
+        (nested(100), number),
+        (nested(1500), unknown),
+        (set("image.width", &json!(1e300)), "must be a whole number"),
+        (set("image.width", &json!(-1)), "-1 must be"),
+        (set("image.width", &json!(u64::MAX)), "must be a whole number"),
+        (
+            set("shapes[0].center", &json!([0, 0, null])),
+            "must be a list of 3 numbers",
+        ),
+        (
+            set("shapes[0].center", &json!([0, 0, 0, 0])),
+            "must be a list of 3 numbers",
+        ),
+        (
+            set("shapes[0].center", &json!(vec![0; 1500])),
+            "must be a list of 3 numbers",
+        ),
+        (
+            set("shapes[0].center", &json!([0, [0], 0])),
+            "must be a list of 3 numbers",
+        ),
+        (set("shapes[0].center", &json!([0, 0, 1e300])), "shapes[0].center: "),
+        (
+            set("shapes[0].material", &json!("red\"\nradius = 7 #")),
+            "one of the names",
+        ),
+        (set("materials.red.type", &json!("glass")), nothing),
+        // paths that lead elsewhere, or nowhere
+        (set("shapes[0].radius.x", &json!(1)), nothing),
+        (set("shapes[18446744073709551616].radius", &json!(1)), "must"),
+        (set("shapes[-1].radius", &json!(1)), "must"),
+        (set("shapes[4294967296].radius", &json!(1)), nothing),
+        (set("render.seed = 7\n[camera]\nfov", &json!(1)), path),
+        (set("render.seed # ", &json!(1)), path),
+        (set("\u{feff}render.seed", &json!(1)), "must"),
+        (set("render.\"seed = 7\\n\"", &json!(1)), nothing),
+        (set("\"render]\\nseed = 7\\n[x\".seed", &json!(1)), nothing),
+        (set("materials.\"red]\\n[camera\".shininess", &json!(1)), nothing),
+        (set("materials.'\"'.shininess", &json!(1)), nothing),
+        (set("__proto__.seed", &json!(1)), nothing),
+        (set("render.\u{1b}[2Jseed", &json!(1)), "must"),
+        (set(&"a.".repeat(1500), &json!(1)), "must"),
+        (
+            set(&vec!["render"; 500].join("."), &json!(1)),
+            "must have at most 80 steps",
+        ),
+        (set(&"[0]".repeat(1000), &json!(1)), "must"),
+        (set(&"a".repeat(3900), &json!(1)), nothing),
+        (set("", &json!(1)), "must be"),
+        // messages of other forms
+        ("{\"set\":{\"path\":\"render.seed\"}}".to_owned(), unknown),
+        ("{\"set\":{\"path\":5,\"value\":1}}".to_owned(), unknown),
+        ("{\"set\":{\"path\":[\"render\"],\"value\":1}}".to_owned(), unknown),
+        (
+            "{\"set\":{\"path\":\"render.seed\",\"value\":1,\"file\":\"/etc/passwd\"}}".to_owned(),
+            unknown,
+        ),
+        (
+            "{\"set\":{\"path\":\"render.seed\",\"value\":1,\"gesture\":-1}}".to_owned(),
+            unknown,
+        ),
+        (
+            "{\"set\":{\"path\":\"render.seed\",\"path\":\"render.seed\",\"value\":1}}".to_owned(),
+            unknown,
+        ),
+        ("{\"set\":null}".to_owned(), unknown),
+        ("{\"set\":".to_owned(), unknown),
+        ("\u{0}".to_owned(), unknown),
+        ("[".repeat(4000), unknown),
+    ];
+    // Where the key is absent, too.
+    messages.push((set("render.shadow_epsilon", &json!("0.01")), number));
+    let mut wrong = Vec::new();
+    for (message, told) in messages {
+        let said = viewer.refused(&message);
+        let is_plain = said.chars().count() < 400 && !said.chars().any(char::is_control);
+        if !said.contains(told) || !is_plain || files.read("scene.toml") != SCENE {
+            wrong.push((message.chars().take(100).collect::<String>(), said));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert_eq!(session.state().undo, None);
+    // The control: what is right is followed, and nothing of the above has been.
+    viewer.say(set("shapes[0].radius", &json!(0.25)).as_bytes()).unwrap();
+    session.wait("the value that is right", |_| {
+        (files.read("scene.toml") == SCENE.replace("radius = 0.5", "radius = 0.25")).then_some(())
+    });
+    session.wait_rendered(&files);
+
+    // What is no text, and what is far too long, ends its own connection and no more.
+    for message in [&b"\xff\xfe{"[..], set(&"a".repeat(1 << 20), &json!(1)).as_bytes()] {
+        let mut other = Viewer::new(address);
+        let _ = other.say(message); // it may be cut off while it speaks
+        while other.hear().is_some() {}
+    }
+    let said = viewer.refused(&set("shapes[0].radius", &json!([])));
+    assert!(said.contains(number), "{said}");
+}
+
+#[test]
+fn a_path_of_a_megabyte_is_refused_in_few_words() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    for path in [
+        "a".repeat(1 << 20),
+        "a.".repeat(1 << 19) + "b",
+        "\"\\u001b\".".repeat(1 << 17) + "b",
+        "\u{1b}".repeat(1 << 20),
+        format!("materials.\"{}\".shininess", "é".repeat(1 << 19)),
+    ] {
+        let heard = running.state().heard;
+        running.session.send(Command::Set(Set {
+            path,
+            value: json!("x".repeat(1 << 20)),
+            gesture: None,
+        }));
+        running.wait("the command to be followed", |running| {
+            (running.state().heard > heard).then_some(())
+        });
+        let notice = running.state().notice.clone().unwrap();
+        assert!(notice.bad && notice.command == running.state().heard);
+        assert!(
+            notice.text.chars().count() < 1000 && !notice.text.contains('\u{1b}'),
+            "{}",
+            notice.text
+        );
+        assert_eq!(files.read("scene.toml"), SCENE);
+    }
+}

@@ -1,0 +1,299 @@
+//! What is clicked, where meshes are placed, bring materials of their own, or come out of glTF files.
+
+use std::fs;
+
+use serde_json::json;
+use wgray::dev::{Command, Object, Seen, Set, Sources};
+use wgray::scene::Overrides;
+
+use super::running::{Files, Running};
+use crate::model::Model;
+
+/// A view of 40 x 30 pixels from -y, in which x from -2 to 2 is the whole width, nearly.
+const START: &str = "\
+image = { width = 40, height = 30 }
+camera = { position = [0, -4, 0], look_at = [0, 0, 0], fov = 40 }
+render.pixel_samples = { count = 1 }
+";
+/// Left, in the middle, and right.
+const LEFT: [u32; 2] = [10, 15];
+const MIDDLE: [u32; 2] = [20, 15];
+const RIGHT: [u32; 2] = [30, 15];
+
+const TILE: &str = "v -0.4 0 -0.4\nv 0.4 0 -0.4\nv 0.4 0 0.4\nv -0.4 0 0.4\nf 1 2 3 4\n";
+
+/// Materials of a mesh file's own, the left part's and the right one's.
+const PAIR: &str = "\
+mtllib pair.mtl
+v -1.4 0 -0.4
+v -0.6 0 -0.4
+v -0.6 0 0.4
+v -1.4 0 0.4
+v 0.6 0 -0.4
+v 1.4 0 -0.4
+v 1.4 0 0.4
+v 0.6 0 0.4
+g trunk
+usemtl bark
+f 1 2 3 4
+g crown
+usemtl leaf
+f 5 6 7 8
+";
+const MTL: &str = "newmtl bark\nKd 0.4 0.2 0.1\nnewmtl leaf\nKd 0.1 0.5 0.1\n";
+
+/// The scene, once there is one.
+fn seen(running: &Running) -> std::sync::Arc<Seen> {
+    running.wait("a scene", |running| running.session.seen.borrow().clone())
+}
+
+fn groups(object: &Object) -> Vec<&str> {
+    object.groups.iter().map(|group| group.name.as_str()).collect()
+}
+
+/// The number of the line that has a text.
+#[track_caller]
+fn line(text: &str, of: &str) -> usize {
+    1 + text.lines().position(|line| line == of).unwrap()
+}
+
+/// Sets a value, and gives what was said against it.
+fn set(running: &Running, path: &str, value: serde_json::Value) -> Option<String> {
+    let heard = running.state().heard;
+    running.session.send(Command::Set(Set {
+        path: path.to_owned(),
+        value,
+        gesture: None,
+    }));
+    running.wait("the command to be followed", |running| {
+        (running.state().heard > heard).then_some(())
+    });
+    let state = running.state();
+    let notice = state.notice.clone().filter(|notice| notice.command == state.heard);
+    notice.filter(|notice| notice.bad).map(|notice| notice.text)
+}
+
+#[test]
+fn an_instance_of_a_mesh_is_named_with_its_lines_its_mesh_and_its_material() {
+    let text = format!(
+        "{START}materials.red = {{ type = 'phong', color = [0.8, 0.1, 0.1] }}
+materials.green = {{ type = 'phong', color = [0.1, 0.8, 0.1] }}
+
+[meshes.tile]
+file = 'tile.obj'
+
+# the left one
+[[instances]]
+mesh = 'tile'
+material = 'red'
+translate = [-1, 0, 0]
+
+# a ball is a shape: it comes before instances
+[[shapes]]
+type = 'sphere'
+material = 'green'
+center = [0, 0, 0]
+radius = 0.3
+
+# the right one
+[[instances]]
+mesh = 'tile'
+material = 'green'
+translate = [1, 0, 0]
+"
+    );
+    let files = Files::new(&text);
+    files.write("tile.obj", TILE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let scene = seen(&running);
+    for (pixel, name, first, named) in [
+        (LEFT, "instances[0]", "# the left one", ["materials.red", "meshes.tile"]),
+        (
+            RIGHT,
+            "instances[1]",
+            "# the right one",
+            ["materials.green", "meshes.tile"],
+        ),
+    ] {
+        let object = scene.at(pixel);
+        assert_eq!((object.name.as_str(), &object.gone, &object.note), (name, &None, &None));
+        assert_eq!(object.groups[0].line, line(&text, first));
+        let mut others = groups(&object).split_off(1);
+        others.sort_unstable();
+        assert_eq!(others, named, "{object:?}");
+    }
+    assert_eq!(scene.at(MIDDLE).name, "shapes[0]");
+    assert_eq!(scene.at([0, 0]).name, "render");
+    let mesh = scene.object("meshes.tile", None);
+    let file = mesh.groups[0].fields.iter().find(|field| field.name == "file").unwrap();
+    assert!(file.fixed.is_some(), "no viewer says which files are read");
+    // It is moved away from where it was clicked, and is found where it is then.
+    assert_eq!(set(&running, "instances[1].translate", json!([1, 0, 0.9])), None);
+    assert_eq!(
+        files.read("scene.toml"),
+        text.replace("translate = [1, 0, 0]", "translate = [1, 0, 0.9]")
+    );
+    running.wait_rendered(&files);
+    let scene = seen(&running);
+    assert_eq!(scene.at(RIGHT).name, "render");
+    assert_eq!(scene.at([30, 6]).name, "instances[1]");
+    // Keys that are absent, of either form that a scale has.
+    assert_eq!(set(&running, "instances[0].scale", json!(0.5)), None);
+    assert!(
+        files
+            .read("scene.toml")
+            .contains("translate = [-1, 0, 0]\nscale = 0.5\n")
+    );
+    running.wait_rendered(&files);
+    let told = set(&running, "instances[0].scale", json!(0)).unwrap();
+    assert!(told.contains("instances[0].scale: 0 must not be 0"), "{told}");
+    assert!(files.read("scene.toml").contains("scale = 0.5\n"));
+}
+
+#[test]
+fn a_mesh_with_materials_of_its_own_is_named_and_these_are_told() {
+    let text = format!(
+        "{START}[materials.leaf]
+type = 'phong'
+color = [0.1, 0.8, 0.1]
+
+# a tree
+[[shapes]]
+type = 'mesh'
+file = 'pair.obj'
+materials = {{ leaf = 'leaf' }}
+"
+    );
+    let files = Files::new(&text);
+    files.write("pair.obj", PAIR);
+    files.write("pair.mtl", MTL);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let scene = seen(&running);
+    let trunk = scene.at(LEFT);
+    assert_eq!((trunk.name.as_str(), &trunk.gone), ("shapes[0]", &None));
+    assert_eq!(trunk.groups[0].line, line(&text, "# a tree"));
+    assert_eq!(groups(&trunk), ["shapes[0]", "materials.leaf"]);
+    let note = trunk.note.unwrap();
+    assert!(
+        note.contains("bark") && note.ends_with("comes from another file"),
+        "{note}"
+    );
+    let crown = scene.at(RIGHT);
+    assert_eq!(
+        (crown.name.as_str(), crown.material.as_deref()),
+        ("shapes[0]", Some("leaf"))
+    );
+    assert_eq!(
+        (groups(&crown), &crown.note),
+        (vec!["shapes[0]", "materials.leaf"], &None)
+    );
+    // Which of the scene's materials a part has is chosen among those that there are, and no file's own value can be set.
+    for (path, value, told) in [
+        (
+            "shapes[0].materials.leaf",
+            json!("bark"),
+            "must be one of the names that it may have",
+        ),
+        (
+            "shapes[0].file",
+            json!("other.obj"),
+            "names and files are changed in the scene file itself",
+        ),
+        (
+            "materials.bark.color",
+            json!([1, 1, 1]),
+            "is nothing that can be changed",
+        ),
+    ] {
+        let said = set(&running, path, value).unwrap();
+        assert!(said.contains(told), "{path}: {said}");
+        assert_eq!(files.read("scene.toml"), text);
+    }
+    assert_eq!(set(&running, "shapes[0].scale", json!(0.75)), None);
+    running.wait_rendered(&files);
+    assert_eq!(set(&running, "materials.leaf.color", json!([0.8, 0.8, 0.1])), None);
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn a_gltf_file_is_told_to_be_one_and_stays() {
+    let files = Files::new("");
+    Model::default().write_glb(files.folder.path(), "box.glb");
+    let before = fs::read(files.path("box.glb")).unwrap();
+    let sources = Sources {
+        scene: files.path("box.glb"),
+        overrides: Overrides {
+            size: Some((24, 16)),
+            pixel_samples: Some(1),
+            ..Overrides::default()
+        },
+        shaders: None,
+    };
+    let running = Running::start(sources, None);
+    running.wait_done(0);
+    let scene = seen(&running);
+    let clicked = scene.at([12, 11]);
+    assert_eq!((clicked.name.as_str(), clicked.groups.len()), ("shapes[0]", 0));
+    let told = "the scene file is glTF: wgray convert makes a scene of it that can be changed";
+    assert_eq!(clicked.gone.as_deref(), Some(told));
+    for (name, _) in scene.objects("").objects {
+        assert_eq!(scene.object(&name, None).gone.as_deref(), Some(told), "{name}");
+    }
+    for path in ["shapes[0].file", "camera.fov", "render.seed"] {
+        let said = set(&running, path, json!(1)).unwrap();
+        assert!(
+            said.ends_with("it is glTF, and wgray convert makes a scene of it"),
+            "{said}"
+        );
+    }
+    assert_eq!(fs::read(files.path("box.glb")).unwrap(), before);
+    assert_eq!(running.state().undo, None);
+}
+
+#[test]
+fn what_a_scene_has_of_gltf_files_is_of_the_shape_that_names_them() {
+    let files = Files::new(&format!(
+        "{START}materials.red = {{ type = 'phong', color = [0.8, 0.1, 0.1] }}
+render.integrator = 'path'
+
+[[shapes]]
+type = 'sphere'
+material = 'red'
+center = [-1, 0, 0]
+radius = 0.3
+
+# the model
+[[shapes]]
+type = 'gltf'
+file = 'box.glb'
+scale = 0.4
+translate = [1, 0, -0.2]
+"
+    ));
+    Model::default().write_glb(files.folder.path(), "box.glb");
+    let model = fs::read(files.path("box.glb")).unwrap();
+    let text = files.read("scene.toml");
+    let running = files.start();
+    running.wait_rendered(&files);
+    let scene = seen(&running);
+    assert_eq!(scene.at(LEFT).name, "shapes[0]");
+    let clicked = scene.at(RIGHT);
+    assert_eq!(
+        (clicked.name.as_str(), groups(&clicked)),
+        ("shapes[1]", vec!["shapes[1]"])
+    );
+    assert_eq!(clicked.groups[0].line, line(&text, "# the model"));
+    assert_eq!(
+        clicked.note.as_deref(),
+        Some("it is of this glTF file, whose materials wgray convert writes into a scene")
+    );
+    assert_eq!(set(&running, "shapes[1].translate", json!([1, 0, 0.7])), None);
+    running.wait_rendered(&files);
+    assert_eq!(seen(&running).at(RIGHT).name, "render");
+    assert_eq!(
+        (files.read("scene.toml"), fs::read(files.path("box.glb")).unwrap()),
+        (text.replace("-0.2]", "0.7]"), model)
+    );
+}
