@@ -12,7 +12,7 @@ use crate::image::{Aov, AovSource, Layout};
 use crate::job::{self, Bands, Cut, Flow, Nowhere, Order};
 use crate::pack::{FirstHit, Packed, pack};
 use crate::picture::Picture;
-use crate::scene::{Integrator, Problem, Scene};
+use crate::scene::{Problem, Scene};
 
 /// How a scene is rendered. Size, samples and seed are the scene's, which [`Overrides`](crate::Overrides) can change.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -41,12 +41,8 @@ impl Options {
         let Region { x0, y0, x1, y1 } = region;
         let integrator = scene.render.integrator;
         let unknown = self.aovs.iter().find_map(|aov| {
-            let rule = match aov.source(integrator) {
-                AovSource::Adaptive if scene.render.adaptive.is_none() => "is known under adaptive sampling alone",
-                AovSource::Samples if integrator != Integrator::Path => "needs integrator = \"path\"",
-                _ => return None,
-            };
-            Some((aov, rule))
+            let rule = aov.missing(integrator, scene.render.adaptive.is_some());
+            rule.map(|rule| (aov, rule))
         });
         let rule = if x0 >= x1 || y0 >= y1 {
             "must have x0 less than x1, and y0 less than y1".to_string()

@@ -29,7 +29,7 @@ pub struct Args {
     scene: PathBuf,
 
     /// Where the page is. Who can reach this address can look, and can change values of the
-    /// scene file
+    /// scene file and marked constants of the shaders
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7878", value_parser = NonEmptyStringValueParser::new())]
     listen: String,
 
@@ -66,6 +66,11 @@ pub struct Args {
     /// Measures the time from a save to the picture, on copies of the files, and prints it
     #[arg(long, conflicts_with_all = ["listen", "out", "no_page"])]
     measure: bool,
+
+    /// What the page's links to source lines open: an address of an editor with {file}, {line} and {column}, such as
+    /// idea://open?file={file}&line={line}; off: no such links
+    #[arg(long, value_name = "URL|off", default_value = "vscode://file/{file}:{line}:{column}", value_parser = NonEmptyStringValueParser::new())]
+    editor: String,
 
     #[command(flatten)]
     options: SceneOptions,
@@ -108,6 +113,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     } else {
         Some(Listener::open(&args.listen).map_err(|error| anyhow!("--listen: {error}"))?)
     };
+    let editor = editor(&args.editor)?;
     let terminal = Terminal::new();
     let what = format!("{}: watched", watched(&sources));
     let session = Session::start(Settings {
@@ -115,6 +121,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         device,
         out,
         only_for_viewers: true,
+        editor,
         report: Box::new(move |report| terminal.report(&report)),
     })
     .map_err(|error| match error {
@@ -135,12 +142,56 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !address.ip().is_loopback() {
         let told = format!(
             "{address} is no loopback address: everybody who can reach it can look, and can change values \
-             of the scene file"
+             of the scene file and marked constants of the shaders"
         );
         log::say(Level::Warning, &told);
     }
     listener.serve(&session)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Schemes of addresses that are no editor's: browsers and systems do other things with them.
+const NO_EDITORS: [&str; 14] = [
+    "javascript",
+    "data",
+    "http",
+    "https",
+    "vbscript",
+    "file",
+    "blob",
+    "about",
+    "ws",
+    "wss",
+    "ftp",
+    "mailto",
+    "tel",
+    "view-source",
+];
+
+/// The form of links that open an editor; `None` for no such links.
+fn editor(told: &str) -> anyhow::Result<Option<String>> {
+    if told == "off" {
+        return Ok(None);
+    }
+    let refused = |rule: &str| Err(Usage(format!("--editor: {told}: {rule}")).into());
+    let (scheme, rest) = told.split_once(':').unwrap_or(("", told));
+    let letters = scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
+    if !scheme.starts_with(|c: char| c.is_ascii_alphabetic()) || !letters {
+        return refused("must begin with an editor's scheme, such as vscode:, or be off");
+    }
+    if NO_EDITORS.iter().any(|known| scheme.eq_ignore_ascii_case(known)) {
+        return refused(&format!("{scheme}: is no editor's scheme"));
+    }
+    if rest.contains(|c: char| c.is_whitespace() || c.is_control()) {
+        return refused("must have no blanks");
+    }
+    let unknown = ["{file}", "{line}", "{column}"]
+        .iter()
+        .fold(rest.to_string(), |rest, known| rest.replace(known, ""));
+    if unknown.contains(['{', '}']) || !rest.contains("{file}") {
+        return refused("must have {file}, may have {line} and {column}, and no other braces");
+    }
+    Ok(Some(told.to_string()))
 }
 
 /// The file that --out means, behind its links: no file that is watched, nor anything but a PNG file.
@@ -227,6 +278,8 @@ impl Terminal {
             ),
             Report::Wrote(what, Ok(())) => self.line(GREEN, &format!("{what} saved into the scene file")),
             Report::Wrote(what, Err(error)) => self.line(RED, &format!("{what} not saved: {error}")),
+            Report::Written(what, Ok(())) => self.line(GREEN, what),
+            Report::Written(what, Err(error)) => self.line(RED, &format!("not {what}: {error}")),
             Report::Turned(what, Ok(())) => self.line(GREEN, what),
             Report::Turned(what, Err(error)) => self.line(RED, &format!("not {what}: {error}")),
         }
@@ -242,9 +295,8 @@ impl Terminal {
             let mut facts = Facts::new();
             facts.extend(
                 problem
-                    .excerpt
-                    .as_ref()
-                    .map(|excerpt| ("excerpt".to_owned(), excerpt.as_str().into())),
+                    .marked_line()
+                    .map(|excerpt| ("excerpt".to_owned(), excerpt.into())),
             );
             log::tell(Level::Error, &format!("{place}{}", problem.message), facts);
             return;
@@ -255,9 +307,8 @@ impl Terminal {
             self.painted(BOLD, &format!("{place}{}", problem.message))
         );
         let excerpt = problem
-            .excerpt
-            .as_ref()
-            .map(|excerpt| self.marked(excerpt))
+            .marked_line()
+            .map(|excerpt| self.marked(&excerpt))
             .unwrap_or_default();
         say(&format!("{} {head}\n{excerpt}", clock()));
     }
@@ -341,4 +392,43 @@ fn print(scene: &Path, all: Vec<Measured>) -> io::Result<()> {
         )?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_open_editors_and_nothing_else() {
+        for good in [
+            "vscode://file/{file}:{line}:{column}",
+            "vscode-insiders://file/{file}:{line}",
+            "idea://open?file={file}&line={line}",
+            "txmt://open?url=file://{file}",
+        ] {
+            assert_eq!(editor(good).unwrap().as_deref(), Some(good));
+        }
+        assert_eq!(editor("off").unwrap(), None);
+        for bad in [
+            "",
+            "vscode",
+            "javascript:alert({file})",
+            "JavaScript://{file}",
+            "data:text/html,{file}",
+            "http://evil.example/{file}",
+            "HTTPS://evil.example/{file}",
+            "file://{file}",
+            "1code://{file}",
+            " vscode://{file}",
+            "vs code://{file}",
+            "java\nscript:{file}",
+            "vscode://file/{file} {line}",
+            "vscode://file/",
+            "vscode://file/{path}",
+            "vscode://file/{file}{",
+        ] {
+            let error = editor(bad).expect_err(bad).to_string();
+            assert!(error.starts_with("--editor: "), "{error}");
+        }
+    }
 }

@@ -7,9 +7,11 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use super::times::Times;
 use crate::error::{RenderError, ShaderErrors};
 use crate::gpu::compose::Shaders;
-use crate::gpu::{Choice, Device, Forms, Gpu, Options, check_kernels, choose};
+use crate::gpu::marks::Layer;
+use crate::gpu::{Choice, Device, Forms, Gpu, Live, Options, check_kernels, choose};
 use crate::pack::Packed;
 
 /// What is to be made.
@@ -22,6 +24,8 @@ pub struct Request {
     pub packed: Packed,
     /// The shaders.
     pub shaders: Arc<Shaders>,
+    /// The layer that takes the place of light.
+    pub layer: Option<Layer>,
     /// Shaders that are known to be right, to be used if those are wrong.
     pub fallback: Option<Arc<Shaders>>,
 }
@@ -49,11 +53,11 @@ pub struct Builder {
 
 impl Builder {
     /// Starts the thread. It gives `done` its results, except those of requests that a newer one has overtaken.
-    pub fn start(choice: Choice, done: impl Fn(Built) + Send + 'static) -> std::io::Result<Builder> {
+    pub fn start(choice: Choice, times: Times, done: impl Fn(Built) + Send + 'static) -> std::io::Result<Builder> {
         let (sender, receiver) = channel();
         let thread = std::thread::Builder::new()
             .name("build".to_string())
-            .spawn(move || run(&choice, &receiver, done))?;
+            .spawn(move || run(&choice, &times, &receiver, done))?;
         Ok(Builder {
             requests: Some(sender),
             thread: Some(thread),
@@ -77,26 +81,29 @@ impl Drop for Builder {
     }
 }
 
-fn run(choice: &Choice, requests: &Receiver<Request>, done: impl Fn(Built)) {
+fn run(choice: &Choice, times: &Times, requests: &Receiver<Request>, done: impl Fn(Built)) {
     while let Ok(mut request) = requests.recv() {
         while let Ok(newer) = requests.try_recv() {
             request = newer;
         }
-        done(build(choice, request));
+        done(build(choice, times, request));
     }
 }
 
-fn build(choice: &Choice, request: Request) -> Built {
+fn build(choice: &Choice, times: &Times, request: Request) -> Built {
     let Request {
         id,
         device,
         packed,
         shaders,
+        layer,
         fallback,
     } = request;
     let start = Instant::now();
     // Every kernel, whether it is used now or by another view later.
-    let refused = check_kernels(&packed, &shaders, Forms::Buffers).err();
+    let refused = times.of("check shaders", || {
+        check_kernels(&packed, &shaders, Forms::Buffers).err()
+    });
     let usable = if refused.is_some() { fallback } else { Some(shaders) };
     let result = usable.map(|shaders| {
         guarded(|| {
@@ -106,7 +113,13 @@ fn build(choice: &Choice, request: Request) -> Built {
                 baked: false,
                 ..Options::best(&device)
             };
-            Ok((Box::new(Gpu::new(&device, &packed, &shaders, options)?), shaders))
+            let gpu = times.of("compile", || {
+                let live = Live::of(&shaders, packed.adaptive, packed.integrator, layer);
+                let mut gpu = Gpu::with_live(&device, &packed, &shaders, options, live)?;
+                gpu.time_calls()?;
+                Ok::<_, RenderError>(gpu)
+            })?;
+            Ok((Box::new(gpu), shaders))
         })
     });
     Built {

@@ -8,11 +8,12 @@ use crate::backend::Backend;
 use crate::cpu::Cpu;
 use crate::error::RenderError;
 use crate::film::{Film, Region};
-use crate::gpu::Gpu;
-use crate::image::{Aov, Pixels};
+use crate::gpu::{Call, Gpu, Live};
+use crate::image::Aov;
 use crate::job::{Cut, Order, Steps};
 use crate::pack::{Camera, FirstHit, Packed};
 
+use super::film_layer::FilmLayer;
 use super::picture::{Content, View, means};
 
 /// What one call aims to take: a save or a move of the camera waits so long.
@@ -42,8 +43,8 @@ pub struct Canvas {
     compare: bool,
     stage: Stage,
     steps: Steps,
-    /// The last coarser picture, by the GPU and by the CPU.
-    under: Option<(Pixels, Option<Pixels>)>,
+    /// The last coarser film, by the GPU and by the CPU.
+    under: Option<(Film, Option<Film>)>,
     /// What the CPU has of the stage.
     cpu: Film,
     /// The first rows' hits.
@@ -124,6 +125,21 @@ impl Canvas {
         Ok(same_kernel)
     }
 
+    /// What the kernel has that is not as the files say.
+    pub fn live(&self) -> &Live {
+        self.gpu.live()
+    }
+
+    /// Gives the kernel's sliders their values. The picture must be started again.
+    pub fn set_sliders(&mut self, values: &[[u32; 4]]) -> Result<(), RenderError> {
+        self.gpu.set_sliders(values)
+    }
+
+    /// The calls that have ended since this was asked last.
+    pub fn calls(&mut self) -> Vec<Call> {
+        self.gpu.calls()
+    }
+
     /// Starts the picture again, from a camera.
     pub fn restart(&mut self, camera: Camera, view: View) -> Result<(), RenderError> {
         self.camera = camera;
@@ -136,7 +152,7 @@ impl Canvas {
         self.shown = false;
         let largest = self.gpu.largest_film();
         self.finest = finest(camera.width, camera.height, largest, self.limits.scale);
-        let scale = if view.aov().is_some() {
+        let scale = if self.hits_of(view).is_some() {
             self.finest
         } else {
             self.first_scale()
@@ -146,10 +162,10 @@ impl Canvas {
 
     /// Goes over to another view of the same picture.
     pub fn change_view(&mut self, view: View) -> Result<(), RenderError> {
-        self.shown = false;
-        let film = view.aov().is_none();
+        let film = self.hits_of(view).is_none();
         let nothing_there = self.stage.scale == self.finest && self.steps.samples() == 0;
         let other_film = self.compare != view.is_by_both();
+        self.shown = film && self.stage.scale == self.finest && !nothing_there; // the film has it already
         if film && (other_film || nothing_there) {
             self.restart(self.camera, view)
         } else if !film && self.stage.scale > self.finest {
@@ -157,6 +173,11 @@ impl Canvas {
         } else {
             Ok(())
         }
+    }
+
+    /// What a view shows of the first hits.
+    fn hits_of(&self, view: View) -> Option<Aov> {
+        view.of_hits(self.scene.integrator)
     }
 
     fn first_scale(&self) -> u32 {
@@ -223,7 +244,7 @@ impl Canvas {
 
     /// Whether there is nothing left to do for a view.
     pub fn is_done(&self, view: View) -> bool {
-        match view.aov() {
+        match self.hits_of(view) {
             Some(_) => {
                 let [width, height] = self.finest_size();
                 self.hits.len() as u64 == Region::whole(width, height).pixels()
@@ -234,7 +255,7 @@ impl Canvas {
 
     /// Makes one call. Returns whether there is something new that must not wait to be shown.
     pub fn step(&mut self, view: View) -> Result<bool, RenderError> {
-        let show = match view.aov() {
+        let show = match self.hits_of(view) {
             Some(_) => self.step_hits(view)?,
             None => self.step_film()?,
         };
@@ -273,9 +294,8 @@ impl Canvas {
         }
         self.stage.begun = true;
         if self.stage.scale > self.finest && self.steps.is_done() {
-            let gpu = self.gpu_pixels()?;
-            let cpu = self.compare.then(|| self.cpu_pixels());
-            self.under = Some((gpu, cpu));
+            let gpu = self.gpu.film()?;
+            self.under = Some((gpu, self.compare.then(|| self.cpu.clone())));
             self.begin((self.stage.scale / 4).max(self.finest))?;
             return Ok(true);
         }
@@ -283,23 +303,9 @@ impl Canvas {
         Ok(first_pass || self.steps.is_done())
     }
 
-    fn gpu_pixels(&mut self) -> Result<Pixels, RenderError> {
-        let film = self.gpu.film()?;
-        Ok(self.pixels(&film, self.under.as_ref().map(|(gpu, _)| gpu)))
-    }
-
-    fn cpu_pixels(&self) -> Pixels {
-        self.pixels(&self.cpu, self.under.as_ref().and_then(|(_, cpu)| cpu.as_ref()))
-    }
-
-    fn pixels(&self, film: &Film, under: Option<&Pixels>) -> Pixels {
-        let steps = &self.steps;
-        means(film, under, &|y| steps.samples_of_row(y) > 0)
-    }
-
     /// The picture as it is now, and its width and height.
     pub fn content(&mut self, view: View) -> Result<(Content, [u32; 2]), RenderError> {
-        if let Some(aov) = view.aov() {
+        if let Some(aov) = self.hits_of(view) {
             return Ok((self.hits_so_far(aov), self.finest_size()));
         }
         let size = [self.stage.width, self.stage.height];
@@ -313,16 +319,32 @@ impl Canvas {
             };
             return Ok((Content::Samples(counts, self.scene.pixel_samples), size));
         }
+        let film;
+        let under = self.under.as_ref();
         // Before the next stage has anything the last one is sent, which is smaller.
-        let last = self.under.as_ref().filter(|_| !self.stage.begun).cloned();
-        let (gpu, cpu) = match last {
-            Some(last) => last,
-            None => (self.gpu_pixels()?, self.compare.then(|| self.cpu_pixels())),
+        let (gpu, cpu, under) = match under.filter(|_| !self.stage.begun) {
+            Some((gpu, cpu)) => (gpu, cpu.as_ref(), None),
+            None => {
+                film = self.gpu.film()?;
+                (&film, self.compare.then_some(&self.cpu), under)
+            }
         };
-        let size = [gpu.width, gpu.height];
+        let size = [gpu.region.width(), gpu.region.height()];
+        let has_samples = |y| self.steps.samples_of_row(y) > 0;
+        let under_gpu = under.map(|(gpu, _)| gpu);
+        if let Some(aov) = view.of_film(self.scene.integrator) {
+            return Ok((Content::Film(FilmLayer::of(aov, gpu, under_gpu, &has_samples)), size));
+        }
+        let colors = means(gpu, under_gpu, &has_samples);
         Ok(match cpu.filter(|_| view.is_by_both()) {
-            Some(cpu) => (Content::Compare(gpu, cpu), size),
-            None => (Content::Color(gpu), size),
+            Some(cpu) => {
+                let under = under.and_then(|(_, cpu)| cpu.as_ref());
+                (Content::Compare(colors, means(cpu, under, &has_samples)), size)
+            }
+            None => match self.gpu.live().layer() {
+                Some(layer) => (Content::Layer(colors, layer.numbers), size),
+                None => (Content::Color(colors), size),
+            },
         })
     }
 

@@ -1,8 +1,11 @@
 //! What is wrong, as the terminal and the page show it.
 
+use std::path::{Path, absolute};
+
 use serde::Serialize;
 
 use crate::error::{RenderError, ShaderError};
+use crate::gpu::compose::Shaders;
 use crate::scene::SceneError;
 
 /// An error that a person can mend: what kind of thing is wrong, where, and the lines around the place.
@@ -12,9 +15,15 @@ pub struct Diagnostic {
     pub kind: &'static str,
     /// File, line and column, if it has a place.
     pub place: Option<String>,
+    /// The whole path of the file, for an editor.
+    pub file: Option<String>,
+    /// Counted from 1.
+    pub line: Option<usize>,
+    /// In characters, counted from 1.
+    pub column: Option<usize>,
     /// What is wrong.
     pub message: String,
-    /// The source with the place marked, if there is one.
+    /// The line with the place marked, between the one before and the one after, if there is a source.
     pub excerpt: Option<String>,
 }
 
@@ -24,6 +33,9 @@ impl Diagnostic {
         Diagnostic {
             kind,
             place: None,
+            file: None,
+            line: None,
+            column: None,
             message: message.into(),
             excerpt: None,
         }
@@ -47,15 +59,69 @@ impl Diagnostic {
         let message = whole.strip_prefix(&format!("{place}: ")).unwrap_or(&whole).to_string();
         Diagnostic {
             kind: "scene",
-            excerpt: excerpt(text, line, column),
+            excerpt: marked(text, line, column).map(|excerpt| around(text, line, &excerpt)),
             place: Some(place),
+            file: whole_path(Path::new(origin)),
+            line: Some(line),
+            column,
             message,
         }
     }
+
+    /// A mistake in a file of shaders, which lie in a folder unless they are those in the program.
+    pub fn shader(error: &ShaderError, shaders: &Shaders, folder: Option<&Path>) -> Diagnostic {
+        let mut told = Diagnostic {
+            place: Some(error.place.clone()),
+            excerpt: error.excerpt.clone(),
+            ..Diagnostic::plain("shader", error.message.clone())
+        };
+        let mut parts = error.place.rsplitn(3, ':');
+        let (column, line, file) = (parts.next(), parts.next(), parts.next());
+        let number = |part: Option<&str>| part.and_then(|part| part.parse().ok());
+        let (Some(file), Some(line), Some(column)) = (file, number(line), number(column)) else {
+            return told;
+        };
+        let text = shaders.text(file);
+        if text.is_empty() {
+            return told; // the program's own part of a kernel
+        }
+        told.excerpt = told.excerpt.map(|excerpt| around(text, line, &excerpt));
+        (told.line, told.column) = (Some(line), Some(column));
+        if let Some(folder) = folder {
+            let path = folder.join(file);
+            told.place = Some(format!("{}:{line}:{column}", path.display()));
+            told.file = whole_path(&path);
+        }
+        told
+    }
+
+    /// Of the excerpt the line that has the place, and the mark below it: what a terminal has room for.
+    pub fn marked_line(&self) -> Option<String> {
+        let lines: Vec<&str> = self.excerpt.as_ref()?.lines().collect();
+        let mark = lines.iter().position(|line| line.starts_with(NO_NUMBER))?;
+        Some(lines[mark.checked_sub(1)?..=mark].join("\n"))
+    }
+}
+
+/// What stands before the bar in a line of an excerpt that is none of the text's.
+const NO_NUMBER: &str = "      |";
+
+fn whole_path(path: &Path) -> Option<String> {
+    absolute(path).ok()?.to_str().map(str::to_string)
+}
+
+/// An excerpt of a line of a text, counted from 1, with the lines before and after it.
+fn around(text: &str, line: usize, excerpt: &str) -> String {
+    let numbered = |line: usize| Some((line, text.lines().nth(line.checked_sub(1)?)?));
+    let shown = |(line, content): (usize, &str)| format!("{line:>5} | {content}").trim_end().to_string();
+    let before = line.checked_sub(1).and_then(numbered).map(shown);
+    let after = numbered(line + 1).map(shown);
+    let lines = before.into_iter().chain([excerpt.to_string()]).chain(after);
+    lines.collect::<Vec<_>>().join("\n")
 }
 
 /// A line of a text, counted from 1, with its number and a mark under a column.
-fn excerpt(text: &str, line: usize, column: Option<usize>) -> Option<String> {
+fn marked(text: &str, line: usize, column: Option<usize>) -> Option<String> {
     let content = text.lines().nth(line.checked_sub(1)?)?;
     let indent = content.chars().take_while(|c| c.is_whitespace()).count();
     let (start, length) = match column {
@@ -63,29 +129,15 @@ fn excerpt(text: &str, line: usize, column: Option<usize>) -> Option<String> {
         None => (indent, content.trim().chars().count().max(1)),
     };
     Some(format!(
-        "{line:>5} | {content}\n      | {}{}",
+        "{line:>5} | {content}\n{NO_NUMBER} {}{}",
         " ".repeat(start),
         "^".repeat(length)
     ))
 }
 
-impl From<&ShaderError> for Diagnostic {
-    fn from(error: &ShaderError) -> Diagnostic {
-        Diagnostic {
-            kind: "shader",
-            place: Some(error.place.clone()),
-            message: error.message.clone(),
-            excerpt: error.excerpt.clone(),
-        }
-    }
-}
-
 impl From<&RenderError> for Diagnostic {
     fn from(error: &RenderError) -> Diagnostic {
-        match error {
-            RenderError::Shader(error) => error.into(),
-            error => Diagnostic::plain("device", error.to_string()),
-        }
+        Diagnostic::plain("device", error.to_string())
     }
 }
 
@@ -101,11 +153,50 @@ mod tests {
         let shown = Diagnostic::scene(&error, text);
         assert_eq!(shown.place.as_deref(), Some("s.toml:2"));
         assert_eq!(shown.message, "image.width: 0 must be from 1 to 65536");
-        assert_eq!(shown.excerpt.as_deref(), Some("    2 | width = 0\n      | ^^^^^^^^^"));
+        let lines = "    1 | [image]\n    2 | width = 0\n      | ^^^^^^^^^\n    3 | height = 4";
+        assert_eq!(shown.excerpt.as_deref(), Some(lines));
+        assert_eq!(
+            shown.marked_line().as_deref(),
+            Some("    2 | width = 0\n      | ^^^^^^^^^")
+        );
+        assert!(Path::new(shown.file.as_ref().unwrap()).is_absolute() && shown.file.unwrap().ends_with("s.toml"));
+        assert_eq!((shown.line, shown.column), (Some(2), None));
         let text = "[image]\nwidth = = 2";
         let error = Scene::parse(text, "s.toml").unwrap_err();
         let shown = Diagnostic::scene(&error, text);
         assert_eq!(shown.place.as_deref(), Some("s.toml:2:9"));
-        assert_eq!(shown.excerpt.as_deref(), Some("    2 | width = = 2\n      |         ^"));
+        let lines = "    1 | [image]\n    2 | width = = 2\n      |         ^";
+        assert_eq!(
+            shown.excerpt.as_deref(),
+            Some(lines),
+            "there is no line behind the last"
+        );
+        assert_eq!((shown.line, shown.column), (Some(2), Some(9)));
+    }
+
+    #[test]
+    fn a_shader_error_is_shown_between_its_neighbours() {
+        let text = "// first\n\nfn a() { b }\n| c\n";
+        let shaders = Shaders::built_in().changed(|file, _| (file == "phong.wgsl").then(|| text.to_string()));
+        let error = |place: &str| ShaderError {
+            place: place.to_string(),
+            message: "no".to_string(),
+            excerpt: Some("    3 | fn a() { b }\n      |          ^".to_string()),
+        };
+        let shown = Diagnostic::shader(&error("phong.wgsl:3:10"), &shaders, Some(Path::new("/s")));
+        assert_eq!(shown.place.as_deref(), Some("/s/phong.wgsl:3:10"));
+        assert_eq!(
+            (shown.file.as_deref(), shown.line, shown.column),
+            (Some("/s/phong.wgsl"), Some(3), Some(10))
+        );
+        let lines = "    2 |\n    3 | fn a() { b }\n      |          ^\n    4 | | c";
+        assert_eq!(shown.excerpt.as_deref(), Some(lines));
+        assert_eq!(shown.marked_line(), error("").excerpt);
+        let inside = Diagnostic::shader(&error("phong.wgsl:3:10"), &shaders, None);
+        assert_eq!((inside.place.as_deref(), inside.file), (Some("phong.wgsl:3:10"), None));
+        // The program's own part of a kernel has no file that can be opened.
+        let own = Diagnostic::shader(&error("src/pack/layout.rs:3:10"), &shaders, Some(Path::new("/s")));
+        assert_eq!((own.file, own.line), (None, None));
+        assert_eq!(own.excerpt, error("").excerpt);
     }
 }

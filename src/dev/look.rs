@@ -52,14 +52,15 @@ pub struct Look {
     pub false_color: bool,
 }
 
-/// The stops of luminance, after the exposure, from the first false colour to the last.
+/// The stops of luminance, after the exposure, from the first false colour to the last: of light, and of standard errors.
 const FALSE_COLORS: [f32; 2] = [-10.0, 6.0];
+const ERRORS: [f32; 2] = [-12.0, 0.0];
 
 impl Look {
     /// The bytes that are shown for linear light.
     pub fn shown(&self, light: [f32; 3]) -> [u8; 3] {
         match self.false_color {
-            true => self.false_color(light),
+            true => self.false_color(light, FALSE_COLORS),
             false => self.view.rgb8(light),
         }
     }
@@ -70,10 +71,14 @@ impl Look {
         colors.flat_map_iter(|color| self.shown(*color)).collect()
     }
 
+    /// The false colour of a standard error of light.
+    pub fn error_color(&self, error: [f32; 3]) -> [u8; 3] {
+        self.false_color(error, ERRORS)
+    }
+
     /// Luminance is that of Rec. 709; none is shown as the least.
-    fn false_color(&self, [r, g, b]: [f32; 3]) -> [u8; 3] {
+    fn false_color(&self, [r, g, b]: [f32; 3], [first, last]: [f32; 2]) -> [u8; 3] {
         let stops = (0.2126 * r + 0.7152 * g + 0.0722 * b).log2() + self.view.exposure as f32;
-        let [first, last] = FALSE_COLORS;
         color(((stops - first) / (last - first) * 255.0 + 0.5) as u8) // saturates; NaN is 0
     }
 }
@@ -88,10 +93,19 @@ pub struct Legend {
 }
 
 impl Legend {
-    /// That of an exposure.
+    /// That of light, under an exposure.
     pub fn of(exposure: f64) -> Legend {
+        Legend::over(FALSE_COLORS, exposure)
+    }
+
+    /// That of standard errors of light.
+    pub fn of_errors(exposure: f64) -> Legend {
+        Legend::over(ERRORS, exposure)
+    }
+
+    fn over(stops: [f32; 2], exposure: f64) -> Legend {
         Legend {
-            stops: FALSE_COLORS.map(|stops| f64::from(stops) - exposure),
+            stops: stops.map(|stops| f64::from(stops) - exposure),
             colors: (0..=16).map(|i| color((i * 255 / 16) as u8)).collect(),
         }
     }
@@ -133,6 +147,16 @@ mod tests {
             assert_eq!(look(0.0).shown([light; 3]), wanted, "{light}");
         }
         assert_ne!(look(0.0).shown(grey(0.0)), look(0.0).shown(grey(-3.0)));
+        // Standard errors have a scale of their own.
+        let Legend { stops, colors: legend } = Legend::of_errors(3.0);
+        assert_eq!(stops, [-15.0, -3.0]);
+        for (stops, wanted) in [(-15.0, legend[0]), (-9.0, legend[8]), (-3.0, legend[16])] {
+            let shown = look(3.0).error_color(grey(stops));
+            assert!(
+                shown.iter().zip(wanted).all(|(a, b)| a.abs_diff(b) <= 2),
+                "{stops}: {shown:?} {wanted:?}"
+            );
+        }
     }
 
     #[test]

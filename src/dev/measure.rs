@@ -87,6 +87,7 @@ pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Resul
         device,
         out: None,
         only_for_viewers: false,
+        editor: None,
         report: Box::new(|_| ()),
     })
     .map_err(|error| Some(error.to_string()))?;

@@ -9,9 +9,11 @@ use super::build::Built;
 use super::camera::{Move, Viewpoint};
 use super::diagnostic::Diagnostic;
 use super::look::Choice;
-use super::picture::View;
+use super::picture::{LayerName, View};
 use super::reference::{Apart, Reference};
+use super::sliders::SliderState;
 use super::source::Snapshot;
+use crate::gpu::marks::Value;
 use crate::scene::ViewTransform;
 
 /// Something that happened.
@@ -38,6 +40,8 @@ pub enum Report {
     Note(String),
     /// The picture is larger than what can be shown: the size asked for, and the size of what is shown.
     Smaller([u32; 2], [u32; 2]),
+    /// The values of sliders were written into the shaders, or that was taken back, as is said here; or why not.
+    Written(&'static str, Result<(), String>),
     /// Something was written into the scene file, the camera or a value; or why it could not be.
     Wrote(String, Result<(), String>),
     /// What was written last was taken back, or what was taken back last was made again; or why not.
@@ -89,6 +93,23 @@ pub enum Command {
     Gain(f32),
     /// Whether pixels that are no light are marked.
     Marks(bool),
+    /// Another value of a slider of the shaders.
+    Slide {
+        /// The file of its constant.
+        file: String,
+        /// The constant's name.
+        name: String,
+        /// The value.
+        value: Value,
+    },
+    /// The value of the file for a slider, given as file and name.
+    ResetSlider(String, String),
+    /// The values of the files for all.
+    ResetSliders,
+    /// To write the sliders' values into the shaders.
+    WriteSliders,
+    /// To take that back.
+    UndoSliders,
     /// How light is shown.
     Look(Choice),
     /// Whether nothing but first pictures is rendered.
@@ -179,6 +200,16 @@ pub struct State {
     pub apart: Option<Apart>,
     /// What is wrong now.
     pub problems: Vec<Diagnostic>,
+    /// The sliders of the shaders.
+    pub sliders: Vec<SliderState>,
+    /// Whether the last writing of their values can be taken back.
+    pub sliders_undo: bool,
+    /// The layers of the shaders that can be shown.
+    pub layers: Vec<LayerName>,
+    /// The views that the scene does not have, and why.
+    pub missing_views: Vec<(View, &'static str)>,
+    /// The form of links that open an editor, with `{file}`, `{line}` and `{column}`; none if there are no such links.
+    pub editor: Option<String>,
     /// Whether a kernel is being compiled.
     pub compiling: bool,
     /// Seconds that the last one took.

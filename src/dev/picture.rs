@@ -1,15 +1,18 @@
 //! What the page and the terminal's file show of a render: pictures of several views, and the numbers behind a pixel.
 
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::faults::{Fault, Faults, faults, mark};
+use super::film_layer::FilmLayer;
 use super::histogram::Histogram;
 use super::look::{Legend, Look};
 use crate::film::{Film, mean};
-use crate::image::{self, Aov, Pixels, difference};
+use crate::gpu::marks::LONGEST_NAME;
+use crate::image::{self, Aov, AovSource, Pixels, difference};
 use crate::pack::{FirstHit, NOTHING};
+use crate::scene::Integrator;
 
 /// What is shown of the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
@@ -20,7 +23,7 @@ pub enum View {
     Color,
     /// The first hit's normal.
     Normal,
-    /// The normal that it is shaded by.
+    /// The normal that it is shaded by; under the integrator `path` the mean over the samples.
     ShadingNormal,
     /// Its distance.
     Depth,
@@ -32,10 +35,66 @@ pub enum View {
     Instance,
     /// Where in its triangle it is.
     Barycentric,
+    /// The share of light that surfaces reflect.
+    Albedo,
+    /// Light that was reflected once.
+    Direct,
+    /// Light that was reflected more often.
+    Indirect,
+    /// Light that was not reflected.
+    Emission,
+    /// The variance of a pixel's value.
+    Variance,
     /// How many samples a pixel has.
     Samples,
     /// Radiance, another picture of it, and their difference.
     Compare(Against),
+    /// A variable of the shaders that is marked as a layer.
+    Layer(LayerName),
+}
+
+/// The name of a layer of the shaders.
+#[derive(Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct LayerName {
+    bytes: [u8; LONGEST_NAME],
+    length: u8,
+}
+
+impl LayerName {
+    /// A name; `None` if it is longer than any layer's.
+    pub fn new(name: &str) -> Option<LayerName> {
+        let mut bytes = [0; LONGEST_NAME];
+        bytes.get_mut(..name.len())?.copy_from_slice(name.as_bytes());
+        let length = u8::try_from(name.len()).ok()?;
+        Some(LayerName { bytes, length })
+    }
+
+    /// The name.
+    pub fn as_str(&self) -> &str {
+        let bytes = self.bytes.get(..usize::from(self.length)).unwrap_or_default();
+        std::str::from_utf8(bytes).unwrap_or_default()
+    }
+}
+
+impl std::fmt::Debug for LayerName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.as_str().fmt(f)
+    }
+}
+
+impl TryFrom<String> for LayerName {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<LayerName, String> {
+        LayerName::new(&name).ok_or_else(|| format!("a layer's name must have {LONGEST_NAME} bytes at most"))
+    }
+}
+
+impl From<LayerName> for String {
+    fn from(name: LayerName) -> String {
+        name.as_str().to_string()
+    }
 }
 
 /// What radiance is compared with.
@@ -51,7 +110,41 @@ pub enum Against {
 }
 
 impl View {
+    /// The layer of the shaders that it shows.
+    pub fn layer(self) -> Option<LayerName> {
+        match self {
+            View::Layer(name) => Some(name),
+            _ => None,
+        }
+    }
+
+    /// All that are layers of `wgray render --aov`.
+    pub const LAYERS: [View; 12] = [
+        View::Normal,
+        View::ShadingNormal,
+        View::Depth,
+        View::Uv,
+        View::Primitive,
+        View::Instance,
+        View::Barycentric,
+        View::Albedo,
+        View::Direct,
+        View::Indirect,
+        View::Emission,
+        View::Variance,
+    ];
+
     /// What it shows of the first hits, if it does not show the film.
+    pub fn of_hits(self, integrator: Integrator) -> Option<Aov> {
+        self.aov().filter(|aov| aov.source(integrator) == AovSource::FirstHit)
+    }
+
+    /// What it shows of the film, beside light.
+    pub fn of_film(self, integrator: Integrator) -> Option<Aov> {
+        self.aov().filter(|aov| aov.source(integrator) != AovSource::FirstHit)
+    }
+
+    /// The layer of `wgray render --aov` that it is.
     pub fn aov(self) -> Option<Aov> {
         match self {
             View::Normal => Some(Aov::Normal),
@@ -61,7 +154,12 @@ impl View {
             View::Primitive => Some(Aov::Primitive),
             View::Instance => Some(Aov::Instance),
             View::Barycentric => Some(Aov::Barycentric),
-            View::Color | View::Samples | View::Compare(_) => None,
+            View::Albedo => Some(Aov::Albedo),
+            View::Direct => Some(Aov::Direct),
+            View::Indirect => Some(Aov::Indirect),
+            View::Emission => Some(Aov::Emission),
+            View::Variance => Some(Aov::Variance),
+            View::Color | View::Samples | View::Compare(_) | View::Layer(_) => None,
         }
     }
 
@@ -71,27 +169,34 @@ impl View {
     }
 }
 
-/// The means of a film's sums. In rows that have no samples yet `under` shows through, a smaller picture of the same.
-pub fn means(film: &Film, under: Option<&Pixels>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> Pixels {
-    let (width, height) = (film.region.width(), film.region.height());
-    let color = |(i, sum): (usize, &Vec4)| match under {
-        Some(under) if !has_samples(i as u32 / width) => {
-            let at = Scaled {
-                from: [width, height],
-                to: [under.width, under.height],
-            };
-            at.index(i as u32 % width, i as u32 / width)
-                .and_then(|i| under.colors.get(i))
-                .copied()
-                .unwrap_or_default()
-        }
-        _ => mean(*sum),
-    };
+/// The means of a film's sums. In rows that have no samples yet `under` shows through, a smaller film of the same picture.
+pub fn means(film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> Pixels {
     Pixels {
-        width,
-        height,
-        colors: film.sums.par_iter().enumerate().map(color).collect(),
+        width: film.region.width(),
+        height: film.region.height(),
+        colors: of_film(film, under, has_samples, &|film, i| mean(film.sums[i])),
     }
+}
+
+/// What a film says of each pixel, or, in rows that have no samples yet, a smaller film of the same picture.
+pub(super) fn of_film<T: Default + Send>(
+    film: &Film,
+    under: Option<&Film>,
+    has_samples: &(dyn Fn(u32) -> bool + Sync),
+    value: &(dyn Fn(&Film, usize) -> T + Sync),
+) -> Vec<T> {
+    let size = |film: &Film| [film.region.width(), film.region.height()];
+    let from = size(film);
+    let pixels = (0..film.sums.len()).into_par_iter().with_min_len(1024);
+    let of_pixel = |i: usize| match under {
+        Some(under) if !has_samples(i as u32 / from[0]) => {
+            let at = Scaled { from, to: size(under) };
+            at.index(i as u32 % from[0], i as u32 / from[0])
+                .map_or_else(T::default, |i| value(under, i))
+        }
+        _ => value(film, i),
+    };
+    pixels.map(of_pixel).collect()
 }
 
 /// From a picture to the same in another size.
@@ -121,10 +226,14 @@ pub enum Content {
     Hits(Aov, Vec<FirstHit>),
     /// [`View::Compare`]: the picture, and the other one of the same size.
     Compare(Pixels, Pixels),
+    /// [`View::Layer`], and how many numbers it has.
+    Layer(Pixels, usize),
+    /// The views of the film's layers.
+    Film(FilmLayer),
 }
 
 impl Content {
-    /// The bytes that are shown of what is no light, for a picture of this size; none for light.
+    /// The bytes that are shown of what is no light, nor a layer of the film, for a picture of this size; else none.
     pub(super) fn plain_bytes(&self, [width, height]: [u32; 2]) -> Vec<u8> {
         match self {
             Content::Samples(counts, total) => bytes(counts, |n| Vec3::splat(*n as f32 / (*total).max(1) as f32)),
@@ -133,7 +242,8 @@ impl Content {
                 let middle_depth = middle.filter(|hit| hit.shape != NOTHING).map_or(1.0, |hit| hit.depth);
                 bytes(hits, |hit| aov.color_of_hit(hit, middle_depth))
             }
-            Content::Color(_) | Content::Compare(..) => Vec::new(),
+            Content::Layer(values, _) => bytes(&values.colors, |color| Vec3::from(*color)),
+            Content::Color(_) | Content::Compare(..) | Content::Film(_) => Vec::new(),
         }
     }
 }
@@ -161,6 +271,8 @@ pub struct Header {
     pub total: u32,
     /// Whether nothing will be added.
     pub done: bool,
+    /// Whether it shows the first hits, one ray a pixel.
+    pub first_hits: bool,
     /// Samples of pixels per second.
     pub speed: Option<f64>,
     /// Seconds from the last change to the first frame that showed it.
@@ -206,7 +318,7 @@ pub struct Names {
 }
 
 impl Frame {
-    /// Makes the pictures of `content`; the header's last three fields are found here.
+    /// Makes the pictures of `content`; what the header says of that is found here.
     pub fn new(mut header: Header, content: Content, names: Names, look: Look) -> Frame {
         let [width, height] = header.sent;
         let mut found = Vec::new();
@@ -220,6 +332,16 @@ impl Frame {
         let light = |pixels: &Pixels| faults(&pixels.colors, look.negative, |color| *color);
         let pictures: Vec<(&'static str, Vec<u8>)> = match &content {
             Content::Color(colors) => vec![marked("picture", look.bytes(colors), light(colors))],
+            // Numbers as they are, of which any may be negative.
+            Content::Layer(values, _) => {
+                let found = faults(&values.colors, true, |color| *color);
+                vec![marked("picture", content.plain_bytes(header.sent), found)]
+            }
+            Content::Film(layer) => {
+                let negative = look.negative || layer.may_be_negative();
+                let found = faults(&layer.values.colors, negative, |color| *color);
+                vec![marked("picture", layer.bytes(&look), found)]
+            }
             Content::Samples(..) => vec![("picture", content.plain_bytes(header.sent))],
             Content::Hits(aov, hits) => {
                 // Below zero are normals and texture coordinates by right.
@@ -247,15 +369,18 @@ impl Frame {
             }
         };
         header.faults = found;
+        header.first_hits = matches!(content, Content::Hits(..));
         header.histogram = match &content {
             Content::Color(pixels) | Content::Compare(pixels, _) => Some(Histogram::of(&pixels.colors)),
-            Content::Samples(..) | Content::Hits(..) => None,
+            Content::Film(layer) if layer.is_light() => Some(Histogram::of(&layer.values.colors)),
+            Content::Samples(..) | Content::Hits(..) | Content::Layer(..) | Content::Film(_) => None,
         };
-        header.legend = header
-            .histogram
-            .as_ref()
-            .filter(|_| look.false_color)
-            .map(|_| Legend::of(look.view.exposure));
+        let exposure = look.view.exposure;
+        header.legend = match &content {
+            Content::Film(layer) if layer.aov == Aov::Variance => Some(Legend::of_errors(exposure)),
+            _ if look.false_color && header.histogram.is_some() => Some(Legend::of(exposure)),
+            _ => None,
+        };
         let (parts, pictures): (Vec<_>, Vec<_>) = pictures
             .into_par_iter()
             .map(|(name, rgb)| {
@@ -289,6 +414,13 @@ impl Frame {
                 let shown = self.look.shown(color).map(|byte| byte.to_string()).join(" ");
                 vec![("linear RGB", numbers(color)), ("bits", bits(color)), ("shown", shown)]
             }
+            Content::Layer(values, count) => {
+                let values = values.colors.get(i)?.iter().take(*count);
+                let joined = |told: fn(&f32) -> String| values.clone().map(told).collect::<Vec<_>>().join("  ");
+                let bits = joined(|v| format!("{:08x}", v.to_bits()));
+                vec![("layer", joined(|v| format!("{v}"))), ("bits", bits)]
+            }
+            Content::Film(layer) => layer.pixel(i, &self.look)?,
             Content::Samples(counts, total) => vec![("samples", format!("{} of {total}", counts.get(i)?))],
             Content::Hits(aov, hits) => self.hit(*aov, hits.get(i)?),
             Content::Compare(first, second) => {
@@ -335,12 +467,12 @@ impl Frame {
     }
 }
 
-fn numbers<const N: usize>(values: [f32; N]) -> String {
+pub(super) fn numbers<const N: usize>(values: [f32; N]) -> String {
     values.map(|v| format!("{v}")).join("  ")
 }
 
 /// The bits of floats, in hexadecimal.
-fn bits<const N: usize>(values: [f32; N]) -> String {
+pub(super) fn bits<const N: usize>(values: [f32; N]) -> String {
     values.map(|v| format!("{:08x}", v.to_bits())).join("  ")
 }
 
@@ -349,7 +481,7 @@ fn values<const N: usize>(name: &'static str, values: [f32; N]) -> Vec<(&'static
 }
 
 /// The bytes of values that are shown as they are, not as light.
-fn bytes<T: Sync>(pixels: &[T], color: impl Fn(&T) -> Vec3 + Sync) -> Vec<u8> {
+pub(super) fn bytes<T: Sync>(pixels: &[T], color: impl Fn(&T) -> Vec3 + Sync) -> Vec<u8> {
     let byte = |v: f32| (v * 255.0 + 0.5) as u8; // saturates
     pixels
         .par_iter()
@@ -393,6 +525,8 @@ pub(super) fn png(width: u32, height: u32, rgb: &[u8]) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec4;
+
     use super::*;
     use crate::film::Region;
 
@@ -423,7 +557,8 @@ mod tests {
 
     #[test]
     fn a_coarse_picture_shows_where_the_film_is_empty() {
-        let under = pixels(&[[1.0, 0.0, 0.0]]);
+        let mut under = Film::new(Region::whole(1, 1));
+        under.sums[0] = Vec4::new(1.0, 0.0, 0.0, 1.0);
         let mut film = Film::new(Region::whole(1, 2));
         film.sums[0] = Vec4::new(0.0, 2.0, 4.0, 2.0);
         assert_eq!(

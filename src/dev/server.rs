@@ -18,6 +18,7 @@ use hyper_util::rt::TokioIo;
 use hyper_util::service::TowerToHyperService;
 use serde::{Deserialize, Serialize};
 use tokio::sync::{Semaphore, watch};
+use tokio::time::MissedTickBehavior;
 
 use super::download::{exr_file, png_file};
 use super::guard::Guard;
@@ -26,6 +27,7 @@ use super::object::{Listed, Object, Seen};
 use super::picture::Frame;
 use super::reference::Reference;
 use super::session::{Session, Viewers};
+use super::times::{Time, Times};
 
 /// So many may look at once.
 const VIEWERS: usize = 16;
@@ -41,6 +43,8 @@ const LARGEST_FILE: usize = 256 << 20;
 const LONGEST_NAME: usize = 80;
 /// A viewer that takes nothing for so long is gone.
 const SEND: Duration = Duration::from_secs(30);
+/// So often a viewer is told where the time goes, while that changes.
+const TIMES: Duration = Duration::from_millis(500);
 /// So often a viewer is asked whether it is there; after three times without a word it is gone.
 const BEAT: Duration = Duration::from_secs(15);
 
@@ -84,6 +88,7 @@ impl Listener {
             guard: self.guard,
             state: session.state.clone(),
             frames: session.frames.clone(),
+            times: session.times.clone(),
             seen: session.seen.clone(),
             send: Arc::new(session.commands()),
             give: Arc::new(session.references()),
@@ -123,6 +128,7 @@ struct Shared {
     guard: Guard,
     state: watch::Receiver<Arc<messages::State>>,
     frames: watch::Receiver<Option<Arc<Frame>>>,
+    times: Times,
     seen: watch::Receiver<Option<Arc<Seen>>>,
     send: Arc<dyn Fn(Command) -> Option<u64> + Send + Sync>,
     give: Arc<dyn Fn(Reference) -> bool + Send + Sync>,
@@ -131,16 +137,19 @@ struct Shared {
 }
 
 /// The page's modules.
-const MODULES: [(&str, &str); 10] = [
+const MODULES: [(&str, &str); 13] = [
     ("/camera.js", include_str!("page/camera.js")),
     ("/compare.js", include_str!("page/compare.js")),
     ("/object.js", include_str!("page/object.js")),
+    ("/editor.js", include_str!("page/editor.js")),
     ("/link.js", include_str!("page/link.js")),
     ("/numbers.js", include_str!("page/numbers.js")),
     ("/page.js", include_str!("page/page.js")),
     ("/picture.js", include_str!("page/picture.js")),
     ("/probes.js", include_str!("page/probes.js")),
     ("/render.js", include_str!("page/render.js")),
+    ("/shader.js", include_str!("page/shader.js")),
+    ("/times.js", include_str!("page/times.js")),
     ("/view.js", include_str!("page/view.js")),
 ];
 
@@ -281,6 +290,8 @@ enum Tell<'a> {
     /// The number of a command that was given; the state says when it has been followed.
     Asked(u64),
     Refused(String),
+    /// Where the time goes.
+    Times(&'a [Time]),
 }
 
 /// Tells one viewer what there is to tell, as fast as it takes it: it gets the newest frame, not every frame.
@@ -289,6 +300,9 @@ async fn view(mut socket: WebSocket, shared: &Shared) -> Option<()> {
     state.mark_changed();
     frames.mark_changed();
     let mut beat = tokio::time::interval(BEAT);
+    let mut clock = tokio::time::interval(TIMES);
+    clock.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut times = Vec::new();
     let mut heard = Instant::now();
     loop {
         let message = tokio::select! {
@@ -315,6 +329,14 @@ async fn view(mut socket: WebSocket, shared: &Shared) -> Option<()> {
                     Message::Ping(_) | Message::Pong(_) => continue,
                 }
             }
+            _ = clock.tick() => {
+                let told = shared.times.told();
+                if told == times {
+                    continue;
+                }
+                times = told;
+                text(&Tell::Times(&times))?
+            }
             _ = beat.tick() => {
                 if heard.elapsed() > 3 * BEAT {
                     return None;
@@ -322,7 +344,12 @@ async fn view(mut socket: WebSocket, shared: &Shared) -> Option<()> {
                 Message::Ping(Vec::new().into())
             }
         };
+        let is_frame = matches!(message, Message::Binary(_));
+        let start = Instant::now();
         tokio::time::timeout(SEND, socket.send(message)).await.ok()?.ok()?;
+        if is_frame {
+            shared.times.part("send", start.elapsed());
+        }
     }
 }
 

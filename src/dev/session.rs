@@ -16,6 +16,7 @@ use super::painter::{Painter, Told};
 use super::picture::Frame;
 use super::reference::Reference;
 use super::source::Sources;
+use super::times::Times;
 use super::watch::Watch;
 use crate::error::RenderError;
 use crate::gpu::{Choice, choose};
@@ -30,6 +31,8 @@ pub struct Settings {
     pub out: Option<PathBuf>,
     /// Whether nothing is rendered while nobody looks ([`Session::viewers`]) and there is no `out`.
     pub only_for_viewers: bool,
+    /// The form of links that open an editor; none for no such links.
+    pub editor: Option<String>,
     /// Is told what happens, for the terminal.
     pub report: Box<dyn Fn(Report) + Send>,
 }
@@ -46,6 +49,8 @@ pub struct Session {
     pub state: watch::Receiver<Arc<State>>,
     /// The newest picture, once there is one. A slow reader misses some.
     pub frames: watch::Receiver<Option<Arc<Frame>>>,
+    /// Where the time goes.
+    pub times: Times,
     /// The scene and how it is looked at, once there is one.
     pub seen: watch::Receiver<Option<Arc<Seen>>>,
     viewers: Viewers,
@@ -107,6 +112,7 @@ impl Session {
             device: choice,
             out,
             only_for_viewers,
+            editor,
             report,
         } = settings;
         std::fs::metadata(&sources.scene).map_err(|error| StartError::NoScene(sources.scene.clone(), error))?;
@@ -121,7 +127,8 @@ impl Session {
             let events = events.clone();
             move |snapshot, noticed, count| events.send(Event::Files(Box::new(snapshot), noticed, count)).is_ok()
         })?;
-        let builder = Builder::start(choice, {
+        let times = Times::default();
+        let builder = Builder::start(choice, times.clone(), {
             let events = events.clone();
             move |built| {
                 let _ = events.send(Event::Built(Box::new(built))); // after the session's end nobody wants it
@@ -136,6 +143,8 @@ impl Session {
             report,
             state: state_sender,
             frames: frame_sender,
+            times: times.clone(),
+            editor,
             seen: scene_sender,
             events: events.clone(),
         };
@@ -152,6 +161,7 @@ impl Session {
             asked: Arc::default(),
             state,
             frames,
+            times,
             seen,
             watch: Some(watch),
             thread: Some(thread),
@@ -282,6 +292,7 @@ mod tests {
             device: Choice::Auto,
             out: None,
             only_for_viewers: false,
+            editor: None,
             report: Box::new(move |report| drop(told.send(report))),
         })
         .unwrap();
@@ -336,6 +347,7 @@ mod tests {
             device: Choice::Auto,
             out: None,
             only_for_viewers: false,
+            editor: None,
             report: Box::new(|_| ()),
         };
         let error = Session::start(settings).err().unwrap().to_string();

@@ -4,10 +4,12 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
-use std::time::SystemTime;
+use std::time::{Duration, Instant, SystemTime};
 
 use super::diagnostic::Diagnostic;
+use super::picture::{LayerName, View};
 use crate::gpu::compose::{self, Shaders};
+use crate::image::AovSource;
 use crate::pack::{Packed, Specialization, pack};
 use crate::scene::{
     CameraDescription, Description, Draft, Integrator, Overrides, Pieces, Places, Scene, folder_of, is_gltf, read_text,
@@ -42,9 +44,9 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// A scene that was read from a text.
+    /// A scene that was read from a text, and packed.
     pub fn new(text: String, scene: Scene, description: Description) -> Loaded {
-        let packed = pack(&scene).without_layers(); // no view shows them
+        let packed = pack(&scene).without_layers(); // views that show them have kernels of their own
         Loaded {
             text,
             camera: description.camera.clone(),
@@ -68,12 +70,53 @@ impl Loaded {
     }
 }
 
-/// What a kernel is compiled for: its constants, the integrator, and whether sampling is adaptive.
-pub type Constants = (Specialization, Integrator, bool);
+/// What a kernel is compiled for: its constants, the integrator, whether sampling is adaptive, and the layer that takes the
+/// place of light.
+pub type Constants = (Specialization, Integrator, bool, Option<LayerName>);
 
-/// What a scene's kernel is compiled for.
-pub fn constants(packed: &Packed) -> Constants {
-    (packed.specialization, packed.integrator, packed.adaptive)
+/// What a scene's kernel is compiled for, to show a view, and a layer of the shaders in place of light. Such a layer's samples are
+/// not adaptive: what they say of light's errors is nothing.
+pub fn constants(packed: &Packed, view: View, layer: Option<LayerName>) -> Constants {
+    let adaptive = packed.adaptive && layer.is_none();
+    let integrator = packed.integrator;
+    let of_samples = view
+        .aov()
+        .is_some_and(|aov| aov.source(integrator) == AovSource::Samples);
+    let specialization = Specialization {
+        layers: (of_samples && integrator == Integrator::Path).into(),
+        ..packed.specialization
+    };
+    (specialization, integrator, adaptive, layer)
+}
+
+/// What a kernel shows when a view is asked for: light, if it takes another one. A kernel that has a layer in place of light shows
+/// nothing else.
+pub fn shown(constants: &Constants, view: View) -> View {
+    let (specialization, integrator, adaptive, layer) = constants;
+    match (layer, view) {
+        (Some(layer), _) => View::Layer(*layer),
+        (None, View::Layer(_)) => View::Color,
+        (None, view) => match view.aov().map(|aov| aov.source(*integrator)) {
+            Some(AovSource::Samples) if specialization.layers == 0 => View::Color,
+            Some(AovSource::Adaptive) if !adaptive => View::Color,
+            _ => view,
+        },
+    }
+}
+
+/// Whether two kernels differ at most in what views they are for.
+pub fn are_of_one_scene(a: &Constants, b: &Constants) -> bool {
+    let of_scene = |(specialization, integrator, ..): &Constants| {
+        let layers = 0;
+        (
+            Specialization {
+                layers,
+                ..*specialization
+            },
+            *integrator,
+        )
+    };
+    of_scene(a) == of_scene(b)
 }
 
 /// What the files say at one moment.
@@ -82,7 +125,9 @@ pub struct Snapshot {
     /// The scene, or what is wrong with it.
     pub scene: Result<Arc<Loaded>, Diagnostic>,
     /// The shaders, or what is wrong with them.
-    pub shaders: Result<Arc<Shaders>, Diagnostic>,
+    pub shaders: Result<Arc<Shaders>, Box<Diagnostic>>,
+    /// How long it took to read the files, and to pack the scene.
+    pub took: [Duration; 2],
     /// The scene file and the files that the scene uses, and their state: what decides whether to read again.
     pub files: Vec<(PathBuf, Stamp)>,
 }
@@ -106,6 +151,7 @@ impl Sources {
 
     /// Reads what has changed since a snapshot; `None` if nothing has.
     pub fn reread(&self, last: &Snapshot) -> Option<Snapshot> {
+        let start = Instant::now();
         let shaders = match (self.read_shaders(), &last.shaders) {
             (Ok(new), Ok(old)) if new == *old => Ok(old.clone()), // the same pointer, which later stages compare
             (shaders, _) => shaders,
@@ -120,6 +166,7 @@ impl Sources {
             (true, true) => None,
             (true, false) => Some(Snapshot {
                 shaders,
+                took: [start.elapsed(), Duration::ZERO],
                 ..last.clone()
             }),
             (false, _) => {
@@ -138,15 +185,18 @@ impl Sources {
         }
     }
 
-    fn read_shaders(&self) -> Result<Arc<Shaders>, Diagnostic> {
+    fn read_shaders(&self) -> Result<Arc<Shaders>, Box<Diagnostic>> {
         let shaders = match &self.shaders {
-            Some(folder) => Shaders::read(folder).map_err(|error| Diagnostic::plain("file", error.to_string()))?,
+            Some(folder) => {
+                Shaders::read(folder).map_err(|error| Box::new(Diagnostic::plain("file", error.to_string())))?
+            }
             None => Shaders::built_in(),
         };
         Ok(Arc::new(shaders))
     }
 
-    fn read_scene(&self, shaders: Result<Arc<Shaders>, Diagnostic>) -> Snapshot {
+    fn read_scene(&self, shaders: Result<Arc<Shaders>, Box<Diagnostic>>) -> Snapshot {
+        let start = Instant::now();
         // The stamps are taken first: a file that changes while it is read is read again.
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
         let mut named = BTreeSet::new();
@@ -168,11 +218,22 @@ impl Sources {
                 files.push((path, stamp));
             }
         }
+        let mut took = [start.elapsed(), Duration::ZERO];
         let scene = match scene {
-            Ok((scene, description)) => Ok(Arc::new(Loaded::new(text, scene, description))),
+            Ok((scene, description)) => {
+                let start = Instant::now();
+                let loaded = Loaded::new(text, scene, description);
+                took[1] = start.elapsed();
+                Ok(Arc::new(loaded))
+            }
             Err(error) => Err(Diagnostic::scene(&error, &text)),
         };
-        Snapshot { scene, shaders, files }
+        Snapshot {
+            scene,
+            shaders,
+            took,
+            files,
+        }
     }
 
     /// The files that a scene names.

@@ -156,6 +156,17 @@ fn integrator_files(integrator: Integrator) -> &'static [File] {
 }
 
 impl Kernel {
+    /// Whether it is made of a file, as far as that is not another form of the scene.
+    pub fn has(&self, file: &str, integrator: Integrator) -> bool {
+        let own = self.files.iter().copied().flatten().chain(SHARED);
+        let more = if self.integrates {
+            integrator_files(integrator)
+        } else {
+            &[]
+        };
+        own.chain(more).chain(FROM_BUFFERS).any(|(name, _)| *name == file)
+    }
+
     /// The file that has the entry point.
     pub fn file(&self) -> &'static str {
         self.files.iter().copied().flatten().last().map_or("", |(name, _)| name)
@@ -189,6 +200,19 @@ impl Shaders {
         Ok(Shaders {
             files: built_in().map(|(name, _)| read(name)).collect::<io::Result<_>>()?,
         })
+    }
+
+    /// All files: names and texts.
+    pub fn files(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.files.iter().map(|(name, text)| (name.as_str(), text.as_str()))
+    }
+
+    /// These shaders with other texts of files, where there are any.
+    pub fn changed(&self, text: impl Fn(&str, &str) -> Option<String>) -> Shaders {
+        let new = |(name, old): &(String, String)| (name.clone(), text(name, old).unwrap_or_else(|| old.clone()));
+        Shaders {
+            files: self.files.iter().map(new).collect(),
+        }
     }
 
     /// These shaders with another text of a file.

@@ -228,9 +228,10 @@ fn open(adapter: &wgpu::Adapter) -> Result<Device, RenderError> {
     } else {
         (wgpu::Features::empty(), wgpu::ExperimentalFeatures::disabled())
     };
+    let clock = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
     let descriptor = wgpu::DeviceDescriptor {
         label: None,
-        required_features: features,
+        required_features: features | clock,
         required_limits: adapter.limits(),
         experimental_features: experimental,
         memory_hints: wgpu::MemoryHints::MemoryUsage,

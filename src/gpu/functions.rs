@@ -44,7 +44,7 @@ pub fn functions(text: &str) -> Vec<FunctionText<'_>> {
 }
 
 /// A text of as many bytes, with blanks in place of comments.
-fn without_comments(text: &str) -> String {
+pub fn without_comments(text: &str) -> String {
     let mut plain = text.as_bytes().to_vec();
     let mut i = 0;
     while i < plain.len() {

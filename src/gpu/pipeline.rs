@@ -25,6 +25,8 @@ pub const GROUPS: [&[BufferBindingType]; 3] = [
     &[READ, READ, READ, READ],
 ];
 
+/// The group of what changes with every call; where constants are read from a buffer it ends with that.
+pub const CALL: usize = 0;
 /// The group of the scene, which ends with its texels.
 pub const SCENE: usize = 1;
 
@@ -47,10 +49,15 @@ pub const STORAGE_BUFFERS: usize = {
 /// WebGPU promises so many by default.
 const _: () = assert!(STORAGE_BUFFERS <= 8);
 
-/// The groups of every kernel; that of the scene ends with so many further buffers of texels.
-pub fn bind_group_layouts(device: &Device, more_texels: usize) -> Vec<wgpu::BindGroupLayout> {
+/// The groups of every kernel; that of the scene ends with so many further buffers of texels, that of a call with the values
+/// of constants where these are `live`.
+pub fn bind_group_layouts(device: &Device, more_texels: usize, live: bool) -> Vec<wgpu::BindGroupLayout> {
     let layout = |(group, types): (usize, &&[BufferBindingType])| {
-        let more = std::iter::repeat_n(READ, if group == SCENE { more_texels } else { 0 });
+        let more = match group {
+            CALL => std::iter::repeat_n(UNIFORM, usize::from(live)),
+            SCENE => std::iter::repeat_n(READ, more_texels),
+            _ => std::iter::repeat_n(READ, 0),
+        };
         let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
             .zip(types.iter().copied().chain(more))
             .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {

@@ -1,6 +1,7 @@
 //! A scene on a device: its buffers, its kernels, and the film that it accumulates.
 
 use std::ops::Range;
+use std::time::{Duration, Instant};
 
 use bytemuck::{bytes_of, cast_slice};
 use glam::{UVec2, Vec4};
@@ -9,12 +10,14 @@ use wgpu::BufferUsages;
 use super::bake::bake_if_small;
 use super::compose::{ADAPTIVE, FIRST_HITS, Kernel, RENDER, Shaders};
 use super::device::{Device, Mapping};
+use super::live::Live;
 use super::memory::{Asked, Held};
 use super::pipeline::{WORKGROUP, bind_group, bind_group_layouts, pipeline};
 use super::rounding::Rounding;
 use super::rounds::samples_per_call;
 use super::scene::SceneBuffers;
 use super::texels::TexelParts;
+use super::timer::{TIMES, Timer};
 use crate::backend::{Backend, Rules, Started};
 use crate::error::RenderError;
 use crate::film::{Film, Form, Region};
@@ -58,6 +61,24 @@ pub struct Gpu {
     rules: Rules,
     /// The most samples of a dispatch that the driver is thought to run whole.
     samples_per_call: u32,
+    /// The values of constants that are read from a buffer.
+    sliders: Option<wgpu::Buffer>,
+    /// Of calls, where these are timed.
+    timer: Option<Timer>,
+    calls: Vec<Call>,
+}
+
+/// How long a dispatch has taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Call {
+    /// The kernel's entry point.
+    pub kernel: &'static str,
+    /// From its start to its end.
+    pub took: Duration,
+    /// Whether the device has told; else it is from the call to the news of its end.
+    pub by_device: bool,
+    /// Samples of pixels, or pixels where it takes no samples.
+    pub samples: u64,
 }
 
 /// A call that was submitted: one dispatch of it is under way.
@@ -67,6 +88,7 @@ struct Pending {
     samples: Range<u32>,
     /// Where those of the dispatch end.
     end: u32,
+    start: Instant,
     /// Tells when the dispatch has ended.
     receipt: Mapping,
 }
@@ -81,6 +103,7 @@ struct Kernels {
     layouts: Vec<wgpu::BindGroupLayout>,
     exact: Option<Rounding>,
     texels: TexelParts,
+    live: Live,
 }
 
 /// A buffer with a record for each pixel of a region, and the group of bindings of the kernel that writes it.
@@ -130,22 +153,33 @@ impl Gpu {
     /// Compiles the kernel for a scene and uploads it. The device has run the kernel once, on nothing, when this
     /// returns: drivers compile at the first dispatch.
     pub fn new(device: &Device, packed: &Packed, shaders: &Shaders, options: Options) -> Result<Gpu, RenderError> {
+        Gpu::with_live(device, packed, shaders, options, Live::default())
+    }
+
+    /// As [`Gpu::new`], with constants that are read from a buffer. They are 0 until [`Gpu::set_sliders`].
+    pub fn with_live(
+        device: &Device,
+        packed: &Packed,
+        shaders: &Shaders,
+        options: Options,
+        live: Live,
+    ) -> Result<Gpu, RenderError> {
         let texels = TexelParts::of(&device.info, packed)?;
         let kernels = Kernels {
             shaders: shaders.clone(),
             integrator: packed.integrator,
             baked: options.baked.then(|| bake_if_small(packed)).flatten(),
             constants: packed.specialization,
-            layouts: bind_group_layouts(device, texels.count - 1),
+            layouts: bind_group_layouts(device, texels.count - 1, !live.sliders().is_empty()),
             exact: options.exact,
             texels,
+            live,
         };
-        let render = match packed.adaptive {
-            true => kernels.compile(device, &ADAPTIVE)?,
-            false => kernels.compile(device, &RENDER)?,
-        };
+        let render = kernels.compile(device, kernel_of(packed.adaptive))?;
         let scene = SceneBuffers::upload(device, packed, texels, &kernels.layouts)?;
         let work = device.buffer(size_of::<Work>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+        let values = kernels.live.sliders().len() as u64 * size_of::<[u32; 4]>() as u64;
+        let sliders = (values > 0).then(|| device.buffer(values, BufferUsages::UNIFORM | BufferUsages::COPY_DST));
         let written = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let receipt = [device.buffer(RECEIPT, written), receipt_to_read(device)];
         let mut gpu = Gpu {
@@ -161,6 +195,9 @@ impl Gpu {
             film: None,
             pending: None,
             rules: Rules::of(packed),
+            sliders,
+            timer: None,
+            calls: Vec::new(),
         };
         let nothing = Region {
             x0: 0,
@@ -173,6 +210,38 @@ impl Gpu {
         gpu.wait()?;
         gpu.film = None;
         Ok(gpu)
+    }
+
+    /// The constants that are read from a buffer, in its order, and what takes the place of light.
+    pub fn live(&self) -> &Live {
+        &self.kernels.live
+    }
+
+    /// Gives the constants that are read from a buffer their values. The film is lost.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Pending`] while a call is pending.
+    pub fn set_sliders(&mut self, values: &[[u32; 4]]) -> Result<(), RenderError> {
+        self.idle()?;
+        self.film = None;
+        match &self.sliders {
+            Some(buffer) => self
+                .device
+                .checked(|| self.device.queue.write_buffer(buffer, 0, cast_slice(values))),
+            None => Ok(()),
+        }
+    }
+
+    /// Times every call from now on; [`Gpu::calls`] has them.
+    pub fn time_calls(&mut self) -> Result<(), RenderError> {
+        self.timer = Some(self.device.checked(|| Timer::new(&self.device))?);
+        Ok(())
+    }
+
+    /// The calls that have ended since this was asked last.
+    pub fn calls(&mut self) -> Vec<Call> {
+        std::mem::take(&mut self.calls)
     }
 
     /// The device that it is on.
@@ -218,12 +287,17 @@ impl Gpu {
         let target = self.device.checked(|| {
             let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
             let buffer = self.device.buffer(size, usage);
-            let buffers = [&self.work, &buffer, &self.receipt[0]];
-            let group = bind_group(&self.device, &self.kernels.layouts[0], &buffers);
+            let buffers = [&self.work, &buffer, &self.receipt[0]].into_iter().chain(&self.sliders);
+            let group = bind_group(&self.device, &self.kernels.layouts[0], &buffers.collect::<Vec<_>>());
             Target { region, buffer, group }
         });
         let what = format!("a film of {} x {} pixels", region.width(), region.height());
         self.explained(target, Some((what, size)))
+    }
+
+    /// The kernel that adds samples.
+    fn kernel(&self) -> &'static Kernel {
+        kernel_of(self.rules.form().adaptive)
     }
 
     /// What there is on the device.
@@ -265,7 +339,10 @@ impl Gpu {
             let mut encoder = device.create_command_encoder(&Default::default());
             copies(&mut encoder);
             encoder.clear_buffer(written, 0, None);
-            let mut pass = encoder.begin_compute_pass(&Default::default());
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: None,
+                timestamp_writes: self.timer.as_ref().and_then(Timer::writes),
+            });
             pass.set_pipeline(pipeline);
             let groups_of_bindings = [&target.group].into_iter().chain(&self.scene.groups);
             for (i, group) in (0..).zip(groups_of_bindings) {
@@ -273,15 +350,36 @@ impl Gpu {
             }
             pass.dispatch_workgroups(columns, rows, 1);
             drop(pass);
-            encoder.copy_buffer_to_buffer(written, 0, read, 0, read.size());
+            encoder.copy_buffer_to_buffer(written, 0, read, 0, RECEIPT);
+            if let Some(timer) = &self.timer {
+                timer.resolve(&mut encoder, read, RECEIPT);
+            }
             queue.submit([encoder.finish()]);
             self.device.map(read)
         })
     }
 
     /// Whether a dispatch that has ended ran whole for every pixel of its tile: the driver has cut none of its loops short.
-    fn ran_whole(&self, tile: Region) -> Result<bool, RenderError> {
+    /// How long it took is noted where that is asked for.
+    fn ran_whole(
+        &mut self,
+        kernel: &'static str,
+        tile: Region,
+        samples: u32,
+        start: Instant,
+    ) -> Result<bool, RenderError> {
+        let waited = start.elapsed();
         let receipt: Vec<u32> = self.device.mapped(&self.receipt[1])?;
+        let (receipt, ticks) = receipt.split_at((RECEIPT / 4) as usize);
+        if let Some(timer) = &self.timer {
+            let told = timer.took(ticks);
+            self.calls.push(Call {
+                kernel,
+                took: told.unwrap_or(waited),
+                by_device: told.is_some(),
+                samples: tile.pixels() * u64::from(samples),
+            });
+        }
         let [columns, rows] = groups(tile);
         Ok(receipt == [columns * rows, 0])
     }
@@ -313,12 +411,14 @@ impl Gpu {
                 encoder.copy_buffer_to_buffer(&film.buffer, start, &before, copy, rows.size);
             }
         };
+        let start = Instant::now();
         let receipt = self.dispatch(&self.render, film, tile, samples.start..end, save)?;
         self.before = Some(before);
         self.pending = Some(Pending {
             tile,
             samples,
             end,
+            start,
             receipt,
         });
         Ok(())
@@ -327,8 +427,15 @@ impl Gpu {
     /// Brings a dispatch that has ended to its end, and submits the next one of the call, if there is any. One that was cut
     /// short is undone, and the next ones have fewer samples.
     fn end_part(&mut self, pending: Pending) -> Result<(), RenderError> {
-        let Pending { tile, samples, end, .. } = pending;
-        let rest = match self.ran_whole(tile)? {
+        let Pending {
+            tile,
+            samples,
+            end,
+            start,
+            ..
+        } = pending;
+        let kernel = self.kernel().entry_point;
+        let rest = match self.ran_whole(kernel, tile, end - samples.start, start)? {
             true => end..samples.end,
             false => {
                 self.undo(tile)?;
@@ -392,10 +499,11 @@ impl Gpu {
             None => self.kernels.compile(&self.device, &FIRST_HITS)?,
         };
         let target = self.target(FIRST_HITS_RECORD, region)?;
+        let start = Instant::now();
         let receipt = self.dispatch(&pipeline, &target, region, 0..0, |_| ())?;
         self.first_hits = Some(pipeline);
         self.device.wait_for(&receipt)?;
-        match self.ran_whole(region)? {
+        match self.ran_whole(FIRST_HITS.entry_point, region, 1, start)? {
             true => self.device.download(&target.buffer),
             false => Err(self.cut_short()),
         }
@@ -409,12 +517,17 @@ impl Gpu {
     }
 }
 
+/// The kernel that adds samples.
+fn kernel_of(adaptive: bool) -> &'static Kernel {
+    if adaptive { &ADAPTIVE } else { &RENDER }
+}
+
 /// The size of a receipt in bytes.
 const RECEIPT: u64 = size_of::<[u32; 2]>() as u64;
 
-/// A buffer for a receipt that the host reads.
+/// A buffer for a receipt that the host reads, and for the times of its call.
 fn receipt_to_read(device: &Device) -> wgpu::Buffer {
-    device.buffer(RECEIPT, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
+    device.buffer(RECEIPT + TIMES, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
 }
 
 /// A film of the records that a kernel has written: its lists, one after the other, but for those that it does not have.
@@ -540,6 +653,7 @@ impl Kernels {
         let texels = self.texels.wgsl();
         let (baked, texels) = (self.baked.as_deref(), texels.as_deref());
         let source = self.shaders.compose_with_texels(kernel, self.integrator, baked, texels);
+        let source = self.live.applied(kernel, source)?;
         pipeline(device, &self.layouts, kernel, &source, &self.constants, self.exact)
     }
 }

@@ -2,6 +2,7 @@
 //! what they say last, or the last good one with the error beside it.
 
 mod faults;
+mod film_layers;
 mod gltf;
 mod hostile;
 mod kernels;
@@ -13,5 +14,7 @@ mod reload;
 mod responsive;
 mod running;
 mod server;
+mod shader_layers;
+mod shader_sliders;
 mod views;
 mod writing;

@@ -17,6 +17,7 @@ fn rendering_rests_while_nobody_looks() {
         device: Choice::Auto,
         out: None,
         only_for_viewers: true,
+        editor: None,
         report: Box::new(|_| ()),
     };
     let running = Running {

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 use wgray::dev::{Content, Diagnostic, Frame, Session, Settings, Sources, State};
-use wgray::film::Region;
+use wgray::film::{Film, Region, mean};
 use wgray::gpu::compose::{Shaders, built_in};
 use wgray::gpu::{Choice, Gpu, Options, choose};
 use wgray::image::Pixels;
@@ -144,16 +144,22 @@ impl Files {
     /// What `render` makes of the files.
     pub fn rendered(&self) -> Pixels {
         let packed = self.packed();
+        let (width, height) = (packed.camera.width, packed.camera.height);
+        let colors = self.rendered_as(&packed, &|film, i| mean(film.sums[i]));
+        Pixels { width, height, colors }
+    }
+
+    /// A value of each pixel of the film that `render` makes of a scene.
+    pub fn rendered_as<T>(&self, packed: &Packed, value: &dyn Fn(&Film, usize) -> T) -> Vec<T> {
         let device = choose(&Choice::Auto).unwrap();
         let shaders = Shaders::read(&self.path("shaders")).unwrap();
         let options = Options {
             baked: false,
             ..Options::best(&device)
         };
-        let mut gpu = Gpu::new(&device, &packed, &shaders, options).unwrap();
-        let (width, height) = (packed.camera.width, packed.camera.height);
-        let mut colors = Vec::new();
-        let whole = Region::whole(width, height);
+        let mut gpu = Gpu::new(&device, packed, &shaders, options).unwrap();
+        let mut values = Vec::new();
+        let whole = Region::whole(packed.camera.width, packed.camera.height);
         job::render(
             &mut gpu,
             whole,
@@ -161,12 +167,12 @@ impl Files {
             &Cut::default(),
             &mut |_| true,
             &mut |film| {
-                colors.extend(film.means());
+                values.extend((0..film.sums.len()).map(|i| value(&film, i)));
                 Ok(())
             },
         )
         .unwrap();
-        Pixels { width, height, colors }
+        values
     }
 }
 
@@ -181,6 +187,7 @@ impl Running {
             device: Choice::Auto,
             only_for_viewers: out.is_some(), // a file needs the picture as a viewer does
             out,
+            editor: None,
             report: Box::new(|_| ()),
         };
         Running {

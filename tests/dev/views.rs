@@ -128,6 +128,35 @@ fn the_views_show_the_first_hits() {
 }
 
 #[test]
+fn another_view_shows_what_is_rendered_while_it_is_paused() {
+    // It takes minutes, but soon all pixels have a sample.
+    let long = SCENE
+        .replace("width = 40", "width = 120")
+        .replace("height = 30", "height = 90");
+    let files = Files::new(&long.replacen("count = 4", "count = 65536", 1));
+    let running = files.start();
+    running.wait("samples of all pixels", |running| {
+        running.frame().filter(|frame| frame.header.samples > 0)
+    });
+    running.session.send(Command::Pause(true));
+    running.wait("a rest", |running| {
+        let state = running.state();
+        (state.paused && !state.busy).then_some(())
+    });
+    running.session.send(Command::View(View::Samples));
+    let frame = running.wait("the counts", |running| {
+        running.frame().filter(|frame| frame.header.view == View::Samples)
+    });
+    assert!(frame.header.samples > 0 && !frame.header.done);
+    std::thread::sleep(SETTLED);
+    assert_eq!(
+        running.frame().unwrap().header.number,
+        frame.header.number,
+        "nothing is rendered for it"
+    );
+}
+
+#[test]
 fn the_cpu_agrees_until_a_shader_is_changed() {
     let files = Files::new(SCENE);
     let running = files.start();

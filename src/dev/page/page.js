@@ -2,11 +2,14 @@
 
 import { setUpCamera } from "/camera.js";
 import { setUpCompare } from "/compare.js";
+import { editorLink } from "/editor.js";
 import { connect, element, isHeard, lastState, onFrame, onLink, onRefused, onState } from "/link.js";
 import { select, setUpObject } from "/object.js";
 import { Picture } from "/picture.js";
 import { setUpProbes } from "/probes.js";
 import { setUpRender } from "/render.js";
+import { setUpShader } from "/shader.js";
+import { setUpTimes } from "/times.js";
 import { setUpView, viewName } from "/view.js";
 
 let isLinked = null; // not known yet
@@ -23,6 +26,8 @@ setUpCamera(picture, onKey, showNotice);
 setUpCompare(picture, onKey, showNotice);
 setUpProbes(picture, onKey);
 setUpRender(onKey);
+setUpShader();
+setUpTimes();
 setUpObject();
 picture.clicked = select;
 
@@ -115,7 +120,7 @@ function showProblems(state) {
   const articles = problems.map((problem) => {
     const article = document.createElement("article");
     const title = make("h2", problem.place ?? problem.kind);
-    const link = editorLink(problem, editor);
+    const link = editorLink(editor, problem);
     if (link) title.replaceChildren(Object.assign(make("a", problem.place ?? problem.kind), { href: link, title: "Open in the editor" }));
     article.append(title, make("p", problem.message));
     if (problem.excerpt) article.append(make("pre", problem.excerpt));
@@ -127,13 +132,6 @@ function showProblems(state) {
   dock.hidden = !problems.length;
   dock.querySelector("summary").textContent = problems.length === 1 ? "1 problem" : `${problems.length} problems`;
   element("problem-list").replaceChildren(...articles);
-}
-
-// Where an editor opens a problem's place, by the program's template.
-function editorLink({ file, line, column }, template) {
-  if (!file || !template) return null;
-  const path = file.split("/").map(encodeURIComponent).join("/");
-  return template.replace("{file}", path).replace("{line}", line ?? 1).replace("{column}", column ?? 1);
 }
 
 let noticeTimer = 0;

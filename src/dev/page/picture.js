@@ -95,7 +95,10 @@ export class Picture {
 
   // Says what the canvases show, to who does not see it.
   describe(state) {
-    const names = { color: "colour", compare: "comparison", uv: "texture coordinates", layer: `layer ${state.view.layer}` };
+    const names = {
+      color: "colour", compare: "comparison", uv: "texture coordinates", layer: `layer ${state.view.layer}`,
+      direct: "direct light", indirect: "indirect light", emission: "emitted light",
+    };
     const view = names[viewName(state.view)] ?? viewName(state.view).replace("_", " ");
     const parts = { picture: "", first: ", first picture", second: ", second picture", difference: ", difference" };
     for (const panel of this.panels) {

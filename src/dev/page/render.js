@@ -28,7 +28,7 @@ export function setUpRender(onKey) {
 
 function showProgress(header) {
   const { samples, total, speed, view, latency } = header;
-  const counts = ["color", "samples", "compare", "layer"].includes(viewName(view));
+  const counts = !header.first_hits;
   element("bar").value = !counts ? 1 : total ? samples / total : 0;
   element("samples").textContent = counts ? `${samples} of ${total}` : "1 ray a pixel";
   element("speed").textContent = counts && speed ? withPrefix(speed) : "–";

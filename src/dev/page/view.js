@@ -61,10 +61,16 @@ function showState(state, heard) {
   const name = viewName(state.view);
   for (const radio of radios()) radio.checked = radio.value === name;
   showLayers(state.layers ?? []);
+  showMissing(Object.fromEntries(state.missing_views));
   const layers = element("layers");
   layers.value = name === "layer" ? `layer:${state.view.layer}` : name;
   if (layers.selectedIndex < 0) layers.value = "";
-  layers.classList.toggle("chosen", layers.value !== "");
+  const chosen = layers.value !== "";
+  if (chosen && !layers.classList.contains("chosen")) {
+    const bar = element("toolbar"); // on a narrow screen the list may lie beyond its end
+    bar.scrollLeft = Math.max(bar.scrollLeft, layers.offsetLeft + layers.offsetWidth - bar.clientWidth);
+  }
+  layers.classList.toggle("chosen", chosen);
 
   choice = state.look;
   const [exposure, transform] = state.scene_look;
@@ -83,9 +89,25 @@ let layersShown = "";
 function showLayers(names) {
   if (String(names) === layersShown) return;
   layersShown = String(names);
-  const select = element("layers");
-  for (const option of [...select.options]) if (option.value.startsWith("layer:")) option.remove();
-  for (const name of names) select.add(new Option(name, `layer:${name}`));
+  const group = element("layers").querySelector("optgroup:last-of-type");
+  group.replaceChildren(...names.map((name) => new Option(name, `layer:${name}`)));
+  group.hidden = !names.length;
+}
+
+// Views that the scene does not have are off, and their group says why.
+let missingShown = "";
+function showMissing(rules) {
+  if (JSON.stringify(rules) === missingShown) return;
+  missingShown = JSON.stringify(rules);
+  for (const group of element("layers").querySelectorAll("optgroup")) {
+    group.dataset.name ??= group.label;
+    for (const option of group.children) {
+      option.disabled = option.value in rules;
+      option.title = rules[option.value] ?? "";
+    }
+    const rule = [...group.children].map((option) => option.title).find(Boolean);
+    group.label = rule ? `${group.dataset.name}: ${rule}` : group.dataset.name;
+  }
 }
 
 function showFrame(header) {

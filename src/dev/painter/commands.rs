@@ -7,8 +7,8 @@ use super::Painter;
 use crate::dev::build::guarded;
 use crate::dev::canvas::Limits;
 use crate::dev::messages::{Command, Notice};
-use crate::dev::picture::View;
-use crate::dev::source::Loaded;
+use crate::dev::picture::{LayerName, View};
+use crate::dev::source::{Constants, Loaded, constants};
 use crate::pack::{Camera, Packed, pack_camera};
 
 impl Painter {
@@ -25,25 +25,18 @@ impl Painter {
             Command::Set(set) => self.set(&set),
             Command::UndoWrite => self.turn(false),
             Command::RedoWrite => self.turn(true),
-            Command::View(view) => {
-                self.view = view;
-                if let Some(running) = &mut self.running {
-                    running.halted = false;
-                    match guarded(|| running.canvas.change_view(view)) {
-                        Ok(()) => self.changed((Instant::now(), false)), // the camera may have moved meanwhile
-                        Err(error) => return self.fail(&error),
-                    }
-                    if self.is_done() {
-                        self.show();
-                    }
-                }
-            }
+            Command::View(view) => self.choose_view(view),
             Command::Gain(gain) => {
                 self.gain = gain.clamp(1.0, 1e9);
                 if matches!(self.view, View::Compare(_)) {
                     self.show();
                 }
             }
+            Command::Slide { file, name, value } => self.slide(&file, &name, value),
+            Command::ResetSlider(file, name) => self.reset_sliders(Some((&file, &name))),
+            Command::ResetSliders => self.reset_sliders(None),
+            Command::WriteSliders => self.write_sliders(),
+            Command::UndoSliders => self.take_back_sliders(),
             Command::Marks(marks) => {
                 self.marks = marks;
                 self.show();
@@ -80,7 +73,7 @@ impl Painter {
             return;
         }
         self.limits = limits;
-        let view = self.view;
+        let view = self.seen();
         let Some(running) = &mut self.running else { return };
         match guarded(|| running.canvas.set_limits(limits, view)) {
             Ok(()) => self.begun((Instant::now(), false)),
@@ -114,10 +107,19 @@ impl Painter {
         })
     }
 
-    /// A scene with the camera that is looked through.
+    /// What a scene's kernel is compiled for, to show what is asked for.
+    pub(super) fn constants(&self, loaded: &Loaded) -> Constants {
+        let layer = self.layer().and_then(|layer| LayerName::new(&layer.name));
+        constants(&loaded.packed, self.view, layer)
+    }
+
+    /// A scene with the camera that is looked through, sampled as what is asked for needs it.
     pub(super) fn packed(&self, loaded: &Loaded) -> Packed {
+        let (specialization, _, adaptive, _) = self.constants(loaded);
         Packed {
             camera: self.packed_camera(loaded),
+            adaptive,
+            specialization,
             ..loaded.packed.clone()
         }
     }

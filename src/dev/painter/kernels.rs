@@ -7,7 +7,7 @@ use super::{ATTEMPTS, Painter, Running};
 use crate::dev::build::{Built, guarded};
 use crate::dev::canvas::Canvas;
 use crate::dev::diagnostic::Diagnostic;
-use crate::dev::source::Constants;
+use crate::dev::source::{Constants, are_of_one_scene, shown};
 use crate::error::{RenderError, ShaderError};
 use crate::gpu::Gpu;
 use crate::gpu::compose::Shaders;
@@ -26,7 +26,8 @@ impl Painter {
             }
         };
         if let Some(errors) = &built.refused {
-            let problems = errors.0.iter().map(|error| self.of_shader(error)).collect();
+            let shaders = pending.shaders.clone();
+            let problems = errors.0.iter().map(|error| self.of_shader(error, &shaders)).collect();
             self.refuse((pending.shaders.clone(), pending.constants), problems);
         }
         match built.result {
@@ -47,7 +48,7 @@ impl Painter {
                 self.refuse_cut((tried, pending.constants), &error);
             }
             Some(Err(error)) => {
-                let (view, running) = (self.view, &mut self.running);
+                let (view, running) = (self.seen(), &mut self.running);
                 let lives = |running: &mut Running| guarded(|| running.canvas.content(view)).is_ok();
                 if running.as_mut().is_some_and(lives) {
                     // The driver refuses what naga does not; the device is well.
@@ -68,10 +69,14 @@ impl Painter {
         let info = &gpu.device().info;
         self.state.device = format!("{}, {}", info.name, info.driver);
         self.device = Some(gpu.device().clone());
-        let (packed, view, limits) = (self.packed(&loaded), self.view, self.limits);
-        self.stop_running();
+        let (packed, limits) = (self.packed(&loaded), self.limits);
+        let view = shown(&constants, self.view);
+        self.sliders.runs(gpu.live().sliders());
+        let sliders = self.sliders.values(gpu.live().sliders());
+        self.park(&shaders, &constants);
         let canvas = guarded(|| {
-            gpu.update(&packed)?; // the scene may have changed since it was uploaded
+            self.times.of("upload", || gpu.update(&packed))?; // the scene may have changed since it was uploaded
+            gpu.set_sliders(&sliders)?;
             Canvas::new(gpu, packed, view, limits)
         });
         match canvas {
@@ -81,9 +86,14 @@ impl Painter {
                     halted: false,
                     shaders,
                     constants,
+                    sliders,
                 });
                 self.problems.device = None;
                 self.begun((Instant::now(), true));
+                // It may be known only now that a slider's value must be compiled in.
+                if self.take_shaders() {
+                    self.settle((Instant::now(), true));
+                }
             }
             Err(error) => self.fail(&error),
         }
@@ -107,7 +117,10 @@ impl Painter {
     /// A picture that the kernel cannot make, with what can be done.
     fn of_render(&self, error: &RenderError) -> Diagnostic {
         match error {
-            RenderError::Shader(error) => self.of_shader(error),
+            RenderError::Shader(error) => match &self.shaders {
+                Some(shaders) => self.of_shader(error, shaders),
+                None => Diagnostic::plain("shader", error.to_string()),
+            },
             error => {
                 let edited = self
                     .shaders
@@ -123,14 +136,8 @@ impl Painter {
     }
 
     /// A shader's error, with the path by which the user knows the file.
-    fn of_shader(&self, error: &ShaderError) -> Diagnostic {
-        let mut problem = Diagnostic::from(error);
-        if let (Some(folder), Some(place)) = (&self.sources.shaders, &mut problem.place)
-            && place.contains(".wgsl:")
-        {
-            *place = folder.join(&*place).display().to_string();
-        }
-        problem
+    fn of_shader(&self, error: &ShaderError, shaders: &Shaders) -> Diagnostic {
+        Diagnostic::shader(error, shaders, self.sources.shaders.as_deref())
     }
 
     /// The device refused something, or is lost: another one is opened, a few times. Not so if it cuts the kernel short:
@@ -148,6 +155,7 @@ impl Painter {
             return self.tell();
         }
         self.stop_running();
+        drop_contained(self.parked.take());
         self.problems.device = Some(error.into());
         self.device = None;
         self.pending = None;
@@ -159,12 +167,31 @@ impl Painter {
         self.tell();
     }
 
-    /// Gives up the running kernel. What a lost device holds may not be given back without a panic.
+    /// Gives up the running kernel.
     pub(super) fn stop_running(&mut self) {
-        let running = self.running.take();
-        let _ = guarded(|| {
-            drop(running);
-            Ok(())
-        });
+        drop_contained(self.running.take());
     }
+
+    /// Another kernel comes. Of those that differ from it by layers alone one is kept, that of light if it is there: whoever looks at
+    /// a layer will look at that again.
+    fn park(&mut self, shaders: &Arc<Shaders>, constants: &Constants) {
+        let is_sibling = |known: &Running| {
+            let same_scene = are_of_one_scene(&known.constants, constants);
+            known.shaders == *shaders && same_scene && known.constants != *constants
+        };
+        let is_of_light = |known: &Running| known.constants.3.is_none() && known.constants.0.layers == 0;
+        let known = [self.parked.take(), self.running.take()].into_iter().flatten();
+        let (mut siblings, others): (Vec<Running>, Vec<Running>) = known.partition(is_sibling);
+        siblings.sort_by_key(is_of_light);
+        self.parked = siblings.pop();
+        siblings.into_iter().chain(others).map(Some).for_each(drop_contained);
+    }
+}
+
+/// What a lost device holds may not be given back without a panic.
+fn drop_contained(running: Option<Running>) {
+    let _ = guarded(|| {
+        drop(running);
+        Ok(())
+    });
 }

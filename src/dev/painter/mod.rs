@@ -3,7 +3,9 @@
 mod commands;
 mod comparison;
 mod kernels;
+mod shader;
 mod show;
+mod view;
 mod walk;
 mod writing;
 
@@ -27,7 +29,9 @@ use super::look::Choice;
 use super::messages::{Event, Report, State};
 use super::object::Seen;
 use super::picture::{Frame, View};
-use super::source::{Constants, Loaded, Snapshot, Sources, Stamp, constants};
+use super::sliders::Sliders;
+use super::source::{Constants, Loaded, Snapshot, Sources, Stamp};
+use super::times::Times;
 use super::watch::Writes;
 use crate::gpu::Device;
 use crate::gpu::compose::Shaders;
@@ -57,7 +61,7 @@ pub struct Painter {
 
     /// The last scene that was right.
     loaded: Option<Arc<Loaded>>,
-    /// The newest shaders that could be read.
+    /// The newest shaders that could be read, with the values of sliders that are compiled in.
     shaders: Option<Arc<Shaders>>,
     /// The last shaders that made a picture.
     good: Option<Arc<Shaders>>,
@@ -67,6 +71,8 @@ pub struct Painter {
     cut: Option<(Arc<Shaders>, Constants)>,
     device: Option<Device>,
     running: Option<Running>,
+    /// The kernel of light where the running one is for layers; else the one for layers that ran before, if any.
+    parked: Option<Running>,
     pending: Option<Pending>,
     requests: u64,
     failures: u32,
@@ -74,7 +80,8 @@ pub struct Painter {
 
     /// The camera, where it is not the file's.
     camera: Option<CameraDescription>,
-    /// Whether it moved since the picture was begun.
+    sliders: Sliders,
+    /// Whether the camera or a slider moved since the picture was begun.
     camera_waits: bool,
     /// What was written into the scene file, while it can be taken back.
     history: History,
@@ -83,6 +90,7 @@ pub struct Painter {
     /// The files that the scene is made of.
     files: Vec<(PathBuf, Stamp)>,
     view: View,
+    times: Times,
     gain: f32,
     marks: bool,
     look: Choice,
@@ -120,6 +128,8 @@ struct Running {
     halted: bool,
     shaders: Arc<Shaders>,
     constants: Constants,
+    /// The values of its sliders.
+    sliders: Vec<[u32; 4]>,
 }
 
 struct Pending {
@@ -136,6 +146,10 @@ pub struct Told {
     pub state: watch::Sender<Arc<State>>,
     /// Those who are sent the picture.
     pub frames: watch::Sender<Option<Arc<Frame>>>,
+    /// Where the time goes.
+    pub times: Times,
+    /// The form of links that open an editor.
+    pub editor: Option<String>,
     /// Those who ask about the scene.
     pub seen: watch::Sender<Option<Arc<Seen>>>,
     /// The session's own inbox.
@@ -156,6 +170,8 @@ impl Painter {
             report,
             state: state_sender,
             frames: frame_sender,
+            times,
+            editor,
             seen: seen_sender,
             events,
         } = told;
@@ -164,6 +180,7 @@ impl Painter {
             shaders: sources.shaders.as_ref().map(|folder| folder.display().to_string()),
             device: format!("{}, {}", device.info.name, device.info.driver),
             gain: GAIN,
+            editor,
             ..State::default()
         };
         Painter {
@@ -184,16 +201,19 @@ impl Painter {
             cut: None,
             device: Some(device),
             running: None,
+            parked: None,
             pending: None,
             requests: 0,
             failures: 0,
             problems: Problems::default(),
             camera: None,
+            sliders: Sliders::default(),
             camera_waits: false,
             history: History::default(),
             writes,
             files: Vec::new(),
             view: View::default(),
+            times,
             gain: GAIN,
             marks: true,
             look: Choice::default(),
@@ -238,6 +258,11 @@ impl Painter {
     }
 
     fn take_files(&mut self, snapshot: Snapshot, noticed: Instant, writes: u64) {
+        for (part, took) in ["read files", "pack"].into_iter().zip(snapshot.took) {
+            if !took.is_zero() {
+                self.times.part(part, took);
+            }
+        }
         // What was read before this session wrote the file last is no news of the scene.
         let is_new = writes == self.writes.lock().unwrap_or_else(PoisonError::into_inner).count;
         let known = self.loaded.as_ref().map(|loaded| loaded.text.as_bytes());
@@ -254,15 +279,12 @@ impl Painter {
         match snapshot.shaders {
             Ok(shaders) => {
                 self.problems.files = None;
-                if self.shaders.as_ref().is_some_and(|old| *old != shaders) {
+                if self.sliders.differ_from(&shaders) {
                     self.keep_before();
                 }
-                let good = self.good.as_ref();
-                self.refused
-                    .retain(|(known, _)| *known == shaders || Some(known) == good);
-                self.shaders = Some(shaders);
+                self.read_shaders(shaders);
             }
-            Err(problem) => self.problems.files = Some(problem),
+            Err(problem) => self.problems.files = Some(*problem),
         }
         self.show_files(noticed, shown_otherwise);
     }
@@ -299,7 +321,9 @@ impl Painter {
     /// Sees to it that what the files say now is shown.
     fn show_files(&mut self, noticed: Instant, shown_otherwise: bool) {
         self.failures = 0;
+        self.keep_view();
         self.settle((noticed, true));
+        self.upload_sliders((noticed, true));
         // What is rendered may be the same; if it is not, its first picture comes by itself.
         let picture = self.running.as_ref().filter(|running| !running.canvas.is_new());
         if shown_otherwise && self.pending.is_none() && picture.is_some() {
@@ -312,7 +336,7 @@ impl Painter {
     /// it the last good ones.
     fn wanted(&self) -> Option<(Arc<Loaded>, Arc<Shaders>)> {
         let (loaded, newest) = (self.loaded.clone()?, self.shaders.clone()?);
-        let constants = constants(&loaded.packed);
+        let constants = self.constants(&loaded);
         let mut candidates = [Some(newest), self.good.clone()].into_iter().flatten();
         let shaders = candidates.find(|shaders| !self.refused.contains(&(shaders.clone(), constants)))?;
         Some((loaded, shaders))
@@ -324,11 +348,15 @@ impl Painter {
         if self.shaders.as_ref() == Some(&shaders) {
             self.problems.shader.clear();
         }
-        let constants = constants(&loaded.packed);
+        let constants = self.constants(&loaded);
         let fits = |known: &Arc<Shaders>, of| *known == shaders && constants == of;
         let running = self.running.as_ref();
-        if running.is_some_and(|running| fits(&running.shaders, running.constants)) {
+        let fitting = running.is_some_and(|running| fits(&running.shaders, running.constants));
+        if fitting || self.take_parked(&shaders, &constants) {
             self.pending = None;
+            if !fitting {
+                self.show_parked(since);
+            }
             self.draw_scene(since);
         } else if !(self.pending.as_ref()).is_some_and(|pending| fits(&pending.shaders, pending.constants)) {
             self.since.get_or_insert(since);
@@ -337,7 +365,7 @@ impl Painter {
     }
 
     fn request(&mut self, loaded: &Loaded, shaders: Arc<Shaders>) {
-        let constants = constants(&loaded.packed);
+        let constants = self.constants(loaded);
         // A running kernel that fits the scene stays if the new one is wrong; else the last good shaders are compiled.
         let running = self.running.as_ref();
         let stays = running.is_some_and(|running| running.constants == constants);
@@ -348,6 +376,7 @@ impl Painter {
             device: self.device.clone(),
             packed: self.packed(loaded),
             shaders: shaders.clone(),
+            layer: self.layer().cloned(),
             fallback,
         });
         self.pending = Some(Pending {
@@ -361,15 +390,16 @@ impl Painter {
     fn draw_scene(&mut self, since: (Instant, bool)) {
         let Some(loaded) = self.loaded.clone() else { return };
         let packed = self.packed(&loaded);
-        let (Some(running), view) = (&mut self.running, self.view) else {
-            return;
-        };
+        let (view, times) = (self.seen(), self.times.clone());
+        let Some(running) = &mut self.running else { return };
         if running.canvas.shows(&packed) {
-            self.since = None;
+            if !self.camera_waits {
+                self.since = None;
+            }
             return;
         }
         running.halted = false;
-        match guarded(|| running.canvas.update(&packed, view)) {
+        match guarded(|| times.of("upload", || running.canvas.update(&packed, view))) {
             Ok(true) => self.begun(since),
             Ok(false) => {} // it fits, so this cannot be
             Err(error) => self.fail(&error),
@@ -402,7 +432,7 @@ impl Painter {
             .as_ref()
             .filter(|running| !running.halted)
             .is_some_and(|running| {
-                let more = !running.canvas.is_done(self.view);
+                let more = !running.canvas.is_done(self.seen());
                 let first = running.canvas.is_new();
                 // While a kernel is compiled the processor is left to the compiler, but for the camera.
                 self.camera_waits || (more && (first || (self.pending.is_none() && !self.paused)))
@@ -411,19 +441,27 @@ impl Painter {
 
     /// Does one call's worth of work.
     pub fn work(&mut self) {
-        let (view, waits) = (self.view, self.camera_waits);
+        let (view, waits) = (self.seen(), self.camera_waits);
         let Some(loaded) = self.loaded.clone() else { return };
         let camera = self.packed_camera(&loaded);
         let Some(running) = &mut self.running else { return };
         // A camera that never rests must not keep the first picture from being finished.
         if waits && (!running.canvas.is_new() || running.canvas.is_done(view)) {
-            match guarded(|| running.canvas.restart(camera, view)) {
+            let sliders = self.sliders.values(running.canvas.live().sliders());
+            let restarted = guarded(|| {
+                running.canvas.set_sliders(&sliders)?;
+                running.canvas.restart(camera, view)
+            });
+            running.sliders = sliders;
+            match restarted {
                 Ok(()) => self.begun((Instant::now(), false)),
                 Err(error) => self.fail(&error),
             }
             return;
         }
-        match guarded(|| running.canvas.step(view)) {
+        let stepped = guarded(|| self.times.of("render", || running.canvas.step(view)));
+        running.canvas.calls().iter().for_each(|call| self.times.call(call));
+        match stepped {
             Ok(show) => {
                 let due = self.last_frame.elapsed() > BETWEEN_FRAMES.max(10 * self.frame_cost);
                 if show || (due && !running.canvas.is_new()) {

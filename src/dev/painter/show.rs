@@ -21,6 +21,8 @@ pub struct Problems {
     pub scene: Option<Diagnostic>,
     pub files: Option<Diagnostic>,
     pub shader: Vec<Diagnostic>,
+    /// Marks of shaders that cannot be followed.
+    pub marks: Vec<Diagnostic>,
     /// The picture cannot be rendered whole.
     pub cut: Option<Diagnostic>,
     pub device: Option<Diagnostic>,
@@ -30,7 +32,7 @@ pub struct Problems {
 impl Problems {
     fn all(&self) -> impl Iterator<Item = &Diagnostic> {
         let others = [&self.cut, &self.scene, &self.device, &self.out].into_iter().flatten();
-        self.files.iter().chain(&self.shader).chain(others)
+        self.files.iter().chain(&self.shader).chain(&self.marks).chain(others)
     }
 }
 
@@ -38,16 +40,16 @@ impl Painter {
     pub(super) fn is_done(&self) -> bool {
         self.running
             .as_ref()
-            .is_some_and(|running| running.canvas.is_done(self.view))
+            .is_some_and(|running| running.canvas.is_done(self.seen()))
     }
 
     /// Shows the picture as it is now.
     pub(super) fn show(&mut self) {
-        let (view, done) = (self.view, self.is_done());
+        let (view, done) = (self.seen(), self.is_done());
         let Some(running) = &mut self.running else { return };
         let canvas = &mut running.canvas;
         let start = Instant::now();
-        let (content, sent) = match guarded(|| canvas.content(view)) {
+        let (content, sent) = match guarded(|| self.times.of("read back", || canvas.content(view))) {
             Ok(content) => content,
             Err(error) => return self.fail(&error),
         };
@@ -97,7 +99,8 @@ impl Painter {
             view: self.look.over(settings),
             false_color: self.look.false_color,
         };
-        let frame = Arc::new(Frame::new(header, content, names.unwrap_or_default(), look));
+        let make = || Frame::new(header, content, names.unwrap_or_default(), look);
+        let frame = Arc::new(self.times.of("make PNG", make));
         self.frame_sender.send_replace(Some(frame.clone()));
         self.measure(&frame);
         self.last_frame = Instant::now();
@@ -204,6 +207,11 @@ impl Painter {
         self.state.problems = problems;
         self.state.compiling = self.pending.is_some();
         (self.state.view, self.state.gain, self.state.marks) = (self.view, self.gain, self.marks);
+        let integrator = self.loaded.as_ref().map(|loaded| loaded.packed.integrator);
+        self.state.sliders = self.sliders.told(self.sources.shaders.as_deref(), integrator);
+        self.state.sliders_undo = self.sliders.can_take_back();
+        self.state.layers = self.layers();
+        self.state.missing_views = self.missing_views();
         if **self.state_sender.borrow() != self.state {
             self.state_sender.send_replace(Arc::new(self.state.clone()));
         }

@@ -1,0 +1,153 @@
+//! Sliders and layers of shaders: what the page asks for, and what the kernels have.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::{Painter, Running};
+use crate::dev::build::guarded;
+use crate::dev::diagnostic::Diagnostic;
+use crate::dev::messages::Report;
+use crate::dev::picture::{LayerName, View};
+use crate::dev::source::Constants;
+use crate::gpu::compose::Shaders;
+use crate::gpu::marks::{Layer, Value};
+
+impl Painter {
+    /// Takes the shaders as the files have them now.
+    pub(super) fn read_shaders(&mut self, shaders: Arc<Shaders>) {
+        self.sliders.read(shaders.clone());
+        let folder = self.sources.shaders.as_deref();
+        let mistakes = self.sliders.marks().mistakes.iter();
+        self.problems.marks = mistakes
+            .map(|error| Diagnostic::shader(error, &shaders, folder))
+            .collect();
+        self.take_shaders();
+    }
+
+    /// The shaders to be compiled are those of the files, with the values of sliders that need it.
+    /// Returns whether they are others than before.
+    pub(super) fn take_shaders(&mut self) -> bool {
+        let Some(shaders) = self.sliders.shaders() else {
+            return false;
+        };
+        if self.shaders.as_ref().is_some_and(|known| Arc::ptr_eq(known, &shaders)) {
+            return false;
+        }
+        let good = self.good.as_ref();
+        self.refused
+            .retain(|(known, _)| *known == shaders || Some(known) == good);
+        self.shaders = Some(shaders);
+        true
+    }
+
+    pub(super) fn slide(&mut self, file: &str, name: &str, value: Value) {
+        match self.sliders.slide(file, name, value) {
+            Ok(true) => self.slid(),
+            Ok(false) => {}
+            Err(error) => self.notice(&Err(error), String::new()),
+        }
+    }
+
+    pub(super) fn reset_sliders(&mut self, one: Option<(&str, &str)>) {
+        if self.sliders.reset(one) {
+            self.slid();
+        }
+    }
+
+    /// Sliders stand elsewhere: the running kernel gets their values, or another one is compiled.
+    fn slid(&mut self) {
+        if self.take_shaders() {
+            self.settle((Instant::now(), false));
+        }
+        self.upload_sliders((Instant::now(), false));
+    }
+
+    /// Sees to it that the running kernel has the values of its sliders, with the next picture.
+    pub(super) fn upload_sliders(&mut self, since: (Instant, bool)) {
+        let Some(running) = &mut self.running else { return };
+        if self.sliders.values(running.canvas.live().sliders()) != running.sliders {
+            running.halted = false;
+            self.camera_waits = true;
+            self.since.get_or_insert(since);
+        }
+    }
+
+    /// Writes the values into the shaders' files.
+    pub(super) fn write_sliders(&mut self) {
+        let result = match &self.sources.shaders {
+            None => Err("the shaders in the program cannot be changed: --shaders must name a folder".to_string()),
+            Some(_) if !self.sliders.are_moved() => Err("every slider stands where its file says".to_string()),
+            Some(folder) => self.sliders.write(folder),
+        };
+        self.tell_written(result, "sliders written into the shaders");
+    }
+
+    /// Takes back what was written into them last.
+    pub(super) fn take_back_sliders(&mut self) {
+        if self.sliders.can_take_back() {
+            let result = self.sliders.take_back();
+            self.tell_written(result, "shaders as they were before the sliders were written");
+        }
+    }
+
+    fn tell_written(&mut self, result: Result<usize, String>, what: &'static str) {
+        let files = |count: &usize| format!("{what}: {count} {}", if *count == 1 { "file" } else { "files" });
+        let told = result.as_ref().map(files).unwrap_or_default();
+        let result = result.map(drop);
+        self.notice(&result, told);
+        (self.report)(Report::Written(what, result));
+    }
+
+    /// The layer that is asked for, if the shaders have it.
+    pub(super) fn layer(&self) -> Option<&Layer> {
+        let (View::Layer(name), Some(loaded)) = (self.view, &self.loaded) else {
+            return None;
+        };
+        self.sliders
+            .layers(loaded.packed.integrator)
+            .find(|layer| layer.name == name.as_str())
+    }
+
+    /// The names of the layers that can be shown.
+    pub(super) fn layers(&self) -> Vec<LayerName> {
+        let Some(loaded) = &self.loaded else { return Vec::new() };
+        let layers = self.sliders.layers(loaded.packed.integrator);
+        let mut names: Vec<LayerName> = layers.filter_map(|layer| LayerName::new(&layer.name)).collect();
+        names.dedup();
+        names
+    }
+
+    /// Goes back to the kernel that ran before, if that is what is wanted: a layer's, or that of light.
+    pub(super) fn take_parked(&mut self, shaders: &Arc<Shaders>, constants: &Constants) -> bool {
+        let fits = |parked: &Running| parked.shaders == *shaders && parked.constants == *constants;
+        let found = self.parked.as_ref().is_some_and(fits);
+        if found {
+            std::mem::swap(&mut self.running, &mut self.parked);
+        }
+        found
+    }
+
+    /// The kernel that runs is shown from now on, with what it has.
+    pub(super) fn show_parked(&mut self, since: (Instant, bool)) {
+        let (view, limits) = (self.seen(), self.limits);
+        let packed = self.loaded.as_ref().map(|loaded| self.packed(loaded));
+        let Some(running) = &mut self.running else { return };
+        running.halted = false;
+        let shown = guarded(|| {
+            running.canvas.set_limits(limits, view)?;
+            running.canvas.change_view(view)
+        });
+        // Of another scene, or seen from elsewhere, it is begun again at once.
+        let is_current = packed.is_some_and(|packed| running.canvas.shows(&packed));
+        match shown {
+            Ok(()) => {
+                self.changed(since);
+                self.upload_sliders(since);
+                if is_current {
+                    self.show_what_is_there();
+                }
+            }
+            Err(error) => self.fail(&error),
+        }
+    }
+}

@@ -1,0 +1,405 @@
+//! Marked constants of shaders as sliders: what the files say, and what the page says in place of it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf, absolute};
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use super::save::replace;
+use crate::gpu::compose::{KERNELS, Shaders};
+use crate::gpu::marks::{Kind, Layer, Marks, Slider, Value, edited};
+use crate::gpu::{with_edits, without_values};
+use crate::scene::Integrator;
+
+/// A slider as the page shows it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SliderState {
+    /// Its file in the folder of shaders.
+    pub file: String,
+    /// The whole path of that, for an editor; none for the shaders in the program.
+    pub path: Option<String>,
+    /// The constant's name.
+    pub name: String,
+    /// Its line, counted from 1.
+    pub line: usize,
+    /// What it is.
+    pub kind: Kind,
+    /// The least value of a number.
+    pub min: f64,
+    /// The largest.
+    pub max: f64,
+    /// How far apart the values are, if the mark says so.
+    pub step: Option<f64>,
+    /// What is rendered.
+    pub value: Value,
+    /// What the file says.
+    pub file_value: Value,
+    /// Whether another value takes the compiler.
+    pub recompiles: bool,
+    /// Whether the scene's kernels have it.
+    pub used: bool,
+}
+
+/// A file, and a constant in it.
+type Key = (String, String);
+
+/// The sliders of a session.
+#[derive(Default)]
+pub struct Sliders {
+    /// The shaders as the files have them.
+    files: Option<Arc<Shaders>>,
+    marks: Marks,
+    /// The values that stand in for those of the files.
+    moved: BTreeMap<Key, Value>,
+    /// What is compiled, which says nothing of the values that kernels read from a buffer.
+    given: Option<Arc<Shaders>>,
+    /// The constants that the running kernel reads from a buffer, once there is one.
+    live: Option<BTreeSet<Key>>,
+    /// The files as they were written last.
+    written: Vec<Written>,
+}
+
+/// A file that sliders were written into.
+struct Written {
+    path: PathBuf,
+    before: String,
+    after: String,
+}
+
+impl Written {
+    fn put(&self, text: &str) -> Result<(), String> {
+        let told = |error| format!("{}: cannot be written: {error}", self.path.display());
+        replace(&self.path, text.as_bytes()).map_err(told)
+    }
+}
+
+fn key(slider: &Slider) -> Key {
+    (slider.file.clone(), slider.name.clone())
+}
+
+impl Sliders {
+    /// Takes the shaders as they are in the files now. A number that was changed there is what counts.
+    pub fn read(&mut self, shaders: Arc<Shaders>) {
+        let new = Marks::of(&shaders);
+        let old: BTreeMap<Key, Value> = self
+            .marks
+            .sliders
+            .iter()
+            .map(|slider| (key(slider), slider.value))
+            .collect();
+        let kept = |known: &Key, value: &mut Value| {
+            let slider = new.sliders.iter().find(|slider| key(slider) == *known);
+            slider.is_some_and(|slider| old.get(known) == Some(&slider.value) && slider.rounded(*value) == Some(*value))
+        };
+        self.moved.retain(kept);
+        self.marks = new;
+        self.files = Some(shaders);
+    }
+
+    /// Whether shaders are others than those of the files that were read last.
+    pub fn differ_from(&self, shaders: &Arc<Shaders>) -> bool {
+        self.files.as_ref().is_some_and(|known| known != shaders)
+    }
+
+    /// What is marked.
+    pub fn marks(&self) -> &Marks {
+        &self.marks
+    }
+
+    /// Takes what the running kernel reads from a buffer.
+    pub fn runs(&mut self, live: &[Slider]) {
+        self.live = Some(live.iter().map(key).collect());
+    }
+
+    fn is_live(&self, slider: &Slider) -> bool {
+        self.live.as_ref().is_some_and(|live| live.contains(&key(slider)))
+    }
+
+    /// The shaders to be compiled: the same as before if nothing but what is read from a buffer has changed. The pointer is
+    /// then the same too, which later stages compare.
+    pub fn shaders(&mut self) -> Option<Arc<Shaders>> {
+        let files = self.files.as_ref()?;
+        let moved = |slider: &Slider| self.moved.get(&key(slider)).filter(|_| !self.is_live(slider));
+        let wanted = match self.moved.is_empty() {
+            true => files.clone(),
+            false => Arc::new(with_edits(files, &|slider, text| {
+                moved(slider).map_or(Vec::new(), |value| slider.edits(text, *value))
+            })),
+        };
+        let common = |shaders: &Shaders| without_values(shaders, &|slider| self.is_live(slider));
+        let same = |given: &Arc<Shaders>| *given == wanted || common(given) == common(&wanted);
+        if !self.given.as_ref().is_some_and(same) {
+            self.given = Some(wanted);
+        }
+        self.given.clone()
+    }
+
+    /// Gives a slider another value. Returns whether there is such a slider, and whether it has changed; an error says why
+    /// it cannot have the value.
+    pub fn slide(&mut self, file: &str, name: &str, value: Value) -> Result<bool, String> {
+        let slider = self
+            .marks
+            .sliders
+            .iter()
+            .find(|slider| (slider.file.as_str(), slider.name.as_str()) == (file, name));
+        let slider = slider.ok_or_else(|| format!("{file}: no constant `{name}` is marked as a slider"))?;
+        let rounded = slider.rounded(value);
+        let value = rounded.ok_or_else(|| format!("{file}: `{name}` cannot have a value of this kind"))?;
+        let before = self.value(slider);
+        match value == slider.value {
+            true => self.moved.remove(&key(slider)),
+            false => self.moved.insert(key(slider), value),
+        };
+        Ok(before != value)
+    }
+
+    /// Gives all the values of the files, or one of them. Returns whether any has changed.
+    pub fn reset(&mut self, one: Option<(&str, &str)>) -> bool {
+        let before = self.moved.len();
+        self.moved
+            .retain(|(file, name), _| one.is_some_and(|one| (file.as_str(), name.as_str()) != one));
+        self.moved.len() != before
+    }
+
+    fn value(&self, slider: &Slider) -> Value {
+        self.moved.get(&key(slider)).copied().unwrap_or(slider.value)
+    }
+
+    /// The values of constants that a kernel reads from a buffer, in its order.
+    pub fn values(&self, live: &[Slider]) -> Vec<[u32; 4]> {
+        let value = |slider: &Slider| {
+            let known = self.marks.sliders.iter().find(|known| key(known) == key(slider));
+            slider.bits(known.map_or(slider.value, |known| self.value(known)))
+        };
+        live.iter().map(value).collect()
+    }
+
+    /// Writes the values into the files of a folder: of each the number alone. Returns how many files were written.
+    ///
+    /// # Errors
+    ///
+    /// What to tell the user. Files before the one that fails have been written.
+    pub fn write(&mut self, folder: &Path) -> Result<usize, String> {
+        let files: BTreeSet<&String> = self.moved.keys().map(|(file, _)| file).collect();
+        let mut new = Vec::new();
+        for file in files {
+            let path = folder.join(file);
+            let failed = |error| format!("{}: {error}", path.display());
+            // A link stays one: what it leads to is replaced.
+            let target = fs::canonicalize(&path).map_err(failed)?;
+            let before = fs::read_to_string(&target).map_err(failed)?;
+            let there = Marks::of_file(file, &before).sliders;
+            let mut edits = Vec::new();
+            for ((_, name), value) in self.moved.iter().filter(|((known, _), _)| known == file) {
+                let slider = there.iter().find(|slider| slider.name == *name);
+                let slider = slider.ok_or_else(|| format!("{}: `{name}` is no slider any more", path.display()))?;
+                edits.extend(slider.edits(&before, *value));
+            }
+            let after = edited(&before, edits);
+            new.push(Written {
+                path: target,
+                before,
+                after,
+            });
+        }
+        self.written.clear();
+        for file in new {
+            file.put(&file.after)?;
+            self.written.push(file);
+        }
+        Ok(self.written.len())
+    }
+
+    /// Gives the files the texts that they had before the last [`Sliders::write`]. Returns how many there were.
+    ///
+    /// # Errors
+    ///
+    /// What to tell the user: a file has been changed since, or cannot be read or written.
+    pub fn take_back(&mut self) -> Result<usize, String> {
+        let written = std::mem::take(&mut self.written);
+        for file in &written {
+            let place = file.path.display();
+            let now = fs::read(&file.path).map_err(|error| format!("{place}: {error}"))?;
+            if now != file.after.as_bytes() {
+                return Err(format!(
+                    "{place}: has been changed since the sliders were written, and stays as it is"
+                ));
+            }
+        }
+        for file in &written {
+            file.put(&file.before)?;
+        }
+        Ok(written.len())
+    }
+
+    /// Whether anything was written that can be taken back.
+    pub fn can_take_back(&self) -> bool {
+        !self.written.is_empty()
+    }
+
+    /// What the page is told.
+    pub fn told(&self, folder: Option<&Path>, integrator: Option<Integrator>) -> Vec<SliderState> {
+        let short = |slider: &Slider, value: Value| match value {
+            Value::Number(x) => Value::Number(slider.short(x)),
+            Value::Color(c) => Value::Color(c.map(|x| slider.short(x))),
+            Value::Bool(_) => value,
+        };
+        let folder = folder.and_then(|folder| absolute(folder).ok());
+        let told = |slider: &Slider| SliderState {
+            file: slider.file.clone(),
+            path: folder
+                .as_ref()
+                .map(|folder| folder.join(&slider.file).display().to_string()),
+            name: slider.name.clone(),
+            line: slider.line,
+            kind: slider.kind,
+            min: slider.short(slider.min),
+            max: slider.short(slider.max),
+            step: slider.step.map(|step| slider.short(step)),
+            value: short(slider, self.value(slider)),
+            file_value: short(slider, slider.value),
+            recompiles: self.live.is_some() && !self.is_live(slider),
+            used: integrator.is_none_or(|integrator| KERNELS.iter().any(|kernel| kernel.has(&slider.file, integrator))),
+        };
+        self.marks.sliders.iter().map(told).collect()
+    }
+
+    /// Whether any slider stands elsewhere than the file says.
+    pub fn are_moved(&self) -> bool {
+        !self.moved.is_empty()
+    }
+
+    /// The layers that an integrator's kernels can show.
+    pub fn layers(&self, integrator: Integrator) -> impl Iterator<Item = &Layer> {
+        let shown = move |layer: &&Layer| {
+            KERNELS
+                .iter()
+                .any(|kernel| kernel.integrates && kernel.has(&layer.file, integrator))
+        };
+        self.marks.layers.iter().filter(shown)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shaders(more: &str) -> Arc<Shaders> {
+        let new = |file: &str, text: &str| (file == "phong.wgsl").then(|| format!("{text}{more}\n"));
+        Arc::new(Shaders::built_in().changed(new))
+    }
+
+    const TEXT: &str = "const a: f32 = 0.5; // slider 0..1\nconst n: u32 = 3u; // slider 1..9";
+
+    /// The sliders of a text, of which a kernel reads `a` from a buffer.
+    fn sliders(text: &str) -> Sliders {
+        let mut sliders = Sliders::default();
+        sliders.read(shaders(text));
+        let live: Vec<Slider> = sliders
+            .marks
+            .sliders
+            .iter()
+            .filter(|slider| slider.name == "a")
+            .cloned()
+            .collect();
+        sliders.shaders();
+        sliders.runs(&live);
+        sliders
+    }
+
+    #[test]
+    fn what_is_read_from_a_buffer_takes_no_other_shaders() {
+        let mut sliders = sliders(TEXT);
+        let first = sliders.shaders().unwrap();
+        assert_eq!(sliders.slide("phong.wgsl", "a", Value::Number(0.25)), Ok(true));
+        assert_eq!(sliders.slide("phong.wgsl", "a", Value::Number(0.25)), Ok(false));
+        assert!(Arc::ptr_eq(&first, &sliders.shaders().unwrap()));
+        let live = sliders.marks.sliders[..1].to_vec();
+        assert_eq!(sliders.values(&live), [[0.25f32.to_bits(), 0, 0, 0]]);
+        sliders.read(shaders(&TEXT.replace("0.5", "0.75")));
+        assert!(
+            Arc::ptr_eq(&first, &sliders.shaders().unwrap()),
+            "nor does another number in the file"
+        );
+        assert_eq!(
+            sliders.values(&live),
+            [[0.75f32.to_bits(), 0, 0, 0]],
+            "which is what counts"
+        );
+        assert!(!sliders.are_moved());
+        sliders.read(shaders(&TEXT.replace("f32 = 0.5", "f32 =  0.5")));
+        assert!(!Arc::ptr_eq(&first, &sliders.shaders().unwrap()), "anything else does");
+    }
+
+    #[test]
+    fn what_is_needed_to_compile_is_in_the_shaders() {
+        let mut sliders = sliders(TEXT);
+        let first = sliders.shaders().unwrap();
+        assert_eq!(sliders.slide("phong.wgsl", "n", Value::Number(5.2)), Ok(true));
+        let second = sliders.shaders().unwrap();
+        assert!(second.text("phong.wgsl").contains("n: u32 = 5u; // slider"));
+        assert!(sliders.reset(Some(("phong.wgsl", "n"))));
+        assert_eq!(sliders.shaders().unwrap(), first);
+        let told = sliders.told(None, Some(Integrator::Phong));
+        let recompile: Vec<_> = told
+            .iter()
+            .map(|slider| (slider.name.as_str(), slider.recompiles, slider.used))
+            .collect();
+        assert_eq!(recompile, [("a", false, true), ("n", true, true)]);
+        // Before a kernel is known a slider may be either.
+        sliders.live = None;
+        sliders.slide("phong.wgsl", "a", Value::Number(0.125)).unwrap();
+        assert!(
+            sliders
+                .shaders()
+                .unwrap()
+                .text("phong.wgsl")
+                .contains("a: f32 = 0.125;")
+        );
+    }
+
+    #[test]
+    fn values_that_a_slider_cannot_have_are_refused() {
+        let mut sliders = sliders(TEXT);
+        assert!(
+            sliders
+                .slide("phong.wgsl", "b", Value::Number(0.5))
+                .unwrap_err()
+                .contains("`b`")
+        );
+        assert!(
+            sliders
+                .slide("phong.wgsl", "a", Value::Bool(true))
+                .unwrap_err()
+                .contains("`a` cannot")
+        );
+        assert!(sliders.slide("light.wgsl", "a", Value::Number(0.5)).is_err());
+        assert!(!sliders.are_moved());
+    }
+
+    #[test]
+    fn values_are_written_into_the_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("phong.wgsl");
+        let mut sliders = sliders(TEXT);
+        let text = format!("\u{feff}// mine\r\n{}\r\n", TEXT.replace('\n', "\r\n"));
+        fs::write(&file, &text).unwrap();
+        sliders.slide("phong.wgsl", "a", Value::Number(0.1)).unwrap();
+        sliders.slide("phong.wgsl", "n", Value::Number(4.0)).unwrap();
+        assert_eq!(sliders.write(folder.path()), Ok(1));
+        assert_eq!(
+            fs::read_to_string(&file).unwrap(),
+            text.replace("0.5", "0.1").replace("3u", "4u")
+        );
+        assert_eq!(sliders.take_back(), Ok(1));
+        assert_eq!(fs::read_to_string(&file).unwrap(), text);
+        assert!(!sliders.can_take_back());
+        assert_eq!(sliders.write(folder.path()), Ok(1));
+        fs::write(&file, "// nothing").unwrap();
+        assert!(sliders.take_back().unwrap_err().contains("has been changed since"));
+        assert!(sliders.write(folder.path()).unwrap_err().contains("no slider any more"));
+        assert_eq!(fs::read_to_string(&file).unwrap(), "// nothing");
+    }
+}

@@ -1,0 +1,67 @@
+//! How long a device takes for a call, as it tells itself.
+
+use std::time::Duration;
+
+use wgpu::BufferUsages;
+
+use super::device::Device;
+
+/// What a call's times take, in bytes: its start and its end.
+pub const TIMES: u64 = 2 * size_of::<u64>() as u64;
+
+/// Notes the start and the end of each call, where the device has a clock.
+pub struct Timer {
+    clock: Option<Clock>,
+}
+
+struct Clock {
+    queries: wgpu::QuerySet,
+    ticks: wgpu::Buffer,
+    /// Nanoseconds of a tick.
+    period: f64,
+}
+
+impl Timer {
+    /// One for a device; it tells nothing if that has no clock.
+    pub fn new(device: &Device) -> Timer {
+        let has_clock = device.device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+        Timer {
+            clock: has_clock.then(|| Clock {
+                queries: device.device.create_query_set(&wgpu::QuerySetDescriptor {
+                    label: None,
+                    ty: wgpu::QueryType::Timestamp,
+                    count: 2,
+                }),
+                ticks: device.buffer(TIMES, BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC),
+                period: f64::from(device.queue.get_timestamp_period()),
+            }),
+        }
+    }
+
+    /// What a pass notes.
+    pub fn writes(&self) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
+        self.clock.as_ref().map(|clock| wgpu::ComputePassTimestampWrites {
+            query_set: &clock.queries,
+            beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: Some(1),
+        })
+    }
+
+    /// Copies what a pass has noted into a buffer.
+    pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder, to: &wgpu::Buffer, offset: u64) {
+        if let Some(Clock { queries, ticks, .. }) = &self.clock {
+            encoder.resolve_query_set(queries, 0..2, ticks, 0);
+            encoder.copy_buffer_to_buffer(ticks, 0, to, offset, TIMES);
+        }
+    }
+
+    /// The time between two counts of ticks, each in two words.
+    pub fn took(&self, words: &[u32]) -> Option<Duration> {
+        let clock = self.clock.as_ref()?;
+        let [a, b, c, d] = *words else { return None };
+        let ticks = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
+        let between = ticks(c, d).checked_sub(ticks(a, b)).filter(|ticks| *ticks > 0)?;
+        let nanoseconds = between as f64 * clock.period;
+        (nanoseconds < 3.6e12).then(|| Duration::from_nanos(nanoseconds as u64)) // an hour is no call's time
+    }
+}

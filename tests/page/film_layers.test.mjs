@@ -1,0 +1,84 @@
+// Layers of the film on the page: what a scene has is shown as `wgray render --aov` writes it, what it has not is off and says why.
+
+import assert from "node:assert/strict";
+import fs from "node:fs";
+import { after, afterEach, before, beforeEach, test } from "node:test";
+
+import { SCENE, Studio, decoded, launch, open, settled, shown } from "./studio.mjs";
+
+const PATH = SCENE.replace("[render]", "[render]\nintegrator = \"path\"\nbackground = [0.1, 0.2, 0.4]");
+
+let browser;
+let studio;
+
+before(async () => (browser = await launch()));
+after(() => browser.close());
+beforeEach(() => (studio = new Studio()));
+afterEach(async () => {
+  await Promise.all(browser.contexts().map((context) => context.close()));
+  await studio.remove();
+});
+
+async function choose(page, view) {
+  await page.selectOption("#layers", view);
+  await page.waitForFunction((view) => document.getElementById("panels").dataset.view === view, view);
+  await settled(page);
+}
+
+test("layers of the film are views, with the pictures and the files of a render", async () => {
+  studio.write("scene.toml", PATH);
+  await studio.start();
+  const page = await open(browser, studio);
+  const light = await shown(page);
+  const compiled = () => page.locator("#compile").innerText();
+  const first = await compiled();
+  const names = ["direct", "indirect", "emission", "albedo"];
+  studio.renderTo(studio.path("rendered.png"), ["--aov", names.join()]);
+  const seen = new Set([String(light)]);
+  for (const name of names) {
+    await choose(page, name);
+    const picture = await shown(page);
+    assert.deepEqual(picture, await decoded(page, [...fs.readFileSync(studio.path(`rendered.${name}.png`))]), name);
+    seen.add(String(picture));
+    const saved = await page.evaluate(async () => [...new Uint8Array(await (await fetch("/picture.exr")).arrayBuffer())]);
+    const header = Buffer.from(saved.slice(0, 1000)).toString("latin1");
+    assert.match(header, new RegExp(`\\0chlist\\0....${name}\\.B\\0`, "s"), "its first channel");
+  }
+  assert.equal(seen.size, 5, "all differ");
+  assert.equal(await page.locator("#samples").innerText(), "4 of 4");
+  await page.locator("[data-part=picture] canvas").hover();
+  await page.locator("#values", { hasText: /albedo [\d.]+ +[\d.]+ +[\d.]+.*bits.*shown/ }).waitFor();
+  const one = await compiled();
+  assert.notEqual(one, first, "they take a kernel");
+  await page.keyboard.press("1");
+  await page.waitForFunction(() => document.getElementById("panels").dataset.view === "color");
+  await settled(page);
+  assert.deepEqual(await shown(page), light);
+  assert.equal(await compiled(), one, "that of light is still there");
+  assert.deepEqual(page.faults, []);
+});
+
+test("what a scene does not have is off and says why, until it has it", async () => {
+  await studio.start();
+  const page = await open(browser, studio);
+  const group = page.locator("#layers optgroup:has([value=direct])");
+  const [direct, variance] = ["direct", "variance"].map((name) => page.locator(`#layers [value=${name}]`));
+  assert.ok(await direct.isDisabled());
+  assert.equal(await direct.getAttribute("title"), "needs integrator = \"path\"");
+  assert.equal(await group.getAttribute("label"), "Light: needs integrator = \"path\"");
+  assert.ok(await page.locator("#layers [value=shading_normal]").isEnabled());
+  studio.write("scene.toml", PATH.replace(
+    "pixel_samples = { pattern = \"grid\", count = 4 }",
+    "pixel_samples = { pattern = \"jittered\", count = 4 }\nadaptive = { error = 0.05, max_samples = 68 }",
+  ));
+  await page.waitForFunction(() => !document.querySelector("#layers [value=direct]").disabled);
+  assert.ok(await variance.isEnabled());
+  assert.equal(await group.getAttribute("label"), "Light");
+  // The variance has the scale of its false colours beside it.
+  await choose(page, "variance");
+  await page.locator("#legend", { hasText: "2^-12" }).waitFor();
+  await page.locator("[data-part=picture] canvas").hover();
+  await page.locator("#values", { hasText: /variance .*standard error/ }).waitFor();
+  assert.equal(await page.locator("#layers").evaluate((select) => select.classList.contains("chosen")), true);
+  assert.deepEqual(page.faults, []);
+});
