@@ -65,7 +65,7 @@ export function connect() {
 // Whether the program answers: if it lets nobody in, its places are taken.
 async function isServed() {
   try {
-    return (await fetch("/", { method: "HEAD", signal: AbortSignal.timeout(ANSWER) })).ok;
+    return (await fetch("/", { signal: AbortSignal.timeout(ANSWER) })).ok;
   } catch {
     return false;
   }
