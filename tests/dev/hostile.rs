@@ -163,7 +163,6 @@ fn what_is_no_value_is_refused_and_the_file_stays() {
         (set("shapes[4294967296].radius", &json!(1)), nothing),
         (set("render.seed = 7\n[camera]\nfov", &json!(1)), path),
         (set("render.seed # ", &json!(1)), path),
-        (set("\u{feff}render.seed", &json!(1)), "must"),
         (set("render.\"seed = 7\\n\"", &json!(1)), nothing),
         (set("\"render]\\nseed = 7\\n[x\".seed", &json!(1)), nothing),
         (set("materials.\"red]\\n[camera\".shininess", &json!(1)), nothing),
