@@ -137,19 +137,22 @@ struct Shared {
 }
 
 /// The page's modules.
-const MODULES: [(&str, &str); 13] = [
+const MODULES: [(&str, &str); 16] = [
     ("/camera.js", include_str!("page/camera.js")),
+    ("/color.js", include_str!("page/color.js")),
     ("/compare.js", include_str!("page/compare.js")),
     ("/object.js", include_str!("page/object.js")),
     ("/editor.js", include_str!("page/editor.js")),
     ("/link.js", include_str!("page/link.js")),
     ("/numbers.js", include_str!("page/numbers.js")),
     ("/page.js", include_str!("page/page.js")),
+    ("/parts.js", include_str!("page/parts.js")),
     ("/picture.js", include_str!("page/picture.js")),
     ("/probes.js", include_str!("page/probes.js")),
     ("/render.js", include_str!("page/render.js")),
     ("/shader.js", include_str!("page/shader.js")),
     ("/times.js", include_str!("page/times.js")),
+    ("/touch.js", include_str!("page/touch.js")),
     ("/view.js", include_str!("page/view.js")),
 ];
 

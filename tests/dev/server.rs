@@ -63,6 +63,9 @@ fn the_server_answers_its_own_pages_only() {
         "/link.js",
         "/object.js",
         "/numbers.js",
+        "/color.js",
+        "/parts.js",
+        "/touch.js",
     ] {
         let (status, text) = ask(address, &get(path, &own, ""));
         assert_eq!(status, "HTTP/1.1 200 OK", "{path}");

@@ -167,8 +167,15 @@ export function launch(more = []) {
   });
 }
 
-// A page in a browser, and what went wrong in it.
+// A page in a browser that shows a finished picture, and what went wrong in it.
 export async function open(browser, studio, options = {}) {
+  const page = await visit(browser, studio, options);
+  await finished(page);
+  return page;
+}
+
+// A page in a browser, whatever it shows.
+export async function visit(browser, studio, options = {}) {
   const context = await browser.newContext({ viewport: { width: 1200, height: 800 }, ...options });
   const page = await context.newPage();
   page.setDefaultTimeout(LONGEST);
@@ -184,7 +191,6 @@ export async function open(browser, studio, options = {}) {
   });
   if (process.env.WGRAY_PAGE) await page.route(/\.(js|css)$/, fromDisk);
   await page.goto(studio.url);
-  await finished(page);
   return page;
 }
 

@@ -80,6 +80,7 @@ test("steps of the camera are taken back and made again", async () => {
   assert.equal(await moved(page, start), first);
   await page.click("#forth");
   assert.equal(await moved(page, first), second);
+  await canvas(page).focus();
   await page.keyboard.press("r");
   assert.equal(await moved(page, second), start);
   await page.click("#back");
@@ -184,7 +185,8 @@ test("exposure, transform and false colours change what is shown, not what it is
     seen.push(String(await shown(page)));
   };
   assert.ok(await page.locator("#as-scene").isDisabled());
-  await look(() => page.fill("#exposure-number", "1.5"));
+  await page.fill("#exposure-number", "1.5");
+  await look(() => page.keyboard.press("Enter"));
   // It is what a render by this exposure is.
   studio.edit("scene.toml", "height = 90", "height = 90\nexposure = 1.5");
   assert.equal(seen[1], String(await decoded(page, studio.render())));

@@ -4,9 +4,10 @@
 export function editorLink(form, { file, line, column }) {
   if (!form || !file) return null;
   const path = encodeURI(file.replaceAll("\\", "/")).replace(/[?#&=+;]/g, encodeURIComponent);
+  // Given by functions: in a text `$&` would mean something.
   return form
-    .replace("/{file}", path.startsWith("/") ? path : `/${path}`) // the path has its own slash
-    .replaceAll("{file}", path)
+    .replace("/{file}", () => (path.startsWith("/") ? path : `/${path}`)) // the path has its own slash
+    .replaceAll("{file}", () => path)
     .replaceAll("{line}", line ?? 1)
     .replaceAll("{column}", column ?? 1);
 }

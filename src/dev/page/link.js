@@ -1,6 +1,7 @@
 // The connection to the program: what it tells goes to whoever listens, what is asked gets its answer.
 
 const RETRY = 500; // milliseconds
+const ANSWER = 2000; // milliseconds in which a program that is there answers
 const listeners = { state: [], frame: [], link: [], refused: [] };
 const named = new Map(); // who listens to other messages, by their names
 let socket = null;
@@ -14,7 +15,7 @@ export const element = (id) => document.getElementById(id);
 
 export const onState = (f) => listeners.state.push(f); // f(state, heard)
 export const onFrame = (f) => listeners.frame.push(f); // f(header, images by name)
-export const onLink = (f) => listeners.link.push(f); // f(whether it is there)
+export const onLink = (f) => listeners.link.push(f); // f(whether it is there, whether there is no place)
 export const onRefused = (f) => listeners.refused.push(f); // f(text)
 export const onMessage = (name, f) => named.set(name, [...(named.get(name) ?? []), f]); // f(value)
 
@@ -47,17 +48,27 @@ export const lastState = () => state;
 export function connect() {
   socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`);
   socket.binaryType = "arraybuffer";
+  let isIn = false;
   socket.onopen = () => {
-    asked = 0;
-    tell("link", true);
+    [asked, isIn] = [0, true];
+    tell("link", true, false);
   };
   socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : showFrame(data));
-  socket.onclose = () => {
+  socket.onclose = async () => {
     for (const resolve of [...answers, ...pixels]) resolve(null);
     [answers, pixels] = [[], []];
-    tell("link", false);
+    tell("link", false, !isIn && (await isServed()));
     setTimeout(connect, RETRY);
   };
+}
+
+// Whether the program answers: if it lets nobody in, its places are taken.
+async function isServed() {
+  try {
+    return (await fetch("/", { signal: AbortSignal.timeout(ANSWER) })).ok;
+  } catch {
+    return false;
+  }
 }
 
 function hear(message) {

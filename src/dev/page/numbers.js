@@ -1,10 +1,12 @@
-// Boxes of numbers that are dragged sideways or stepped by keys, beside being typed into.
+// Boxes of numbers that are typed into, dragged sideways or stepped by keys.
 
 const SLACK = 3; // pixels before a press is a drag
 const PIXELS = 10; // of a drag that are one step
 const FINE = 0.1; // of a step, with Shift
 const KEYS = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
 const HINT = "Drag sideways, or press the arrow keys: with Shift a tenth, by Page Up and Page Down ten steps";
+
+let typing = null; // the box with a number that is half typed: there is never more than one
 
 export const digits = (x, count) => Number(x.toPrecision(count));
 export const say = (x) => (x === undefined || x === null ? "" : String(x));
@@ -18,7 +20,8 @@ export function fit({ kind, range, gap }, x, from) {
 }
 
 // How far a step of a number goes that stands with others in a list: they are of about one size.
-function stepOf({ kind, unit, range }, list) {
+function stepOf({ kind, unit, range, step }, list) {
+  if (step) return step;
   if (kind === "whole") return 1;
   const most = Math.max(0, ...list.map((x) => Math.abs(x ?? 0)));
   if (most > 0) return 10 ** (Math.floor(Math.log10(most)) - 1);
@@ -26,14 +29,46 @@ function stepOf({ kind, unit, range }, list) {
   return range && range[1] - range[0] <= 2 ? 0.01 : 0.1;
 }
 
+// Makes a box one for a number of a field. `numbers()` are the list that it stands in, `use(x)` takes its new number: when it is
+// left or Enter is pressed, unless it is empty or none. Returns what shows a number in it, unless one is half typed.
+export function numberField(box, field, numbers, use) {
+  let last;
+  const take = (x) => {
+    last = x;
+    use(x);
+  };
+  box.classList.add("number");
+  box.addEventListener("input", () => (typing = box));
+  box.addEventListener("change", () => {
+    if (typing !== box) return;
+    typing = null;
+    if (box.value !== "") take(box.valueAsNumber);
+  });
+  box.addEventListener("blur", () => {
+    forget(box);
+    if (box.value === "") box.value = say(last);
+  });
+  steppable(box, field, numbers, take);
+  return (x) => {
+    last = x;
+    if (typing !== box && box.value !== say(x)) box.value = say(x);
+  };
+}
+
+// What is half typed in a part of the page is not sent.
+export function forget(part) {
+  if (typing && part.contains(typing)) typing = null;
+}
+
 // Lets a box be dragged and stepped. `numbers()` are the list that it stands in, `use(x)` takes its new number.
-export function steppable(box, field, numbers, use) {
+function steppable(box, field, numbers, use) {
   let press = null; // what a press of the pointer began with
   let step = 0; // of a key that is held down: it stays while the number changes its size
   const now = () => (Number.isFinite(box.valueAsNumber) ? box.valueAsNumber : 0);
   const show = (x, from) => {
     const next = fit(field, x, from);
     if (box.value !== "" && next === now()) return;
+    forget(box);
     box.value = say(next);
     use(next);
   };
@@ -51,14 +86,15 @@ export function steppable(box, field, numbers, use) {
     if (event.button !== 0 || box.disabled || document.activeElement === box) return;
     const size = stepOf(field, [...numbers(), now()]) / PIXELS;
     box.setPointerCapture(event.pointerId); // a quick hand leaves the box at once
-    press = { id: event.pointerId, left: event.clientX, at: event.clientX, from: now(), moved: 0, size, dragged: false };
+    press = { id: event.pointerId, left: event.clientX, top: event.clientY, at: event.clientX, from: now(), moved: 0, size, dragged: false };
   });
   // What may be a drag selects no text; a finger's press ends before this comes.
   box.addEventListener("mousedown", (event) => press && event.preventDefault());
   box.addEventListener("pointermove", (event) => {
     if (press?.id !== event.pointerId) return;
     if (!press.dragged) {
-      if (Math.abs(event.clientX - press.left) < SLACK) return;
+      const [x, y] = [Math.abs(event.clientX - press.left), Math.abs(event.clientY - press.top)];
+      if (x < SLACK || (event.pointerType !== "mouse" && x < y)) return; // a finger may be about to scroll
       press.dragged = true;
       window.addEventListener("keydown", giveUp, true);
     }
@@ -70,13 +106,16 @@ export function steppable(box, field, numbers, use) {
     window.removeEventListener("keydown", giveUp, true);
     press = null;
   };
+  const takeBack = () => {
+    const { from, dragged } = press;
+    end();
+    if (dragged) show(from, from);
+  };
   const giveUp = (event) => {
     if (event.key !== "Escape" || !press) return;
     event.preventDefault();
     event.stopPropagation();
-    const { from } = press;
-    end();
-    show(from, from);
+    takeBack();
   };
   box.addEventListener("pointerup", () => {
     const isClick = press && !press.dragged;
@@ -85,5 +124,5 @@ export function steppable(box, field, numbers, use) {
     box.focus();
     box.select();
   });
-  box.addEventListener("pointercancel", end);
+  box.addEventListener("pointercancel", () => press && takeBack()); // the finger scrolls
 }

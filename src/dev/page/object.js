@@ -1,7 +1,9 @@
 // The object that was clicked: its lines in the scene file, and its values as controls that write into it.
 
+import { colorOf, hexOf } from "/color.js";
 import { ask, element, lastState, onLink, onMessage, onState, put } from "/link.js";
-import { digits, fit, say, steppable } from "/numbers.js";
+import { digits, fit, numberField, say } from "/numbers.js";
+import { keep, make, place } from "/parts.js";
 
 const STEPS = 1000; // of a slider that goes by factors
 const MOVING = /^(Arrow|Page|Home$|End$)/; // keys that move a control
@@ -9,20 +11,13 @@ const LISTED = 250; // milliseconds without a key before names are asked for
 
 let asked = null; // the pixel, or the name and the material, that was asked for
 let scenes = null; // which scene it was asked of
-let signature = ""; // of the controls that are there
-let controls = new Map(); // by their paths
+let groups = new Map(); // the tables that are shown, by their names
 let gesture = Math.floor(Math.random() * 2 ** 40); // changes of one gesture are one step of undo
 let held = null; // the path whose control is being moved
 let [pointer, key] = [false, false]; // whether it is by the pointer, and by a key that is down
-let stale = false; // whether controls must be shown anew once it is let go
+let stale = false; // whether all must be shown anew once it is let go
 let sending = null; // the change that waits for the program
 let waiting = null; // the newest one after it
-
-const make = (tag, values = {}, ...children) => {
-  const made = Object.assign(document.createElement(tag), values);
-  made.append(...children);
-  return made;
-};
 
 // Selects what is at a pixel of the picture.
 export function select(pixel) {
@@ -45,6 +40,7 @@ function again() {
 }
 
 export function setUpObject() {
+  element("object-groups").tabIndex = -1; // the focus of what goes falls here
   const find = element("object-find");
   let timer = 0;
   const list = () => put({ objects: find.value });
@@ -70,6 +66,13 @@ export function setUpObject() {
     event.preventDefault();
     ask(event.shiftKey ? "redo_write" : "undo_write");
   });
+  // However a press ends, and wherever: as a click, as a scroll, in another window.
+  for (const end of ["pointerup", "pointercancel", "blur"]) {
+    window.addEventListener(end, () => setTimeout(() => {
+      if (pointer) letGo();
+      pointer = false;
+    }));
+  }
   onLink(() => {
     scenes = null;
     [sending, waiting] = [null, null];
@@ -123,56 +126,48 @@ function letGo() {
 // What is being changed shows what the user wants, and not what the file says yet.
 const isBusy = (path) => path === held || path === sending?.set.path || path === waiting?.path;
 
-// What of an object says which controls it has.
-const form = ({ name, note, gone, groups }) => JSON.stringify([name, note, gone, groups.map((group) => [
-  group.name, group.kind, group.fields.map(({ path, kind, length, choices, fixed, value, required }) => [
-    path, kind, length, choices, fixed, value === undefined, required,
-  ]),
-])]);
-
 function showObject(object) {
   // Another may have been asked for since.
   if (asked?.at ? String(object.at) !== String(asked.at) : object.at || object.name !== asked?.name) return;
   if (object.name) asked = { name: object.name, material: object.material };
-  const next = form(object);
-  if (next === signature) {
-    object.groups.forEach((group, i) => {
-      showLines(element("object-groups").children[i].querySelector("pre"), group, object.file);
-      for (const field of group.fields) {
-        if (field.path === held) stale = true;
-        if (!isBusy(field.path)) controls.get(field.path)?.(field);
-      }
-    });
-    return;
-  }
-  if (held) {
-    stale = true;
-    return;
-  }
-  signature = next;
+  if (element("object-name").textContent !== object.name) held = null;
   element("object-name").textContent = object.name;
   element("object-note").textContent = object.gone || object.note || "";
-  controls = new Map();
-  const focused = document.activeElement?.dataset?.control;
-  const closed = new Set([...element("object-groups").children].filter(({ open }) => !open).map(({ dataset }) => dataset.name));
-  element("object-groups").replaceChildren(...object.groups.map((group) => groupOf(group, object.file, closed)));
-  if (focused) document.querySelector(`[data-control="${CSS.escape(focused)}"]`)?.focus();
+  stale = held !== null; // no control goes or comes while one is moved
+  groups = keep(groups, object.groups, ({ name }) => name, groupOf);
+  for (const group of object.groups) groups.get(group.name).show(group, object.file);
+  if (!stale) place(element("object-groups"), [element("object-groups"), [...groups.values()].map(({ item }) => item)]);
 }
 
-function groupOf(group, file, closed) {
+// A table: its lines, the values that are there, and those that are not.
+function groupOf({ name }) {
   const pre = make("pre", { tabIndex: 0 });
-  showLines(pre, group, file);
-  const summary = make("summary", {}, make("b", { textContent: group.name }), group.kind && group.kind !== group.name ? ` ${group.kind}` : "");
-  const details = make("details", { className: "group", open: !closed.has(group.name) }, summary, pre);
-  details.dataset.name = group.name;
-  const [there, absent] = [group.fields.filter(({ value }) => value !== undefined), group.fields.filter(({ value }) => value === undefined)];
-  details.append(...there.map(fieldOf));
-  if (absent.length) {
-    const more = make("details", { className: "absent" }, make("summary", { textContent: `${absent.length} not in the file` }), ...absent.map(fieldOf));
-    details.append(more);
-  }
-  return details;
+  const kind = new Text();
+  const [there, absent] = [make("div"), make("details", { className: "absent" })];
+  const count = make("summary");
+  const summary = make("summary", {}, make("b", { textContent: name }), kind);
+  const item = make("details", { className: "group", open: true }, summary, pre, there, absent);
+  item.dataset.name = name;
+  let rows = new Map();
+  const show = (group, file) => {
+    kind.data = group.kind && group.kind !== name ? ` ${group.kind}` : "";
+    showLines(pre, group, file);
+    rows = keep(rows, group.fields, keyOf, fieldOf);
+    for (const field of group.fields) rows.get(keyOf(field)).show(field);
+    if (held !== null) return;
+    const itemsOf = (isAbsent) => group.fields.filter(({ value }) => (value === undefined) === isAbsent).map((field) => rows.get(keyOf(field)).item);
+    const missing = itemsOf(true);
+    absent.hidden = !missing.length;
+    count.textContent = `${missing.length} not in the file`;
+    if (missing.some((row) => row.contains(document.activeElement))) absent.open = true; // it goes there, and stays in sight
+    place(element("object-groups"), [there, itemsOf(false)], [absent, [count, ...missing]]);
+  };
+  return { item, show };
 }
+
+// What makes it another control.
+const keyOf = ({ path, kind, length, unit, range, gap, fixed, slider, about }) =>
+  JSON.stringify([path, kind, length, unit, range, gap, fixed, Boolean(slider), about]);
 
 function showLines(pre, { line, text, more }, file) {
   pre.hidden = !line;
@@ -191,42 +186,35 @@ function fieldOf(field) {
   error.setAttribute("role", "alert");
   const title = make("span", { className: "name", textContent: field.name, title: field.about });
   const unit = make("small", { textContent: field.unit && field.unit !== "linear" ? field.unit : "" });
-  const head = make("div", { className: "head" }, title, unit);
-  const box = make("div", { className: "field", role: "group" }, head);
-  box.dataset.path = field.path;
-  box.setAttribute("aria-label", field.unit ? `${field.name}, ${field.unit}` : field.name);
+  const origin = make("small"); // of what is not in the file
+  const out = make("button", { type: "button", textContent: "default", title: `Takes ${field.name} out of the file` });
+  const head = make("div", { className: "head" }, title, unit, origin, out);
+  const item = make("div", { className: "field", role: "group" }, head);
+  item.dataset.path = field.path;
+  item.setAttribute("aria-label", field.unit ? `${field.name}, ${field.unit}` : field.name);
   const note = (text) => {
     error.textContent = text;
     error.hidden = !text;
-    box.classList.toggle("invalid", Boolean(text));
+    item.classList.toggle("invalid", Boolean(text));
   };
-  let current = field;
-  const change = (value) => write(current, value, note);
-  const made = { number: numberOf, whole: numberOf, color: colorOf, vector: vectorOf, choice: choiceOf, switch: switchOf, text: textOf }[field.kind](field, change);
+  const change = (value) => write(field, value, note);
+  const made = { number: numberOf, whole: numberOf, color: colorsOf, vector: vectorOf, choice: choiceOf, switch: switchOf, text: textOf }[field.kind](field, change);
   if (field.fixed) {
     head.append(make("small", { className: "fixed", textContent: field.fixed }));
     for (const input of made.inputs) input.disabled = true;
-  } else if (field.value === undefined) {
-    head.append(make("small", { textContent: field.default === undefined ? "absent" : "default" }));
-  } else if (!field.required) {
-    const out = make("button", { type: "button", textContent: "default", title: `Takes ${field.name} out of the file` });
-    out.addEventListener("click", () => {
-      change(null);
-      letGo();
-    });
-    head.append(out);
   }
+  out.addEventListener("click", () => {
+    if (out.matches(":focus-visible")) made.inputs[0].focus(); // the button goes
+    change(null);
+    letGo();
+  });
   made.inputs.forEach((input, i) => {
     input.dataset.control = `${field.path} ${i}`;
-    input.addEventListener("pointerdown", () => {
-      held = field.path;
-      pointer = true;
-    });
-    for (const end of ["pointerup", "pointercancel"]) {
-      input.addEventListener(end, () => setTimeout(() => {
-        pointer = false;
-        if (held === field.path) letGo();
-      }));
+    if (input.matches("[type=range], [type=number]")) {
+      input.addEventListener("pointerdown", () => {
+        held = field.path;
+        pointer = true;
+      });
     }
     // A key that is held down is one gesture, like a drag.
     input.addEventListener("keydown", (event) => {
@@ -244,12 +232,19 @@ function fieldOf(field) {
       if (held === field.path) letGo();
     });
   });
-  box.append(...made.elements, error);
-  controls.set(field.path, (next) => {
-    current = next;
+  item.append(...made.elements, error);
+  let isNew = true;
+  const show = (next) => {
+    const isAbsent = next.value === undefined;
+    origin.textContent = !isAbsent || next.fixed ? "" : next.default === undefined ? "absent" : "default";
+    origin.hidden = !origin.textContent;
+    out.hidden = isAbsent || next.required || Boolean(next.fixed);
+    if (isBusy(next.path) && !isNew) return;
+    isNew = false;
+    note(""); // it was about another value
     made.update(next);
-  });
-  return box;
+  };
+  return { item, show };
 }
 
 const valueOf = (field) => field.value ?? field.default;
@@ -262,40 +257,36 @@ function numberBox(field, label) {
   return box;
 }
 
-// A box takes a number when it is left or stepped, unless it is empty or none.
-const onNumber = (box, use) => box.addEventListener("change", () => box.value !== "" && Number.isFinite(box.valueAsNumber) && use(box.valueAsNumber));
-
 // A box, and a slider beside it if there is one, for a number of a field.
 function pairOf(field, label, slider, change) {
   const box = numberBox(field, label);
   let now;
   const range = slider ? make("input", { type: "range" }) : null;
-  const place = (x) => (slider.logarithmic ? (STEPS * Math.log(x / slider.from)) / Math.log(slider.to / slider.from) : x);
+  const placeOf = (x) => (slider.logarithmic ? (STEPS * Math.log(x / slider.from)) / Math.log(slider.to / slider.from) : x);
   const number = (at) => (slider.logarithmic ? digits(slider.from * (slider.to / slider.from) ** (at / STEPS), 3) : at);
   const take = (x) => {
     now = x;
     if (!range) return;
-    range.value = say(x === undefined ? range.min : place(x));
+    range.value = say(x === undefined ? range.min : placeOf(x));
     range.setAttribute("aria-valuetext", say(x));
   };
   const use = (x) => {
     take(x);
     change(x);
   };
-  onNumber(box, use);
-  steppable(box, field, () => [now], use);
+  const show = numberField(box, field, () => [now], use);
   if (range) {
     range.setAttribute("aria-label", `${label}, slider`);
     range.addEventListener("input", () => {
       held = field.path;
       now = fit(field, number(range.valueAsNumber), now ?? 0);
-      box.value = say(now);
+      show(now);
       range.setAttribute("aria-valuetext", say(now));
       change(now);
     });
   }
   const update = (x, next) => {
-    if (document.activeElement !== box) box.value = say(x);
+    show(x);
     slider = next ?? slider;
     if (range) {
       const [low, high, step] = slider.logarithmic ? [0, STEPS, 1] : [slider.from, slider.to, slider.step];
@@ -310,21 +301,10 @@ function pairOf(field, label, slider, change) {
 function numberOf(field, change) {
   const pair = pairOf(field, field.name, field.slider, change);
   const update = (next) => pair.update(valueOf(next), next.slider);
-  update(field);
   return { inputs: pair.inputs, elements: [pair.element], update };
 }
 
-const encode = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
-const decode = (x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4);
-
-// What a display shows of linear light that is divided by its largest component, where that is above 1.
-function hexOf(color) {
-  const most = Math.max(1, ...color);
-  const byte = (x) => Math.round(255 * encode(Math.min(1, Math.max(0, x / most)))).toString(16).padStart(2, "0");
-  return `#${color.map(byte).join("")}`;
-}
-
-function colorOf(field, change) {
+function colorsOf(field, change) {
   const picker = make("input", { type: "color", title: "As a display shows it (sRGB)" });
   picker.setAttribute("aria-label", `${field.name}, as a display shows it (sRGB)`);
   let now = [0, 0, 0];
@@ -337,8 +317,7 @@ function colorOf(field, change) {
   picker.addEventListener("input", () => {
     held = field.path;
     if (picker.value === hexOf(now)) return;
-    const most = Math.max(1, ...now);
-    take([1, 3, 5].map((at) => digits(decode(parseInt(picker.value.slice(at, at + 2), 16) / 255) * most, 4)));
+    take(colorOf(picker.value, now));
     parts.show(now);
     change(now);
   });
@@ -363,7 +342,6 @@ function colorOf(field, change) {
     strength?.update(most, next.slider);
     legend.textContent = most > 1 ? `sRGB of the colour over ${digits(most, 4)}; linear red, green, blue` : "sRGB; linear red, green, blue";
   };
-  update(field);
   const elements = [make("div", { className: "color" }, picker, ...parts.inputs), legend];
   if (strength) elements.push(make("small", { className: "strength", textContent: "strength, the largest of them" }), strength.element);
   return { inputs: [picker, ...parts.inputs, ...(strength?.inputs ?? [])], elements, update };
@@ -373,20 +351,17 @@ function colorOf(field, change) {
 function numbersOf(field, labels, change) {
   let now = [];
   const boxes = labels.map((label) => numberBox(field, label));
-  boxes.forEach((box, i) => {
+  const shows = boxes.map((box, i) => {
     const use = (x) => {
       now = boxes.map((other, j) => now[j] ?? (Number.isFinite(other.valueAsNumber) ? other.valueAsNumber : 0));
       now[i] = x;
       change([...now]);
     };
-    onNumber(box, use);
-    steppable(box, field, () => now, use);
+    return numberField(box, field, () => now, use);
   });
   const show = (list) => {
     now = [...list];
-    boxes.forEach((box, i) => {
-      if (document.activeElement !== box) box.value = say(list[i]);
-    });
+    shows.forEach((show, i) => show(list[i]));
   };
   return { inputs: boxes, show, update: (next) => show(valueOf(next) ?? []) };
 }
@@ -395,17 +370,20 @@ function vectorOf(field, change) {
   const names = field.length <= 4 ? ["x", "y", "z", "w"] : [];
   const labels = Array.from({ length: field.length }, (_, i) => `${field.name}, ${names[i] ?? i + 1}`);
   const parts = numbersOf(field, labels, change);
-  parts.update(field);
   return { inputs: parts.inputs, elements: [make("div", { className: "vector" }, ...parts.inputs)], update: parts.update };
 }
 
 function choiceOf(field, change) {
-  const box = make("select", {}, ...field.choices.map((value) => make("option", { value, textContent: value })));
+  const box = make("select");
   box.setAttribute("aria-label", field.name);
-  if (valueOf(field) === undefined) box.prepend(make("option", { value: "", textContent: "–" }));
   box.addEventListener("change", () => box.value && change(box.value));
-  const update = (next) => (box.value = valueOf(next) ?? "");
-  update(field);
+  let shown = "";
+  const update = (next) => {
+    const choices = valueOf(next) === undefined ? ["", ...next.choices] : next.choices;
+    if (JSON.stringify(choices) !== shown) box.replaceChildren(...choices.map((value) => make("option", { value, textContent: value || "–" })));
+    shown = JSON.stringify(choices);
+    box.value = valueOf(next) ?? "";
+  };
   return { inputs: [box], elements: [box], update };
 }
 
@@ -413,7 +391,6 @@ function switchOf(field, change) {
   const box = make("input", { type: "checkbox" });
   box.addEventListener("change", () => change(box.checked));
   const update = (next) => (box.checked = valueOf(next) ?? false);
-  update(field);
   return { inputs: [box], elements: [make("label", { className: "check" }, box, field.name)], update };
 }
 
@@ -421,6 +398,5 @@ function textOf(field) {
   const box = make("input", { type: "text", readOnly: true });
   box.setAttribute("aria-label", field.name);
   const update = (next) => (box.value = say(valueOf(next)));
-  update(field);
   return { inputs: [box], elements: [box], update };
 }

@@ -10,29 +10,34 @@ import { setUpProbes } from "/probes.js";
 import { setUpRender } from "/render.js";
 import { setUpShader } from "/shader.js";
 import { setUpTimes } from "/times.js";
+import { setUpTouch } from "/touch.js";
 import { setUpView, viewName } from "/view.js";
 
 let isLinked = null; // not known yet
+let isFull = false; // whether nobody more may look
 let noticesSeen = null;
 let numberShown = 0; // the number of the frame on the screen
-const actions = new Map(); // what a key does
+// What a key does everywhere, and what it does while the picture has the focus.
+const [everywhere, atPicture] = [new Map(), new Map()];
 
 // Names a key's action: `key` as KeyboardEvent has it.
-const onKey = (key, act) => actions.set(key, act);
+const onKey = (key, act) => everywhere.set(key, act);
+const onPictureKey = (key, act) => atPicture.set(key, act);
 
 const picture = new Picture([...document.querySelectorAll("#panels figure")]);
 setUpView(picture, onKey);
-setUpCamera(picture, onKey, showNotice);
+setUpCamera(picture, onPictureKey, showNotice);
 setUpCompare(picture, onKey, showNotice);
-setUpProbes(picture, onKey);
+setUpProbes(picture, onPictureKey);
 setUpRender(onKey);
 setUpShader();
 setUpTimes();
 setUpObject();
+setUpTouch();
 picture.clicked = select;
 
-onLink((there) => {
-  isLinked = there;
+onLink((there, full) => {
+  [isLinked, isFull] = [there, full];
   if (there) [noticesSeen, numberShown] = [null, 0];
   showBadge();
 });
@@ -81,6 +86,7 @@ onState((state) => {
 function showBadge() {
   const state = lastState();
   const says = isLinked === null ? ["connecting", "waits"]
+    : isFull ? ["as many look as may at once; waiting for a place", "lost"]
     : !isLinked ? ["connection lost, trying again", "lost"]
     : state?.compiling ? ["compiling", "waits"]
     : !picture.header ? ["waiting for the first picture", "waits"]
@@ -148,12 +154,19 @@ function seconds(s) {
   return s < 1 ? `${Math.round(s * 1000)} ms` : `${s.toFixed(2)} s`;
 }
 
+// Whether a control has a use of its own for a key. Where values are typed a key that goes astray must not act on all viewers.
+function isTaken(control, key) {
+  if (control.closest("#object-groups, #sliders")) return true;
+  if (control.matches("select, textarea, input:not([type=radio], [type=checkbox], [type=range])")) return true;
+  if (control.matches("input[type=range]")) return /^(Arrow|Page|Home$|End$)/.test(key);
+  return key === " " && control.matches("button, summary, input, a, label");
+}
+
 document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
-  if (event.target.matches("select, textarea, input:not([type=radio], [type=checkbox], [type=range])")) return;
-  if (event.target.matches("input[type=range]") && /^(Arrow|Page|Home$|End$)/.test(event.key)) return; // they move the slider
-  if (event.key === " " && event.target.matches("button, summary, input, a, label")) return;
-  const act = actions.get(event.key) ?? actions.get(event.shiftKey ? `Shift+${event.key.toLowerCase()}` : event.key.toLowerCase());
+  if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented || isTaken(event.target, event.key)) return;
+  const names = [event.key, event.shiftKey ? `Shift+${event.key.toLowerCase()}` : event.key.toLowerCase()];
+  const maps = event.target.closest("#panels figure") ? [atPicture, everywhere] : [everywhere];
+  const act = maps.flatMap((map) => names.map((name) => map.get(name))).find(Boolean);
   if (act && act(event) !== false) event.preventDefault();
 });
 

@@ -1,26 +1,27 @@
 // Sliders of constants that shaders mark.
 
+import { colorOf, hexOf } from "/color.js";
 import { editorLink } from "/editor.js";
 import { ask, element, onState } from "/link.js";
+import { numberField } from "/numbers.js";
+import { keep, make, place } from "/parts.js";
 
-const rows = new Map(); // what shows each slider, by file and name
+let rows = new Map(); // what shows each slider, by file, name and kind
+let made = 0; // rows, ever
 let [underWay, waiting] = [false, new Map()]; // the values that are not asked for yet, by file and name
 
 const keyOf = ({ file, name }) => JSON.stringify([file, name]);
-const make = (tag, properties = {}) => Object.assign(document.createElement(tag), properties);
+const rowKey = (slider) => JSON.stringify([keyOf(slider), slider.kind]);
 
 export function setUpShader() {
   element("write-sliders").addEventListener("click", () => ask("write_sliders"));
   element("undo-sliders").addEventListener("click", () => ask("undo_sliders"));
   element("reset-sliders").addEventListener("click", () => ask("reset_sliders"));
+  element("sliders").tabIndex = -1; // the focus of what goes falls here
   onState((state, heard) => {
-    const keys = state.sliders.map((slider) => JSON.stringify([keyOf(slider), slider.kind]));
-    if (String(keys) !== String([...rows.values()].map((row) => row.key))) {
-      rows.clear();
-      state.sliders.forEach((slider, i) => rows.set(keyOf(slider), { key: keys[i], ...rowOf(slider) }));
-      element("sliders").replaceChildren(...[...rows.values()].map((row) => row.item));
-    }
-    for (const slider of state.sliders) rows.get(keyOf(slider)).show(slider, state, heard && !underWay);
+    rows = keep(rows, state.sliders, rowKey, rowOf);
+    for (const slider of state.sliders) rows.get(rowKey(slider)).show(slider, state, heard && !underWay);
+    place(element("sliders"), [element("sliders"), [...rows.values()].map(({ item }) => item)]);
     const moved = state.sliders.some(isMoved);
     element("write-sliders").disabled = !moved || !state.shaders;
     element("reset-sliders").disabled = !moved;
@@ -49,96 +50,86 @@ async function next() {
 
 // A slider's row, and what shows its values in it.
 function rowOf(slider) {
-  const item = make("li");
-  const id = `slider-${rows.size}`;
+  const id = `slider-${made++}`;
   const name = make("label", { textContent: slider.name, htmlFor: id });
-  const place = make("a");
+  const link = make("a");
   const note = make("small");
   const reset = make("button", { type: "button", textContent: "Reset" });
   reset.setAttribute("aria-label", `Reset ${slider.name}`);
-  reset.addEventListener("click", () => ask({ reset_slider: [slider.file, slider.name] }));
-  const fields = make("span", { className: "pair" });
-  const head = make("span", { className: "head" });
-  head.append(name, place, note, reset);
-  const make_fields = { bool: switchOf, color: colorOf }[slider.kind] ?? numberOf;
-  const showValue = make_fields(slider, id, fields);
-  item.append(head, fields);
+  const head = make("span", { className: "head" }, name, link, note, reset);
+  const { inputs, update } = ({ bool: switchOf, color: colorsOf }[slider.kind] ?? numberOf)(slider);
+  inputs[0].id = id;
+  reset.addEventListener("click", () => {
+    if (reset.matches(":focus-visible")) inputs[0].focus(); // the button goes
+    ask({ reset_slider: [slider.file, slider.name] });
+  });
+  const item = make("li", {}, head, make("span", { className: "pair" }, ...inputs));
+  let isNew = true;
   const show = (now, { editor }, heard) => {
-    place.textContent = `${now.file}:${now.line}`;
-    const link = editorLink(editor, { file: now.path, line: now.line });
-    if (link) place.href = link;
-    else place.removeAttribute("href");
+    link.textContent = `${now.file}:${now.line}`;
+    const href = editorLink(editor, { file: now.path, line: now.line });
+    if (href) link.href = href;
+    else link.removeAttribute("href");
     note.textContent = [now.recompiles && "compiles anew", !now.used && "not used by this scene"].filter(Boolean).join(", ");
     reset.hidden = !isMoved(now);
-    if (heard) showValue(now);
+    if (heard || isNew) update(now);
+    isNew = false;
   };
   return { item, show };
 }
 
-function switchOf(slider, id, fields) {
-  const box = make("input", { type: "checkbox", id });
+function switchOf(slider) {
+  const box = make("input", { type: "checkbox" });
   box.addEventListener("change", () => slide(slider, box.checked));
-  fields.append(box);
-  return ({ value }) => (box.checked = value);
+  return { inputs: [box], update: ({ value }) => (box.checked = value) };
 }
 
-// A field for a number, which is told once it is typed.
-function fieldOf(label, told) {
-  const field = make("input", { type: "number", step: "any" });
-  field.setAttribute("aria-label", label);
-  let typing = false;
-  field.addEventListener("input", () => (typing = true));
-  field.addEventListener("blur", () => (typing = false));
-  field.addEventListener("change", () => {
-    typing = false;
-    if (field.value !== "") told(Number(field.value));
-  });
-  return [field, (value) => {
-    if (!typing && field.value !== String(value)) field.value = value;
-  }];
+function numberBox(label) {
+  const box = make("input", { type: "number", step: "any" });
+  box.setAttribute("aria-label", label);
+  return box;
 }
 
-function numberOf(slider, id, fields) {
-  const { min, max, step, kind } = slider;
-  const fine = kind === "f32" ? 10 ** Math.floor(Math.log10((max - min) / 500)) : 1;
-  const range = make("input", { type: "range", id, min, max, step: step ?? fine, value: slider.value });
-  range.addEventListener("input", () => {
-    showNumber(Number(range.value));
-    slide(slider, Number(range.value));
-  });
-  const [field, showNumber] = fieldOf(`${slider.name}, as a number`, (value) => slide(slider, value));
-  fields.append(range, field);
-  return (now) => {
-    Object.assign(range, { min: now.min, max: now.max });
-    if (Number(range.value) !== now.value) range.value = now.value;
-    showNumber(now.value);
-  };
-}
-
-// Colours are linear; what a browser chooses one by is not.
-const shown = (x) => Math.round(255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * Math.min(x, 1) ** (1 / 2.4) - 0.055));
-const linear = (byte) => {
-  const x = byte / 255;
-  return Number((x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4).toPrecision(4));
-};
-
-function colorOf(slider, id, fields) {
+function numberOf(slider) {
+  const field = { kind: slider.kind === "f32" ? "number" : "whole" }; // its range and step may change
   let last = slider.value;
-  const input = make("input", { type: "color", id });
-  input.addEventListener("input", () => {
-    last = [1, 3, 5].map((at) => linear(parseInt(input.value.slice(at, at + 2), 16)));
-    slide(slider, last);
-  });
-  const parts = ["red", "green", "blue"].map((name, i) =>
-    fieldOf(`${slider.name}, ${name}`, (value) => {
-      last = last.map((old, at) => (at === i ? value : old));
-      slide(slider, last);
-    }));
-  fields.append(input, ...parts.map(([field]) => field));
-  return ({ value }) => {
+  const range = make("input", { type: "range" });
+  const box = numberBox(`${slider.name}, as a number`);
+  const use = (value) => {
     last = value;
-    const hex = `#${value.map((x) => shown(x).toString(16).padStart(2, "0")).join("")}`;
-    if (input.value !== hex) input.value = hex;
-    parts.forEach(([, show], i) => show(value[i]));
+    slide(slider, value);
   };
+  range.addEventListener("input", () => {
+    show(range.valueAsNumber);
+    use(range.valueAsNumber);
+  });
+  const show = numberField(box, field, () => [last], use);
+  const update = ({ min, max, step, value }) => {
+    Object.assign(field, { range: [min, max], step });
+    last = value;
+    const fine = field.kind === "whole" ? 1 : 10 ** Math.floor(Math.log10((max - min) / 500));
+    Object.assign(range, { min, max, step: step ?? fine, value });
+    show(value);
+  };
+  return { inputs: [range, box], update };
+}
+
+const LIGHT = { kind: "number", range: [0, 3.4e38] };
+
+function colorsOf(slider) {
+  let last = slider.value;
+  const use = (color) => {
+    last = color;
+    slide(slider, color);
+  };
+  const picker = make("input", { type: "color" });
+  picker.addEventListener("input", () => use(colorOf(picker.value, last)));
+  const boxes = ["red", "green", "blue"].map((name) => numberBox(`${slider.name}, ${name}`));
+  const shows = boxes.map((box, i) => numberField(box, LIGHT, () => last, (value) => use(last.with(i, value))));
+  const update = ({ value }) => {
+    last = value;
+    if (picker.value !== hexOf(value)) picker.value = hexOf(value);
+    shows.forEach((show, i) => show(value[i]));
+  };
+  return { inputs: [picker, ...boxes], update };
 }

@@ -1,9 +1,13 @@
 // What is shown of the scene, and how: the toolbar's views, exposure, view transform, false colours, the histogram.
 
 import { ask, element, onFrame, onState } from "/link.js";
+import { numberField } from "/numbers.js";
 
 const VIEWS = ["color", "normal", "depth", "uv", "primitive", "samples", "compare"];
 const radios = () => [...document.querySelectorAll("input[name=view]")];
+const STOPS = { kind: "number", range: [-100, 100] };
+let stops = 0; // of exposure
+let showStops = null; // in their box
 let choice = { exposure: null, transform: null, false_color: false };
 
 // The name of a view as the program tells it: "normal", or {"compare": "cpu"}.
@@ -28,12 +32,12 @@ export function setUpView(picture, onKey) {
     element("zoom").textContent = fits ? `fit, ${percent}` : percent;
   };
 
-  for (const id of ["exposure", "exposure-number"]) {
-    element(id).addEventListener("input", ({ target }) => {
-      const stops = target.valueAsNumber;
-      if (Number.isFinite(stops)) look({ exposure: Math.max(-100, Math.min(100, stops)) });
-    });
-  }
+  const expose = (exposure) => look({ exposure: Math.max(-100, Math.min(100, exposure)) });
+  showStops = numberField(element("exposure-number"), STOPS, () => [stops], expose);
+  element("exposure").addEventListener("input", ({ target }) => {
+    showStops(target.valueAsNumber);
+    expose(target.valueAsNumber);
+  });
   element("transform").addEventListener("change", ({ target }) => look({ transform: target.value }));
   element("false-color").addEventListener("change", ({ target }) => look({ false_color: target.checked }));
   element("as-scene").addEventListener("click", () => look({ exposure: null, transform: null, false_color: false }));
@@ -74,10 +78,9 @@ function showState(state, heard) {
 
   choice = state.look;
   const [exposure, transform] = state.scene_look;
-  const stops = choice.exposure ?? exposure;
-  for (const id of ["exposure", "exposure-number"]) {
-    if (document.activeElement !== element(id) || element(id).valueAsNumber !== stops) element(id).value = stops;
-  }
+  stops = choice.exposure ?? exposure;
+  element("exposure").value = stops;
+  showStops(stops);
   element("transform").value = choice.transform ?? transform;
   element("false-color").checked = choice.false_color;
   element("as-scene").disabled = choice.exposure === null && choice.transform === null && !choice.false_color;
@@ -157,7 +160,7 @@ function drawHistogram(header = lastHeader) {
       context.fillRect(x(bin), canvas.height - height, x(bin + 1) - x(bin), height);
     });
   });
-  const white = (-element("exposure-number").valueAsNumber - first) * of_a_stop;
+  const white = (-stops - first) * of_a_stop;
   context.globalCompositeOperation = "source-over";
   context.fillStyle = style.color;
   context.fillRect(Math.round(x(white)), 0, Math.max(1, ratio), canvas.height);

@@ -1,0 +1,311 @@
+// The page's fields under hands: what is half typed, fingers that scroll, keys, the focus.
+
+import assert from "node:assert/strict";
+import { after, afterEach, before, beforeEach, test } from "node:test";
+
+import { LONGEST, SCENE, Studio, decoded, launch, open, settled, visit } from "./studio.mjs";
+
+const KERNEL = "shaders/kernels/render.wgsl";
+const LEVEL = "const level: f32 = 0.5; // slider 0..1\n";
+const PHONE = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
+
+let browser;
+let studio;
+let kernel;
+
+before(async () => (browser = await launch()));
+after(() => browser.close());
+beforeEach(async () => {
+  studio = new Studio();
+  studio.edit(KERNEL, "path_value(path)", "(path_value(path) * level)");
+  kernel = studio.read(KERNEL);
+  mark(LEVEL);
+  await studio.start();
+});
+afterEach(async () => {
+  await Promise.all(browser.contexts().map((context) => context.close()));
+  await studio.remove();
+});
+
+const mark = (lines) => studio.write(KERNEL, kernel + lines);
+const box = (page, path, nth = 0) => page.locator(`[data-control="${path} ${nth}"]`);
+const slider = (page, name) => page.getByRole("slider", { name, exact: true });
+const number = (page, name) => page.getByRole("spinbutton", { name: `${name}, as a number` });
+const isFocused = (locator) => locator.evaluate((node) => node === document.activeElement);
+
+async function says(locator, value) {
+  const node = await locator.elementHandle();
+  await locator.page().waitForFunction(([node, value]) => node.value === value, [node, value]);
+}
+
+async function written(text) {
+  const deadline = Date.now() + LONGEST;
+  while (!studio.read("scene.toml").includes(text)) {
+    assert.ok(Date.now() < deadline, `no ${text} in ${studio.read("scene.toml")}`);
+    await new Promise((resolve) => setTimeout(resolve, 10));
+  }
+}
+
+async function choose(page, name) {
+  await page.fill("#object-find", name);
+  await page.keyboard.press("Enter");
+  await page.locator("#object-name", { hasText: name }).waitFor();
+}
+
+// Notes each change that the page asks for from now on.
+async function listen(page) {
+  await page.evaluate(() => {
+    const send = WebSocket.prototype.send;
+    window.sent = [];
+    WebSocket.prototype.send = function (text) {
+      const asked = JSON.parse(text);
+      if (["set", "look", "slide", "view", "frame", "reset_camera"].some((name) => asked === name || asked[name] !== undefined)) window.sent.push(text);
+      return send.call(this, text);
+    };
+  });
+  return () => page.evaluate(() => window.sent.splice(0));
+}
+
+test("a half-typed number stays while other controls come and go", async () => {
+  const [page, other] = [await open(browser, studio), await open(browser, studio)];
+  await choose(page, "shapes[0]");
+  await choose(other, "shapes[0]");
+  const z = box(page, "shapes[0].center", 2);
+  await z.focus();
+  await page.keyboard.press("Control+a");
+  await page.keyboard.type("0.7");
+  await box(other, "shapes[0].material").selectOption("grey");
+  await box(page, "materials.grey.color").waitFor();
+  assert.equal(await page.locator('[data-name="materials.red"]').count(), 0);
+  assert.equal(await z.inputValue(), "0.7");
+  assert.ok(await isFocused(z));
+  assert.ok(studio.read("scene.toml").includes("center = [0, 0, 0.5]"), "nothing is written yet");
+  await page.keyboard.type("5");
+  await page.keyboard.press("Enter");
+  await written("center = [0, 0, 0.75]");
+  // What goes takes its text with it, and the keys that follow act on nobody.
+  const sent = await listen(page);
+  await box(page, "materials.grey.shininess", 1).focus();
+  await page.keyboard.press("Control+a");
+  await page.keyboard.type("3");
+  await box(other, "shapes[0].material").selectOption("red");
+  await page.locator('[data-name="materials.grey"]').waitFor({ state: "detached" });
+  await page.keyboard.type("5r");
+  assert.deepEqual(await sent(), []);
+  assert.equal(studio.read("scene.toml").match(/shininess = 16/g).length, 2);
+  // A number that goes from those that are not in the file to those that are keeps its focus, and the list stays open.
+  await choose(page, "render");
+  const absent = page.locator('[data-name="render"] .absent');
+  await absent.locator("> summary").click();
+  const there = page.locator('[data-name="render"] > div [data-control="render.seed 1"]');
+  await box(page, "render.seed", 1).focus();
+  await page.keyboard.type("2");
+  await page.keyboard.press("Enter");
+  await there.waitFor();
+  assert.ok(await isFocused(there));
+  assert.ok(await absent.evaluate((node) => node.open));
+  // Taken out by keys it goes back, with the focus.
+  await page.locator('[data-path="render.seed"]').getByRole("button", { name: "default" }).focus();
+  await page.keyboard.press("Enter");
+  await there.waitFor({ state: "detached" });
+  assert.ok(await isFocused(box(page, "render.seed")));
+  assert.deepEqual(page.faults, []);
+});
+
+test("a half-typed number of a shader stays while sliders come and go, and they take their ranges from the file", async () => {
+  const page = await open(browser, studio);
+  const sent = await listen(page);
+  const level = number(page, "level");
+  await level.focus();
+  await page.keyboard.press("Control+a");
+  await page.keyboard.type("0.2");
+  mark(`const early: f32 = 0.5; // slider 0..1\n${LEVEL}const wide: f32 = 5.0; // slider 0..1000\n`);
+  await slider(page, "wide").waitFor();
+  assert.equal(await level.inputValue(), "0.2");
+  await page.keyboard.type("5");
+  assert.deepEqual(await sent(), []);
+  await page.keyboard.press("Enter");
+  await says(slider(page, "level"), "0.25");
+  await settled(page);
+  assert.deepEqual((await sent()).map((text) => JSON.parse(text).slide.value), [0.25]);
+  // It is stepped and dragged like any other number.
+  await page.keyboard.press("ArrowUp");
+  await says(slider(page, "level"), "0.26");
+  await page.keyboard.press("Control+a");
+  await page.keyboard.press("Delete");
+  await slider(page, "level").focus();
+  await says(level, "0.26");
+  const wide = slider(page, "wide");
+  assert.equal(await wide.getAttribute("step"), "1");
+  mark(`const wide: f32 = 0.05; // slider 0..0.1\n${LEVEL}`);
+  await says(wide, "0.05");
+  assert.deepEqual(await wide.evaluate((node) => [node.min, node.max, Number(node.step)]), ["0", "0.1", 0.0001]);
+  mark(`const wide: f32 = 0.05; // slider 0..0.1 step 0.05\n${LEVEL}`);
+  await page.waitForFunction(() => document.querySelector("#sliders input[max='0.1']").step === "0.05");
+  assert.equal(await slider(page, "early").count(), 0);
+  // One that goes while its number is typed drops it.
+  await sent();
+  await number(page, "wide").focus();
+  await page.keyboard.press("Control+a");
+  await page.keyboard.type("0.0");
+  mark(LEVEL);
+  await wide.waitFor({ state: "detached" });
+  await page.keyboard.type("5");
+  assert.deepEqual(await sent(), []);
+  assert.deepEqual(page.faults, []);
+});
+
+test("a finger that scrolls changes nothing, one that drags or taps does", async () => {
+  const page = await open(browser, studio, PHONE);
+  const client = await page.context().newCDPSession(page);
+  await choose(page, "shapes[0]");
+  await page.evaluate(() => document.activeElement.blur());
+  const sent = await listen(page);
+  // A finger comes down on a control, moves, and goes up.
+  const swipe = async (control, dx, dy) => {
+    await control.evaluate((node) => scrollBy(0, node.getBoundingClientRect().top - 680));
+    const area = await control.boundingBox();
+    const [x, y] = [area.x + area.width * 0.15, area.y + area.height / 2];
+    const touch = (type, touchPoints) => client.send("Input.dispatchTouchEvent", { type, touchPoints });
+    const top = await page.evaluate(() => scrollY);
+    await touch("touchStart", [{ x, y }]);
+    for (let i = 1; i <= 12; i++) await touch("touchMove", [{ x: x + (dx * i) / 12, y: y + (dy * i) / 12 }]);
+    await touch("touchEnd", []);
+    await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+    return (await page.evaluate(() => scrollY)) - top;
+  };
+  const sliders = [box(page, "shapes[0].radius"), slider(page, "level"), page.locator("#exposure")];
+  const boxes = [box(page, "shapes[0].radius", 1), number(page, "level"), page.locator("#exposure-number")];
+  for (const control of [...sliders, ...boxes]) {
+    const value = await control.inputValue();
+    assert.ok((await swipe(control, 5, -96)) > 20, "it scrolls");
+    assert.equal(await control.inputValue(), value);
+    assert.deepEqual(await sent(), []);
+    assert.ok(Math.abs(await swipe(control, 60, 3)) < 10, "it does not scroll");
+    assert.ok((await sent()).length > 0);
+    await settled(page);
+    await sent();
+    if (boxes.includes(control)) continue;
+    await swipe(control, 0, 0);
+    assert.equal((await sent()).length, 1);
+    await settled(page);
+  }
+  // Nothing is held by a finger that has gone: boxes follow the file, and another object is shown.
+  const radius = box(page, "shapes[0].radius", 1);
+  await swipe(radius, 5, -96);
+  studio.write("scene.toml", SCENE.replace("radius = 0.5", "radius = 0.35"));
+  await says(radius, "0.35");
+  await swipe(radius, 5, -96);
+  const area = await page.locator("[data-part=picture] canvas").boundingBox();
+  await page.touchscreen.tap(area.x + area.width * 0.9, area.y + area.height * 0.6);
+  await box(page, "shapes[1].point").waitFor({ state: "attached" });
+  assert.deepEqual(page.faults, []);
+});
+
+test("keys belong to what has the focus", async () => {
+  const page = await open(browser, studio);
+  await choose(page, "shapes[0]");
+  const sent = await listen(page);
+  for (const [control, least] of [[page.locator("#exposure"), -10], [slider(page, "level"), 0]]) {
+    await control.focus();
+    await page.keyboard.press("Home");
+    const [asked] = await sent();
+    const { look, slide } = JSON.parse(asked);
+    assert.equal(look?.exposure ?? slide.value, least);
+  }
+  await box(page, "shapes[0].radius").focus();
+  await page.keyboard.press("Home"); // its range then follows it
+  await page.waitForFunction(() => Number(document.querySelector('[data-control="shapes[0].radius 1"]').value) < 0.01);
+  await page.locator("#object-find").focus();
+  for (const key of ["Home", "r", "5", " "]) await page.keyboard.press(key);
+  // Those of the camera are the picture's.
+  for (const control of ["#transform", "#help summary", "#copy", "#exposure-number"]) {
+    await page.locator(control).focus();
+    for (const key of ["Home", "f", "r"]) await page.keyboard.press(key);
+  }
+  await page.locator("#exposure").focus();
+  await page.keyboard.press("r");
+  await settled(page);
+  const kinds = (await sent()).map((text) => (typeof JSON.parse(text) === "string" ? text : Object.keys(JSON.parse(text))[0]));
+  assert.deepEqual(kinds, ["set"]);
+  await page.locator("[data-part=picture] canvas").focus();
+  await page.keyboard.press("Home");
+  await page.locator("#help summary").focus();
+  await page.keyboard.press("2");
+  assert.deepEqual(await sent(), ['{"frame":null}', '{"view":"normal"}']);
+});
+
+test("on a narrow screen, and on one that is zoomed in, the focus is never behind the picture", async () => {
+  for (const options of [PHONE, { viewport: { width: 600, height: 400 } }]) {
+    const page = await open(browser, studio, options);
+    await choose(page, "shapes[0]");
+    const stops = [];
+    const walk = async (key) => {
+      for (let i = 0; i < 60; i++) {
+        await page.keyboard.press(key);
+        const stop = await page.evaluate(() => {
+          const { activeElement: node } = document;
+          const [{ top, bottom }, stage] = [node.getBoundingClientRect(), document.getElementById("stage").getBoundingClientRect()];
+          if (!node.closest("aside")) return null;
+          const name = node.id || node.dataset.control || node.name || node.textContent.slice(0, 20);
+          const isTall = bottom - top > innerHeight - stage.bottom;
+          const isSeen = isTall ? bottom > stage.bottom && top < innerHeight : top > stage.bottom - 1 && bottom < innerHeight + 1;
+          return { name, isSeen, at: [top, bottom, stage.bottom] };
+        });
+        if (stop) stops.push(stop);
+      }
+    };
+    await page.evaluate(() => document.querySelector("#help summary").focus());
+    await walk("Shift+Tab");
+    await page.locator("#pause").focus();
+    await walk("Tab");
+    assert.ok(stops.length > 60, `${stops.length} stops`);
+    assert.deepEqual(stops.filter(({ isSeen }) => !isSeen), []);
+  }
+});
+
+test("an error goes with the value that it was about, and an emptied box shows its value again", async () => {
+  const page = await open(browser, studio);
+  await choose(page, "shapes[0]");
+  const radius = box(page, "shapes[0].radius", 1);
+  await radius.fill("-1");
+  await page.keyboard.press("Enter");
+  const told = page.locator('[data-path="shapes[0].radius"] .bad');
+  await told.filter({ hasText: "must be finite and greater than 0" }).waitFor();
+  studio.edit("scene.toml", "# a small scene", "# another");
+  await says(radius, "0.5");
+  await told.waitFor({ state: "hidden" });
+  for (const control of [radius, page.locator("#exposure-number")]) {
+    const value = await control.inputValue();
+    await control.focus();
+    await page.keyboard.press("Control+a");
+    await page.keyboard.press("Delete");
+    await page.keyboard.press("Tab");
+    assert.equal(await control.inputValue(), value);
+  }
+  const link = (file) => page.evaluate((file) => import("/editor.js").then(({ editorLink }) => editorLink("x://file/{file}:{line}", { file, line: 3 })), file);
+  assert.equal(await link("/a/$$/$'.wgsl"), "x://file/a/$$/$'.wgsl:3");
+});
+
+test("whoever finds no place is told so, and gets one that falls free", async () => {
+  const page = await open(browser, studio);
+  await page.evaluate(async () => {
+    window.others = Array.from({ length: 15 }, () => new WebSocket(`ws://${location.host}/socket`));
+    await Promise.all(window.others.map((socket) => new Promise((resolve) => (socket.onopen = resolve))));
+  });
+  const late = await visit(browser, studio);
+  await late.locator("#badge", { hasText: "as many look as may at once" }).waitFor();
+  await page.evaluate(() => window.others[0].close());
+  await late.locator("#badge.live").waitFor({ state: "attached" });
+});
+
+test("forced colours show how far the picture is", async () => {
+  const page = await open(browser, studio, { forcedColors: "active" });
+  const bar = page.locator("#bar");
+  const colors = async () => {
+    const [, , bytes] = await decoded(page, [...await bar.screenshot()]);
+    return new Set(bytes.match(/\d+,\d+,\d+/g)).size;
+  };
+  await page.evaluate(() => (document.getElementById("bar").value = 0.5));
+  assert.ok((await colors()) >= 3, "an edge, what is done and what is not");
+});
