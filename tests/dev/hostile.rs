@@ -211,7 +211,8 @@ fn what_is_no_value_is_refused_and_the_file_stays() {
     assert!(wrong.is_empty(), "{wrong:#?}");
     assert_eq!(session.state().undo, None);
     // The control: what is right is followed, and nothing of the above has been.
-    viewer.say(set("shapes[0].radius", &json!(0.25)).as_bytes()).unwrap();
+    let mut other = Viewer::new(address);
+    other.say(set("shapes[0].radius", &json!(0.25)).as_bytes()).unwrap();
     session.wait("the value that is right", |_| {
         (files.read("scene.toml") == SCENE.replace("radius = 0.5", "radius = 0.25")).then_some(())
     });

@@ -23,13 +23,14 @@ fn slide(running: &Running, name: &str, value: Value) {
 /// Writes the values into the files, and waits until that is done.
 #[track_caller]
 fn write(running: &Running) {
-    let heard = running.state().heard;
+    let number = |running: &Running| running.state().notice.as_ref().map(|notice| notice.number);
+    let before = number(running);
     running.session.send(Command::WriteSliders);
-    running.wait("the command to be followed", |running| {
-        (running.state().heard > heard).then_some(())
+    let notice = running.wait("what was written", |running| {
+        let notice = running.state().notice.clone();
+        notice.filter(|notice| before != Some(notice.number))
     });
-    let notice = running.state().notice.clone();
-    assert!(notice.as_ref().is_some_and(|notice| !notice.bad), "{notice:?}");
+    assert!(!notice.bad && notice.text.contains("written"), "{notice:?}");
 }
 
 fn slider(running: &Running, name: &str) -> SliderState {
