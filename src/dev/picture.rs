@@ -370,12 +370,12 @@ impl Frame {
         };
         header.faults = found;
         header.first_hits = matches!(content, Content::Hits(..));
+        let exposure = look.view.exposure;
         header.histogram = match &content {
-            Content::Color(pixels) | Content::Compare(pixels, _) => Some(Histogram::of(&pixels.colors)),
-            Content::Film(layer) if layer.is_light() => Some(Histogram::of(&layer.values.colors)),
+            Content::Color(pixels) | Content::Compare(pixels, _) => Some(Histogram::of(&pixels.colors, exposure)),
+            Content::Film(layer) if layer.is_light() => Some(Histogram::of(&layer.values.colors, exposure)),
             Content::Samples(..) | Content::Hits(..) | Content::Layer(..) | Content::Film(_) => None,
         };
-        let exposure = look.view.exposure;
         header.legend = match &content {
             Content::Film(layer) if layer.aov == Aov::Variance => Some(Legend::of_errors(exposure)),
             _ if look.false_color && header.histogram.is_some() => Some(Legend::of(exposure)),

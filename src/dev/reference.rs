@@ -9,6 +9,9 @@ use crate::compare::{self, Channel, Kind, PIXELS_PER_DEGREE, Picture, Plane};
 use crate::image::Pixels;
 use crate::scene::{ViewSettings, ViewTransform};
 
+/// What a viewer gives may have so many pixels, as many as 7680 x 4320 and a little more: a file of them may be small.
+const MOST_PIXELS: u64 = 1 << 25;
+
 /// A picture to compare with.
 #[derive(Clone, Debug)]
 pub struct Reference {
@@ -25,7 +28,7 @@ impl Reference {
     ///
     /// What to tell whoever sent it.
     pub fn decode(name: String, bytes: Vec<u8>, view: ViewSettings) -> Result<Reference, String> {
-        let picture = Picture::decode(bytes).map_err(|error| format!("{name}: {error}"))?;
+        let picture = Picture::decode(bytes, MOST_PIXELS).map_err(|error| format!("{name}: {error}"))?;
         let colors = picture
             .colors()
             .ok_or_else(|| format!("{name}: has no colours: a channel R, G and B, or Y, must be there"))?;
@@ -154,6 +157,12 @@ mod tests {
         }
         let error = Reference::decode("a.png".to_owned(), b"no picture".to_vec(), ViewSettings::default());
         assert!(error.unwrap_err().starts_with("a.png: "));
+        let blank = image::in_memory(8193, 4096, &vec![0; 3 * 8193 * 4096]).unwrap();
+        let error = Reference::decode("b.png".to_owned(), blank, ViewSettings::default());
+        assert_eq!(
+            error.unwrap_err(),
+            "b.png: has 8193 x 4096 pixels; they must be at most 33554432"
+        );
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::fs;
 use std::io::Write;
 use std::path::Path;
+use std::time::Duration;
 
 use toml::Value;
 
@@ -10,8 +11,43 @@ use super::camera::{Entry, entries};
 use super::edit::edited;
 use crate::scene::{CameraDescription, Description, KeyPath, Segment};
 
+/// Nobody takes so long from the first byte of a file to the last.
+const SAVING: Duration = Duration::from_millis(100);
+
 /// Replaces a file in one step: whoever reads it sees the old content or the new.
 pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
+    written(path, content)?.persist(path)?;
+    Ok(())
+}
+
+/// The same of a file that somebody else may change: it stays as it is, unless it is what it was thought to be.
+pub fn replace_known(path: &Path, known: &[u8], content: &[u8]) -> std::io::Result<()> {
+    let file = written(path, content)?;
+    if fs::read(path)? != known {
+        return Err(std::io::Error::other(
+            "somebody else has changed it at the same moment; it stays as that is",
+        ));
+    }
+    file.persist(path)?;
+    Ok(())
+}
+
+/// Refuses a file that somebody has changed so shortly ago that there may be more to come: that would go into the file that was
+/// replaced, and be lost.
+pub fn check_settled(path: &Path) -> Result<(), String> {
+    let changed = fs::metadata(path).and_then(|data| data.modified()).ok();
+    let age = changed.and_then(|changed| changed.elapsed().ok());
+    match age.is_some_and(|age| age < SAVING) {
+        true => Err(format!(
+            "{}: is being saved by somebody else; nothing is written into it",
+            path.display()
+        )),
+        false => Ok(()),
+    }
+}
+
+/// A file beside another one, with its permissions, that is to take its place.
+fn written(path: &Path, content: &[u8]) -> std::io::Result<tempfile::NamedTempFile> {
     let folder = path
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty())
@@ -29,8 +65,7 @@ pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
     if let Some(permissions) = permissions {
         file.as_file().set_permissions(permissions)?;
     }
-    file.persist(path)?;
-    Ok(())
+    Ok(file)
 }
 
 /// The text of a scene file with another camera. Values that are as they were are not touched.
@@ -125,6 +160,28 @@ mod tests {
             1,
             "nothing is left behind"
         );
+    }
+
+    #[test]
+    fn what_somebody_else_has_saved_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("s.toml");
+        fs::write(&file, "theirs").unwrap();
+        let error = replace_known(&file, b"before", b"ours").unwrap_err();
+        assert!(error.to_string().contains("somebody else"), "{error}");
+        assert_eq!(fs::read_to_string(&file).unwrap(), "theirs");
+        replace_known(&file, b"theirs", b"ours").unwrap();
+        assert_eq!(fs::read_to_string(&file).unwrap(), "ours");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        // What was changed just now may not be whole.
+        assert!(check_settled(&file).unwrap_err().contains("s.toml: is being saved"));
+        let long_ago = std::time::SystemTime::now() - 2 * SAVING;
+        fs::File::options()
+            .write(true)
+            .open(&file)
+            .and_then(|file| file.set_modified(long_ago))
+            .unwrap();
+        check_settled(&file).unwrap();
     }
 
     #[test]

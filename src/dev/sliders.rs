@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::save::replace;
-use crate::gpu::compose::{KERNELS, Shaders};
+use super::save::{check_settled, replace_known};
+use crate::gpu::compose::{KERNELS, Shaders, without_mark};
 use crate::gpu::marks::{Kind, Layer, Marks, Slider, Value, edited};
 use crate::gpu::{with_edits, without_values};
 use crate::scene::Integrator;
@@ -69,9 +69,11 @@ struct Written {
 }
 
 impl Written {
+    /// Puts one of its texts in place of the other.
     fn put(&self, text: &str) -> Result<(), String> {
         let told = |error| format!("{}: cannot be written: {error}", self.path.display());
-        replace(&self.path, text.as_bytes()).map_err(told)
+        let other = if text == self.after { &self.before } else { &self.after };
+        replace_known(&self.path, other.as_bytes(), text.as_bytes()).map_err(told)
     }
 }
 
@@ -176,6 +178,15 @@ impl Sliders {
         live.iter().map(value).collect()
     }
 
+    /// The shaders as they are once all values are written.
+    pub fn as_written(&self) -> Option<Shaders> {
+        let edits = |slider: &Slider, text: &str| {
+            let value = self.moved.get(&key(slider));
+            value.map_or(Vec::new(), |value| slider.edits(text, *value))
+        };
+        Some(with_edits(self.files.as_ref()?, &edits))
+    }
+
     /// Writes the values into the files of a folder: of each the number alone. Returns how many files were written.
     ///
     /// # Errors
@@ -190,7 +201,8 @@ impl Sliders {
             // A link stays one: what it leads to is replaced.
             let target = fs::canonicalize(&path).map_err(failed)?;
             let before = fs::read_to_string(&target).map_err(failed)?;
-            let there = Marks::of_file(file, &before).sliders;
+            let plain = without_mark(before.clone());
+            let there = Marks::of_file(file, &plain).sliders;
             let mut edits = Vec::new();
             for ((_, name), value) in self.moved.iter().filter(|((known, _), _)| known == file) {
                 let slider = there.iter().find(|slider| slider.name == *name);
@@ -198,6 +210,9 @@ impl Sliders {
                 edits.extend(slider.edits(&before, *value));
             }
             let after = edited(&before, edits);
+            if self.files.as_ref().is_none_or(|shaders| shaders.text(file) != plain) {
+                check_settled(&target)?;
+            }
             new.push(Written {
                 path: target,
                 before,
@@ -386,6 +401,8 @@ mod tests {
         let mut sliders = sliders(TEXT);
         let text = format!("\u{feff}// mine\r\n{}\r\n", TEXT.replace('\n', "\r\n"));
         fs::write(&file, &text).unwrap();
+        let known = |name: &str| (name == "phong.wgsl").then(|| without_mark(text.clone()));
+        sliders.read(Arc::new(Shaders::built_in().changed(|name, _| known(name))));
         sliders.slide("phong.wgsl", "a", Value::Number(0.1)).unwrap();
         sliders.slide("phong.wgsl", "n", Value::Number(4.0)).unwrap();
         assert_eq!(sliders.write(folder.path()), Ok(1));
@@ -397,6 +414,11 @@ mod tests {
         assert_eq!(fs::read_to_string(&file).unwrap(), text);
         assert!(!sliders.can_take_back());
         assert_eq!(sliders.write(folder.path()), Ok(1));
+        // Somebody else's save, which may not be whole.
+        let other = text.replace("mine", "theirs");
+        fs::write(&file, &other).unwrap();
+        assert!(sliders.write(folder.path()).unwrap_err().contains("is being saved"));
+        assert_eq!(fs::read_to_string(&file).unwrap(), other);
         fs::write(&file, "// nothing").unwrap();
         assert!(sliders.take_back().unwrap_err().contains("has been changed since"));
         assert!(sliders.write(folder.path()).unwrap_err().contains("no slider any more"));

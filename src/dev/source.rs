@@ -12,7 +12,8 @@ use crate::gpu::compose::{self, Shaders};
 use crate::image::AovSource;
 use crate::pack::{Packed, Specialization, pack};
 use crate::scene::{
-    CameraDescription, Description, Draft, Integrator, Overrides, Pieces, Places, Scene, folder_of, is_gltf, read_text,
+    CameraDescription, Description, Draft, Integrator, Overrides, Pieces, Places, Scene, folder_of, is_gltf,
+    read_bytes, read_text,
 };
 
 /// Where the files are.
@@ -243,7 +244,7 @@ impl Sources {
 
     fn stamp(&self, path: &Path) -> Stamp {
         if path == self.scene && !is_gltf(path) {
-            return fs::read(path).map_or(Stamp::Absent, Stamp::Content);
+            return read_bytes(path).map_or(Stamp::Absent, Stamp::Content);
         }
         fs::metadata(path).map_or(Stamp::Absent, |data| Stamp::Changed(data.len(), data.modified().ok()))
     }

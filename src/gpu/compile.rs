@@ -8,6 +8,7 @@ use naga::{GlobalVariable, Handle, Module, Span, WithSpan};
 
 use super::compose::{Kernel, ROUNDING, Source};
 use super::controls::FloatControls;
+use super::depth::too_deep;
 use super::prune::prune;
 use super::rounding::{Rounding, round_in_software};
 use super::spirv;
@@ -29,6 +30,10 @@ pub fn check(source: &Source) -> Result<Checked, ShaderError> {
 /// Parses and validates a kernel. An error comes with its place in the whole text, if it has one.
 pub fn check_at(source: &Source) -> Result<Checked, (ShaderError, Option<usize>)> {
     let start = |span: Option<Span>| span.and_then(Span::to_range).map(|range| range.start);
+    if let Some((place, rule)) = too_deep(&source.text) {
+        let span = Some(Span::from(place));
+        return Err((ShaderError::at(source, span, rule), start(span)));
+    }
     let module = naga::front::wgsl::parse_str(&source.text).map_err(|error| {
         let (span, message) = wording::parse_message(&error);
         (ShaderError::at(source, span, message), start(span))

@@ -6,6 +6,7 @@ use std::{fs, io, path::Path};
 use super::bake::{tables, tree_tables};
 use crate::pack::{self, Specialization};
 use crate::scene::Integrator;
+use crate::waiting;
 
 /// The file of quotients and square roots by software.
 pub const ROUNDING: &str = "rounding.wgsl";
@@ -179,6 +180,14 @@ pub struct Shaders {
     files: Vec<(String, String)>,
 }
 
+/// A file's text with blanks in place of a byte-order mark, which WGSL does not have. What follows stays where it is.
+pub fn without_mark(text: String) -> String {
+    match text.strip_prefix('\u{feff}') {
+        Some(rest) => format!("   {rest}"),
+        None => text,
+    }
+}
+
 impl Shaders {
     /// The ones in the program.
     pub fn built_in() -> Shaders {
@@ -193,9 +202,9 @@ impl Shaders {
     pub fn read(folder: &Path) -> io::Result<Shaders> {
         let read = |name: &str| {
             let path = folder.join(name);
-            let text = fs::read_to_string(&path)
-                .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))?;
-            Ok((name.to_string(), text))
+            let text = waiting::check(&path).and_then(|()| fs::read_to_string(&path));
+            let text = text.map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))?;
+            Ok((name.to_string(), without_mark(text)))
         };
         Ok(Shaders {
             files: built_in().map(|(name, _)| read(name)).collect::<io::Result<_>>()?,

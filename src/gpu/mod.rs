@@ -4,6 +4,7 @@ mod bake;
 mod compile;
 pub mod compose;
 mod controls;
+mod depth;
 mod device;
 mod failure;
 mod foresee;

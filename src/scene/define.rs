@@ -27,7 +27,7 @@ impl Define {
     ///
     /// A key that is no path, no value, and values that begin as TOML but are none.
     pub fn new(key: &str, value: &str) -> Result<Define, Problem> {
-        let (path, rest) = read_key(key)?;
+        let (path, rest) = read_key(key, unreadable)?;
         match rest {
             "" => Ok(Define {
                 value: read_value(value).map_err(|message| about(&path, message))?,
@@ -42,7 +42,7 @@ impl FromStr for Define {
     type Err = Problem;
 
     fn from_str(text: &str) -> Result<Define, Problem> {
-        let (path, rest) = read_key(text)?;
+        let (path, rest) = read_key(text, unreadable)?;
         let Some(value) = rest.strip_prefix('=') else {
             return Err(unreadable(text));
         };
@@ -85,14 +85,15 @@ impl FromStr for KeyPath {
 
     /// A path as a scene file has it: `materials."dark red".color`, `shapes[2].radius`.
     fn from_str(text: &str) -> Result<KeyPath, Problem> {
-        match read_key(text)? {
+        match read_key(text, no_path)? {
             (path, "") => Ok(path),
-            _ => Err(Problem::new(format!(
-                "{} must be a path, such as shapes[2].radius",
-                cut(text)
-            ))),
+            _ => Err(no_path(text)),
         }
     }
+}
+
+fn no_path(text: &str) -> Problem {
+    Problem::new(format!("{} must be a path, such as shapes[2].radius", cut(text)))
 }
 
 /// The most steps of a path: tables and lists of a file are no deeper in each other.
@@ -102,8 +103,9 @@ fn too_deep(text: &str) -> Problem {
     Problem::new(format!("{} must have at most {LONGEST_PATH} steps", cut(text)))
 }
 
-/// The path at the start of a text, and what is behind it: nothing, or what begins with `=`.
-fn read_key(text: &str) -> Result<(KeyPath, &str), Problem> {
+/// The path at the start of a text, and what is behind it: nothing, or what begins with `=`. What is told of another text is
+/// `unreadable`.
+fn read_key(text: &str, unreadable: fn(&str) -> Problem) -> Result<(KeyPath, &str), Problem> {
     let mut path = Vec::new();
     // What may come next: a name, and what stands between names.
     let (mut name, mut between) = (true, false);

@@ -403,7 +403,7 @@ impl Overrides {
 
 /// The text of a file.
 pub(crate) fn read_text(path: &Path) -> Result<String, SceneError> {
-    let bytes = read(path).map_err(|error| SceneError::Read {
+    let bytes = read_bytes(path).map_err(|error| SceneError::Read {
         path: path.to_owned(),
         error,
     })?;
@@ -415,7 +415,8 @@ pub(crate) fn read_text(path: &Path) -> Result<String, SceneError> {
     })
 }
 
-fn read(path: &Path) -> io::Result<Vec<u8>> {
+/// The bytes of a file, which must be one that ends, and no longer than a scene may be.
+pub(crate) fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     waiting::check(path)?;
     if path.is_dir() {
         return Err(io::Error::new(

@@ -56,7 +56,7 @@ pub use gltf::{GltfChoice, is_gltf};
 pub use image_file::Assets;
 pub use load::Overrides;
 #[cfg(feature = "dev")]
-pub(crate) use load::{Draft, folder_of, read_text};
+pub(crate) use load::{Draft, folder_of, read_bytes, read_text};
 pub use metals::MetalIndex;
 #[cfg(feature = "dev")]
 pub(crate) use parse::{Pieces, Places};

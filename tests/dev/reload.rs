@@ -315,3 +315,25 @@ fn an_edited_texture_is_seen() {
         (running.colors() == red).then_some(())
     });
 }
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_or_a_device_in_the_scenes_place_is_told_and_left() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let path = files.path("scene.toml");
+    fs::remove_file(&path).unwrap();
+    let made = std::process::Command::new("mkfifo").arg(&path).status().unwrap();
+    assert!(made.success());
+    assert!(running.wait_problem().message.contains("is a pipe"));
+    fs::remove_file(&path).unwrap();
+    files.write("scene.toml", &SCENE.replace("0.8, 0.1, 0.1", "0.1, 0.8, 0.1"));
+    running.wait_rendered(&files);
+    fs::remove_file(&path).unwrap();
+    std::os::unix::fs::symlink("/dev/zero", &path).unwrap();
+    assert!(running.wait_problem().message.contains("is a device"));
+    fs::remove_file(&path).unwrap();
+    files.write("scene.toml", SCENE);
+    running.wait_rendered(&files);
+}

@@ -20,6 +20,18 @@ fn slide(running: &Running, name: &str, value: Value) {
     running.session.send(Command::Slide { file, name, value });
 }
 
+/// Writes the values into the files, and waits until that is done.
+#[track_caller]
+fn write(running: &Running) {
+    let heard = running.state().heard;
+    running.session.send(Command::WriteSliders);
+    running.wait("the command to be followed", |running| {
+        (running.state().heard > heard).then_some(())
+    });
+    let notice = running.state().notice.clone();
+    assert!(notice.as_ref().is_some_and(|notice| !notice.bad), "{notice:?}");
+}
+
 fn slider(running: &Running, name: &str) -> SliderState {
     let state = running.state();
     let found = state.sliders.iter().find(|slider| slider.name == name);
@@ -136,7 +148,7 @@ fn a_slider_shows_what_an_edit_would_without_the_compiler() {
     assert!(!running.state().sliders_undo);
     wait_for(&running, &first);
     slide(&running, "tint", Value::Number(0.2));
-    running.session.send(Command::WriteSliders);
+    write(&running);
     running.wait_rendered(&files);
     // The file's number counts when it is edited, and takes no compiler either.
     slide(&running, "tint", Value::Number(0.9));
@@ -173,10 +185,36 @@ fn a_constant_that_kernels_are_compiled_for_is_compiled_anew() {
     let both = [("size: u32 = 2u", "size: u32 = 5u"), ("f32 = 0.5", "f32 = 0.25")];
     wait_for(&running, &rendered(&files, &both));
     assert_eq!(running.state().compile_seconds, again, "the other one needs none");
-    running.session.send(Command::WriteSliders);
+    write(&running);
     running.wait_rendered(&files);
     assert!(files.read(KERNEL).contains("size: u32 = 5u; // slider 1..8"));
     assert_eq!(running.state().compile_seconds, again, "what is written is what runs");
+}
+
+#[test]
+fn a_value_that_would_not_compile_is_not_written() {
+    let files = Files::new(SCENE);
+    marked(&files, "const c: f32 = 0.5; // slider 0..1", "min(1.0 / c, 1.0)");
+    let running = files.start();
+    running.wait_rendered(&files);
+    let (text, picture) = (files.read(KERNEL), running.colors());
+    slide(&running, "c", Value::Number(0.0));
+    wait_for(&running, &picture); // read from a buffer it is infinite, of which 1 is the least
+    running.session.send(Command::WriteSliders);
+    let notice = running.wait("a notice", |running| running.state().notice.clone());
+    assert!(
+        notice.bad && notice.text.contains("with these values the shaders would be wrong"),
+        "{}",
+        notice.text
+    );
+    assert!(notice.text.contains("kernels/render.wgsl:"), "{}", notice.text);
+    assert_eq!(files.read(KERNEL), text);
+    slide(&running, "c", Value::Number(0.25));
+    running.session.send(Command::WriteSliders);
+    running.wait("the file's value", |running| {
+        (slider(running, "c").file_value == Value::Number(0.25)).then_some(())
+    });
+    assert_eq!(files.read(KERNEL), text.replace("f32 = 0.5", "f32 = 0.25"));
 }
 
 #[test]

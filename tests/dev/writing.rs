@@ -69,6 +69,28 @@ fn a_value_that_is_set_is_written_and_shown() {
 }
 
 #[test]
+fn what_somebody_else_saves_at_the_same_moment_stays() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    // An editor's save, and a value of the page before anything has been read again.
+    for round in 0..10 {
+        let fov = |round: i32| format!("fov = {}", 40 + round);
+        files.edit("scene.toml", &fov(round), &fov(round + 1));
+        set(&running, "shapes[0].radius", json!(0.6), None);
+        let text = files.read("scene.toml");
+        assert!(text.contains(&fov(round + 1)), "{text}");
+        // It is refused, unless it comes late.
+        if !text.contains("radius = 0.6") {
+            assert!(refused(&running).contains("is being saved by somebody else"));
+        }
+        running.wait_rendered(&files);
+        set(&running, "shapes[0].radius", json!(0.5), None);
+        assert!(files.read("scene.toml").contains("radius = 0.5\n"));
+    }
+}
+
+#[test]
 fn what_was_written_is_taken_back_and_written_again() {
     let files = Files::new(&SCENE.replace('\n', "\r\n"));
     let start = files.read("scene.toml");

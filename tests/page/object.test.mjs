@@ -201,13 +201,28 @@ test("nothing out of range is sent by a drag, a key or a slider", async () => {
   for (let i = 0; i < 7; i++) await page.keyboard.press("PageDown");
   await holds("color = [0, 0.8, 0.8]");
   await settled(page);
-  const sent = await page.evaluate(() => window.sent);
+  // Of a lens a number of corners, 0 or 3 and more: what is between is passed over.
+  await choose(page, "camera");
+  await page.click("details.absent > summary");
+  await box(page, "camera.blades", 1).focus();
+  await page.keyboard.press("ArrowUp");
+  await page.waitForFunction(() => window.sent.some(({ path }) => path === "camera.blades"));
+  await settled(page);
+  await box(page, "camera.blades", 1).focus();
+  for (const key of ["ArrowUp", "ArrowDown", "ArrowDown"]) await page.keyboard.press(key);
+  await page.waitForFunction(() => window.sent.at(-1).value === 0);
+  await settled(page);
+  const all = await page.evaluate(() => window.sent);
+  const sent = all.filter(({ path }) => path !== "camera.blades");
+  const blades = all.filter((set) => !sent.includes(set)).map(({ value }) => value);
+  assert.ok(blades[0] === 3 && blades.every((x) => x === 0 || x >= 3), `${blades}`);
   assert.ok(sent.length >= 4); // of each burst the first and the last at least
   for (const { path, value } of sent) {
     const [low, high] = path.endsWith("radius") ? [1e-9, 1e9] : [0, 1e6];
     for (const x of [value].flat()) assert.ok(x >= low && x <= high, `${path}: ${x}`);
   }
   // A number that is typed goes to the scene's own reader, which says what is wrong.
+  await choose(page, "lights[0]");
   await red.fill("-1");
   await page.keyboard.press("Enter");
   await page.locator('[data-path="lights[0].color"] .bad', { hasText: "-1 must be finite, from 0 to" }).waitFor();

@@ -24,7 +24,7 @@ impl From<Error> for Unreadable {
 }
 
 /// Block by block, so that nothing but the picture's own values is in memory.
-pub(super) fn read(source: &mut dyn Source) -> Result<Picture, Unreadable> {
+pub(super) fn read(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable> {
     let length = length_of(source)?;
     let reader = exr::block::read(source, false)?;
     let headers = reader.headers().to_vec();
@@ -49,7 +49,7 @@ pub(super) fn read(source: &mut dyn Source) -> Result<Picture, Unreadable> {
     let pixel = channels
         .map(|channel| channel.sample_type.bytes_per_sample() as u64)
         .sum();
-    check(length, columns.into(), rows.into(), pixel)?;
+    check(most_pixels, length, (columns.into(), rows.into()), pixel)?;
     let names = names(&headers)?;
     let mut planes = Vec::new();
     for header in &headers {

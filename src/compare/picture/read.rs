@@ -42,6 +42,16 @@ pub enum Unreadable {
     /// It is a picture of a kind that is not read.
     #[error("is of a kind that is not read: {0}")]
     Kind(String),
+    /// It has more pixels than are taken here.
+    #[error("has {width} x {height} pixels; they must be at most {most}")]
+    Pixels {
+        /// Columns.
+        width: u64,
+        /// Rows.
+        height: u64,
+        /// How many there may be.
+        most: u64,
+    },
     /// It takes far more memory than its file has bytes.
     #[error(
         "has {width} x {height} pixels, which take {bytes} bytes; of a file of {length} bytes they must take at most {most}"
@@ -84,7 +94,7 @@ impl Picture {
         if path.as_os_str() == "-" {
             let mut bytes = Vec::new();
             io::stdin().lock().read_to_end(&mut bytes)?;
-            return Picture::decode(bytes);
+            return Picture::decode(bytes, u64::MAX);
         }
         waiting::check(path)?;
         let mut file = File::open(path)?;
@@ -96,9 +106,9 @@ impl Picture {
             // a pipe: what decodes pictures goes back and forth
             let mut bytes = Vec::new();
             file.read_to_end(&mut bytes)?;
-            return Picture::decode(bytes);
+            return Picture::decode(bytes, u64::MAX);
         }
-        decode(&mut BufReader::with_capacity(1 << 16, file))
+        decode(&mut BufReader::with_capacity(1 << 16, file), u64::MAX)
     }
 
     /// Reads a picture from its bytes.
@@ -106,12 +116,12 @@ impl Picture {
     /// # Errors
     ///
     /// What is no picture, and why.
-    pub fn decode(bytes: Vec<u8>) -> Result<Picture, Unreadable> {
-        decode(&mut Cursor::new(bytes))
+    pub fn decode(bytes: Vec<u8>, most_pixels: u64) -> Result<Picture, Unreadable> {
+        decode(&mut Cursor::new(bytes), most_pixels)
     }
 }
 
-fn decode(source: &mut dyn Source) -> Result<Picture, Unreadable> {
+fn decode(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable> {
     let mut start = Vec::new();
     source.take(64).read_to_end(&mut start)?;
     source.seek(SeekFrom::Start(0))?;
@@ -119,15 +129,27 @@ fn decode(source: &mut dyn Source) -> Result<Picture, Unreadable> {
         return Err(Unreadable::Empty);
     }
     match image::guess_format(&start) {
-        Ok(ImageFormat::Png) => png(source),
-        Ok(ImageFormat::OpenExr) => super::exr::read(source),
-        Ok(format @ (ImageFormat::Jpeg | ImageFormat::WebP | ImageFormat::Hdr)) => other(source, format),
+        Ok(ImageFormat::Png) => png(source, most_pixels),
+        Ok(ImageFormat::OpenExr) => super::exr::read(source, most_pixels),
+        Ok(format @ (ImageFormat::Jpeg | ImageFormat::WebP | ImageFormat::Hdr)) => other(source, format, most_pixels),
         _ => Err(Unreadable::Format),
     }
 }
 
-/// Refuses a picture whose values take far more than its file has bytes.
-pub(super) fn check(length: u64, width: u64, height: u64, bytes_of_pixel: u64) -> Result<(), Unreadable> {
+/// Refuses a picture of too many pixels, and one whose values take far more than its file has bytes.
+pub(super) fn check(
+    most_pixels: u64,
+    length: u64,
+    (width, height): (u64, u64),
+    bytes_of_pixel: u64,
+) -> Result<(), Unreadable> {
+    if width.saturating_mul(height) > most_pixels {
+        return Err(Unreadable::Pixels {
+            width,
+            height,
+            most: most_pixels,
+        });
+    }
     let bytes = width.saturating_mul(height).saturating_mul(bytes_of_pixel);
     let most = LARGEST.0.saturating_add(length.saturating_mul(LARGEST.1));
     match bytes <= most {
@@ -179,7 +201,7 @@ pub(super) fn length_of(source: &mut dyn Source) -> io::Result<u64> {
 }
 
 /// Row by row, so that nothing but the picture's own values is in memory.
-fn png(source: &mut dyn Source) -> Result<Picture, Unreadable> {
+fn png(source: &mut dyn Source, most_pixels: u64) -> Result<Picture, Unreadable> {
     let length = length_of(source)?;
     let mut options = png::DecodeOptions::default();
     options.set_ignore_text_chunk(true);
@@ -194,7 +216,8 @@ fn png(source: &mut dyn Source) -> Result<Picture, Unreadable> {
     let samples = color.samples();
     let is_deep = depth == png::BitDepth::Sixteen;
     let (columns, rows) = (u64::from(width), u64::from(height));
-    check(length, columns, rows, samples as u64 * if is_deep { 2 } else { 1 })?;
+    let bytes_of_pixel = samples as u64 * if is_deep { 2 } else { 1 };
+    check(most_pixels, length, (columns, rows), bytes_of_pixel)?;
     let mut planes = Planes::new(columns, rows, samples, is_deep)?;
     if is_interlaced {
         let size = reader.output_buffer_size().unwrap_or(usize::MAX) as u64;
@@ -278,7 +301,7 @@ impl Planes {
 }
 
 /// Files that the image library reads whole.
-fn other(source: &mut dyn Source, format: ImageFormat) -> Result<Picture, Unreadable> {
+fn other(source: &mut dyn Source, format: ImageFormat, most_pixels: u64) -> Result<Picture, Unreadable> {
     let length = length_of(source)?;
     let mut reader = ImageReader::with_format(source, format);
     reader.limits(Limits::no_limits());
@@ -293,7 +316,8 @@ fn other(source: &mut dyn Source, format: ImageFormat) -> Result<Picture, Unread
         )));
     }
     let color = decoder.color_type();
-    check(length, width.into(), height.into(), color.bytes_per_pixel().into())?;
+    let size = (width.into(), height.into());
+    check(most_pixels, length, size, color.bytes_per_pixel().into())?;
     // asked for before the library does, which would end the program
     drop(room::<u8>(width.into(), height.into(), decoder.total_bytes())?);
     let image = DynamicImage::from_decoder(decoder).map_err(refused)?;

@@ -142,7 +142,7 @@ function drawHistogram(header = lastHeader) {
   const [canvas, text] = [element("histogram"), element("histogram-text")];
   canvas.hidden = text.hidden = !header?.histogram;
   if (canvas.hidden) return;
-  const { first, of_a_stop, counts } = header.histogram;
+  const { first, of_a_stop, counts, above_white } = header.histogram;
   const bins = counts[0].length;
   const ratio = devicePixelRatio;
   [canvas.width, canvas.height] = [canvas.clientWidth, canvas.clientHeight].map((v) => Math.round(v * ratio));
@@ -164,13 +164,12 @@ function drawHistogram(header = lastHeader) {
   context.globalCompositeOperation = "source-over";
   context.fillStyle = style.color;
   context.fillRect(Math.round(x(white)), 0, Math.max(1, ratio), canvas.height);
-  const sum = (list) => list.reduce((a, b) => a + b, 0);
-  const share = (from) => Math.max(...counts.map((channel) => sum(channel.slice(Math.max(0, Math.ceil(from)))))) / Math.max(1, header.sent[0] * header.sent[1]);
+  const above = Math.max(...above_white) / Math.max(1, header.sent[0] * header.sent[1]);
   const stop = (bin) => `2^${first + Math.floor(bin / of_a_stop)}`;
   const seen = counts[0].map((_, bin) => counts.some((channel) => channel[bin] > 0));
   const [low, high] = [seen.indexOf(true), seen.lastIndexOf(true)];
   const range = low < 0 ? "no light" : `light from ${stop(low)} to ${stop(high + of_a_stop)}`;
-  text.textContent = `${range}; ${(100 * share(white)).toFixed(1)} % above white`;
+  text.textContent = `${range}; ${(100 * above).toFixed(1)} % above white`;
   canvas.setAttribute("aria-label", `Histogram: ${text.textContent}`);
 }
 

@@ -11,6 +11,7 @@ use crate::dev::picture::{LayerName, View};
 use crate::dev::source::Constants;
 use crate::gpu::compose::Shaders;
 use crate::gpu::marks::{Layer, Value};
+use crate::gpu::{Forms, check_kernels};
 
 impl Painter {
     /// Takes the shaders as the files have them now.
@@ -77,9 +78,27 @@ impl Painter {
         let result = match &self.sources.shaders {
             None => Err("the shaders in the program cannot be changed: --shaders must name a folder".to_string()),
             Some(_) if !self.sliders.are_moved() => Err("every slider stands where its file says".to_string()),
-            Some(folder) => self.sliders.write(folder),
+            Some(folder) => {
+                let folder = folder.clone();
+                self.check_written().and_then(|()| self.sliders.write(&folder))
+            }
         };
         self.tell_written(result, "sliders written into the shaders");
+    }
+
+    /// A kernel may take a value from a buffer with which it cannot be compiled: 1 / c, where c is 0.
+    fn check_written(&self) -> Result<(), String> {
+        let (Some(loaded), Some(shaders)) = (&self.loaded, self.sliders.as_written()) else {
+            return Ok(());
+        };
+        let refused = check_kernels(&loaded.packed, &shaders, Forms::Buffers).err();
+        let first = refused.and_then(|errors| errors.0.into_iter().next());
+        first.map_or(Ok(()), |error| {
+            Err(format!(
+                "with these values the shaders would be wrong, and stay as they are: {}: {}",
+                error.place, error.message
+            ))
+        })
     }
 
     /// Takes back what was written into them last.

@@ -12,7 +12,7 @@ use crate::dev::edit::edited_in;
 use crate::dev::history::Step;
 use crate::dev::messages::{Report, Set};
 use crate::dev::object::{Seen, object_of};
-use crate::dev::save::{replace, with_camera};
+use crate::dev::save::{check_settled, replace_known, with_camera};
 use crate::dev::source::{Loaded, Stamp};
 use crate::scene::{Draft, KeyPath, Segment, cut, folder_of, is_course, is_gltf, read_text};
 use crate::visible::visible;
@@ -98,7 +98,7 @@ impl Painter {
         let step = self.history.last(again).ok_or_else(others)?;
         let (at, keeps_view) = (step.at.clone(), step.is_camera && !again);
         let read = self.read_change(&loaded, &at, after)?;
-        self.replace(&file, &read)?;
+        self.replace(&file, &before, &read)?;
         self.history.turn(again);
         // What a save has written was on screen, and stays there.
         let view = keeps_view.then(|| self.camera.clone().unwrap_or(loaded.camera.clone()));
@@ -140,6 +140,7 @@ impl Painter {
         let read = Draft::read(text, &origin, folder, &self.sources.overrides);
         let read = read.and_then(|draft| draft.check(&mut BTreeSet::new()));
         let (scene, description) = read.map_err(|error| format!("mend the file first: {error}"))?;
+        check_settled(&self.sources.scene)?;
         Ok(Arc::new(Loaded::new(text.to_owned(), scene, description)))
     }
 
@@ -166,7 +167,7 @@ impl Painter {
             return Ok(());
         }
         let read = self.read_change(known, &step.at, after)?;
-        self.replace(file, &read)?;
+        self.replace(file, before, &read)?;
         if self.loaded.as_ref().is_none_or(|loaded| loaded.text != before) {
             self.history.forget();
         }
@@ -176,9 +177,10 @@ impl Painter {
         Ok(())
     }
 
-    fn replace(&self, file: &Path, read: &Loaded) -> Result<(), String> {
+    fn replace(&self, file: &Path, before: &str, read: &Loaded) -> Result<(), String> {
         let place = self.sources.scene.display();
-        replace(file, read.text.as_bytes()).map_err(|error| format!("{place}: cannot be written: {error}"))
+        replace_known(file, before.as_bytes(), read.text.as_bytes())
+            .map_err(|error| format!("{place}: cannot be written: {error}"))
     }
 
     /// Takes a scene that this session has written, so that its file need not be read again.

@@ -1,0 +1,100 @@
+//! How deep a shader's expressions go. naga follows them by calls of itself, and would use up its stack.
+
+use std::ops::Range;
+
+use super::functions::without_comments;
+
+/// So many operators, brackets and members may build on each other in one expression.
+const OPERATORS: usize = 1000;
+/// So many times may `else if` follow in all that is open at one place.
+const ALTERNATIVES: usize = 400;
+
+/// What goes too deep, and what the rule is.
+pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
+    let plain = without_comments(text);
+    let bytes = plain.as_bytes();
+    let told = |at: usize, what: &str, most: usize| {
+        Some((
+            at..at + 1,
+            format!("{what} go deeper than {most} here, which is the most"),
+        ))
+    };
+    let mut depth = 0;
+    let mut brackets: Vec<usize> = Vec::new();
+    let mut alternatives = vec![0];
+    for (at, byte) in bytes.iter().enumerate() {
+        match byte {
+            b'(' | b'[' => {
+                depth += 1;
+                brackets.push(depth);
+            }
+            b')' | b']' => depth = brackets.pop().unwrap_or(0),
+            b',' => depth = brackets.last().copied().unwrap_or(0),
+            b'+' | b'-' | b'*' | b'/' | b'%' | b'&' | b'|' | b'^' | b'~' | b'!' | b'<' | b'>' | b'=' => depth += 1,
+            b'.' if bytes.get(at + 1).is_some_and(u8::is_ascii_alphabetic) => depth += 1,
+            b';' => (depth, brackets) = (0, Vec::new()),
+            b'{' => {
+                (depth, brackets) = (0, Vec::new());
+                alternatives.push(0);
+            }
+            b'}' => {
+                (depth, brackets) = (0, Vec::new());
+                if alternatives.len() > 1 {
+                    alternatives.pop();
+                }
+                let rest = plain[at + 1..].trim_start();
+                let goes_on = rest
+                    .strip_prefix("else")
+                    .is_some_and(|rest| rest.trim_start().starts_with("if"));
+                if let Some(count) = alternatives.last_mut() {
+                    *count = if goes_on { *count + 1 } else { 0 };
+                }
+                if alternatives.iter().sum::<usize>() > ALTERNATIVES {
+                    return told(at, "`else if`", ALTERNATIVES);
+                }
+            }
+            _ => {}
+        }
+        if depth > OPERATORS {
+            return told(at, "operators", OPERATORS);
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::compose::Shaders;
+
+    #[test]
+    fn what_shaders_are_made_of_is_not_too_deep() {
+        for (name, text) in Shaders::built_in().files() {
+            assert_eq!(too_deep(text), None, "{name}");
+        }
+        let list = format!("const A = array<f32, 9999>({});", "-(1.0 + 2.5), ".repeat(9999));
+        assert_eq!(too_deep(&list), None);
+        assert_eq!(
+            too_deep(&"fn f() { if a { x = 1; } else { y = 2; } } ".repeat(2000)),
+            None
+        );
+        assert_eq!(too_deep(&"x = (1 + 2) * 3; ".repeat(2000)), None);
+        assert_eq!(too_deep(&format!("// {}\n", "+".repeat(9999))), None);
+    }
+
+    #[test]
+    fn what_goes_on_and_on_is() {
+        let of = |part: &str, count: usize| format!("fn f() {{ let y = x{}; }}", part.repeat(count));
+        for part in ["+x", ".x", "[0]", "<x", "+(x", "-f(x)", "+1.5"] {
+            assert_eq!(too_deep(&of(part, 300)), None, "{part}");
+            let (place, message) = too_deep(&of(part, 1001)).expect(part);
+            assert!(place.start > 500 && message.starts_with("operators go deeper than 1000"));
+        }
+        let of = |count: usize| format!("if a {{}} {} else {{}}", "else if b { x(); }\n ".repeat(count));
+        assert_eq!(too_deep(&of(400)), None);
+        assert!(too_deep(&of(401)).is_some());
+        // What is inside of others goes as deep as all of them.
+        let inner = of(300);
+        assert!(too_deep(&format!("{}if c {{ {inner} }}", "if a {} else if b { ".repeat(101))).is_some());
+    }
+}
