@@ -161,9 +161,18 @@ test("a finger that scrolls changes nothing, one that drags or taps does", async
   await choose(page, "shapes[0]");
   await page.evaluate(() => document.activeElement.blur());
   const sent = await listen(page);
+  // A page that is let go scrolls on for a while: a change with every picture of the screen.
+  const atRest = () => page.evaluate(async () => {
+    let last = null;
+    for (let still = 0; still < 4; still = last === scrollY ? still + 1 : 0) {
+      last = scrollY;
+      await new Promise((resolve) => requestAnimationFrame(resolve));
+    }
+  });
   // A finger comes down on a control, moves, and goes up.
   const swipe = async (control, dx, dy) => {
     await control.evaluate((node) => scrollBy(0, node.getBoundingClientRect().top - 680));
+    await atRest();
     const area = await control.boundingBox();
     const [x, y] = [area.x + area.width * 0.15, area.y + area.height / 2];
     const touch = (type, touchPoints) => client.send("Input.dispatchTouchEvent", { type, touchPoints });
@@ -171,7 +180,7 @@ test("a finger that scrolls changes nothing, one that drags or taps does", async
     await touch("touchStart", [{ x, y }]);
     for (let i = 1; i <= 12; i++) await touch("touchMove", [{ x: x + (dx * i) / 12, y: y + (dy * i) / 12 }]);
     await touch("touchEnd", []);
-    await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+    await atRest();
     return (await page.evaluate(() => scrollY)) - top;
   };
   const sliders = [box(page, "shapes[0].radius"), slider(page, "level"), page.locator("#exposure")];
