@@ -11,6 +11,7 @@ use toml_edit::{DocumentMut, value};
 use super::camera::Move;
 use super::messages::{Command, Set};
 use super::picture::Frame;
+use super::save::replace;
 use super::session::{Session, Settings};
 use super::source::Sources;
 use crate::gpu::Choice;
@@ -114,7 +115,8 @@ pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Resul
             Ok(())
         })?,
         clock.all("scene save", &mut |i, _| {
-            fs::write(scene.path(), reseeded(&text, i)).map_err(told)
+            // In one step: a large file that is half written would be read, and told to be wrong.
+            replace(scene.path(), reseeded(&text, i).as_bytes()).map_err(told)
         })?,
         clock.all("camera move", &mut |_, session| {
             session.send(Command::Move(Move::Orbit(0.05, 0.0)));
@@ -122,11 +124,8 @@ pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Resul
         })?,
         clock.all("shader save", &mut |i, _| {
             let factor = 1.0 + (now as f64 * ROUNDS as f64 + i as f64) / f64::from(1 << 21);
-            fs::write(
-                &kernel,
-                kernel_text.replace(PLACE, &format!("({PLACE} * vec4f(vec3f({factor:?}), 1.0))")),
-            )
-            .map_err(told)
+            let text = kernel_text.replace(PLACE, &format!("({PLACE} * vec4f(vec3f({factor:?}), 1.0))"));
+            replace(&kernel, text.as_bytes()).map_err(told)
         })?,
     ])
 }
