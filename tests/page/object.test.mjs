@@ -248,7 +248,8 @@ test("one slider makes a light stronger and weaker, and its tint stays", async (
   await page.keyboard.press("Enter");
   await holds("color = [30, 15, 7.5]");
   await settled(page);
-  assert.ok(Number(await slider.getAttribute("max")) >= 60, "there is always room above");
+  // There is always room above.
+  await page.waitForFunction((slider) => Number(slider.max) >= 60, await slider.elementHandle());
   for (const text of ["[0, 0, 0]", "[4, 2, 1]", "[2, 1, 0.5]"]) {
     await page.click("#undo-write");
     await holds(`color = ${text}`);
