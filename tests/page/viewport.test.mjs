@@ -230,6 +230,7 @@ test("the picture is compared with what it was, with a kept one and with files",
   await page.keyboard.press("7");
   await page.getByLabel("Before the edit").check();
   await page.locator("#badge", { hasText: "no change has been saved" }).waitFor();
+  await settled(page); // the first comparison is another one, and renders anew
   studio.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.1, 0.8");
   await page.locator("#differing", { hasText: /^[\d,]+ pixels differ, by/ }).waitFor();
   await settled(page);
