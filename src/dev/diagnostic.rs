@@ -5,6 +5,7 @@ use std::path::{Path, absolute};
 use serde::Serialize;
 
 use crate::error::{RenderError, ShaderError};
+use crate::excerpt;
 use crate::gpu::compose::Shaders;
 use crate::scene::SceneError;
 
@@ -98,13 +99,10 @@ impl Diagnostic {
     /// Of the excerpt the line that has the place, and the mark below it: what a terminal has room for.
     pub fn marked_line(&self) -> Option<String> {
         let lines: Vec<&str> = self.excerpt.as_ref()?.lines().collect();
-        let mark = lines.iter().position(|line| line.starts_with(NO_NUMBER))?;
+        let mark = lines.iter().position(|line| line.starts_with(excerpt::NO_NUMBER))?;
         Some(lines[mark.checked_sub(1)?..=mark].join("\n"))
     }
 }
-
-/// What stands before the bar in a line of an excerpt that is none of the text's.
-const NO_NUMBER: &str = "      |";
 
 fn whole_path(path: &Path) -> Option<String> {
     absolute(path).ok()?.to_str().map(str::to_string)
@@ -113,7 +111,7 @@ fn whole_path(path: &Path) -> Option<String> {
 /// An excerpt of a line of a text, counted from 1, with the lines before and after it.
 fn around(text: &str, line: usize, excerpt: &str) -> String {
     let numbered = |line: usize| Some((line, text.lines().nth(line.checked_sub(1)?)?));
-    let shown = |(line, content): (usize, &str)| format!("{line:>5} | {content}").trim_end().to_string();
+    let shown = |(line, content)| excerpt::numbered(line, content);
     let before = line.checked_sub(1).and_then(numbered).map(shown);
     let after = numbered(line + 1).map(shown);
     let lines = before.into_iter().chain([excerpt.to_string()]).chain(after);
@@ -128,11 +126,7 @@ fn marked(text: &str, line: usize, column: Option<usize>) -> Option<String> {
         Some(column) => (column.saturating_sub(1), 1),
         None => (indent, content.trim().chars().count().max(1)),
     };
-    Some(format!(
-        "{line:>5} | {content}\n{NO_NUMBER} {}{}",
-        " ".repeat(start),
-        "^".repeat(length)
-    ))
+    Some(excerpt::marked(line, content, start, length))
 }
 
 impl From<&RenderError> for Diagnostic {

@@ -137,12 +137,13 @@ struct Shared {
 }
 
 /// The page's modules.
-const MODULES: [(&str, &str); 16] = [
+const MODULES: [(&str, &str); 17] = [
     ("/camera.js", include_str!("page/camera.js")),
     ("/color.js", include_str!("page/color.js")),
     ("/compare.js", include_str!("page/compare.js")),
     ("/object.js", include_str!("page/object.js")),
     ("/editor.js", include_str!("page/editor.js")),
+    ("/focus.js", include_str!("page/focus.js")),
     ("/link.js", include_str!("page/link.js")),
     ("/numbers.js", include_str!("page/numbers.js")),
     ("/page.js", include_str!("page/page.js")),

@@ -178,6 +178,11 @@ impl Sliders {
         live.iter().map(value).collect()
     }
 
+    /// The shaders as the files have them.
+    pub fn files(&self) -> Option<&Shaders> {
+        self.files.as_deref()
+    }
+
     /// The shaders as they are once all values are written.
     pub fn as_written(&self) -> Option<Shaders> {
         let edits = |slider: &Slider, text: &str| {

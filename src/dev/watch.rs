@@ -18,6 +18,11 @@ const QUIET: Duration = Duration::from_millis(20);
 /// Files are read after so long, even if something still happens to them.
 const PATIENCE: Duration = Duration::from_millis(150);
 
+/// A scene that is wrong is told of once nothing has happened to the files for so long: it may be half of one.
+const DOUBT: Duration = Duration::from_millis(100);
+/// Or after so long, even if something still happens.
+const DOUBTS: Duration = Duration::from_secs(1);
+
 /// What a session has written into the scene file itself: the watcher need not read that again.
 #[derive(Default)]
 pub struct Writes {
@@ -107,8 +112,12 @@ fn run(
     writes: &Mutex<Writes>,
     mut changed: impl FnMut(Snapshot, Instant, u64) -> bool,
 ) {
-    while let Ok(wake) = wakes.recv() {
-        let noticed = Instant::now();
+    let mut again = None; // what woke us in doubt, and when the first change was noticed
+    loop {
+        let Some((wake, noticed)) = again.take().or_else(|| Some((wakes.recv().ok()?, Instant::now()))) else {
+            return;
+        };
+        let woken = Instant::now();
         let mut next = Ok(wake);
         let mut names = false;
         loop {
@@ -118,7 +127,7 @@ fn run(
                 Err(RecvTimeoutError::Timeout) => break,
                 Ok(Wake::Stop) | Err(RecvTimeoutError::Disconnected) => return,
             }
-            if noticed.elapsed() > PATIENCE {
+            if woken.elapsed() > PATIENCE {
                 break;
             }
             next = wakes.recv_timeout(QUIET);
@@ -135,6 +144,14 @@ fn run(
             writes.count
         };
         if let Some(new) = sources.reread(&last) {
+            let is_doubtful = new.scene.is_err() && new.scene.as_ref().err() != last.scene.as_ref().err();
+            if is_doubtful
+                && noticed.elapsed() < DOUBTS
+                && let Ok(wake) = wakes.recv_timeout(DOUBT)
+            {
+                again = Some((wake, noticed));
+                continue;
+            }
             // The scene may use other files now. They are stamped already: a change since then wakes us or shows here.
             folders.follow(sources, &new);
             last = new.clone();

@@ -3,6 +3,7 @@
 use super::compose::Source;
 use super::wording::chain;
 use crate::error::ShaderError;
+use crate::excerpt;
 
 impl ShaderError {
     pub(crate) fn other(stage: &str, error: &dyn std::error::Error) -> ShaderError {
@@ -27,19 +28,12 @@ impl ShaderError {
         let start = before.rfind('\n').map_or(0, |at| at + 1);
         let column = text[start..offset].chars().count() + 1;
         let line_text = text[start..].lines().next().unwrap_or("");
-        let length = range
-            .map_or(1, |range| range.len())
-            .min(line_text.len().saturating_sub(offset - start))
-            .max(1);
-        let excerpt = format!(
-            "{line:>5} | {line_text}\n      | {}{}",
-            " ".repeat(column - 1),
-            "^".repeat(length)
-        );
+        let marked = range.and_then(|range| text.get(offset..offset + range.len()));
+        let length = marked.map_or(1, |marked| marked.chars().count());
         ShaderError {
             place: format!("{file}:{line}:{column}"),
             message,
-            excerpt: Some(excerpt),
+            excerpt: Some(excerpt::marked(line, line_text, column - 1, length)),
         }
     }
 }

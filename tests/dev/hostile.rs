@@ -4,9 +4,9 @@ use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 
 use serde_json::{Value, json};
-use wgray::dev::{Command, Listener, Set};
+use wgray::dev::{Command, Set};
 
-use super::running::{Files, LONGEST, Running, SCENE};
+use super::running::{Files, LONGEST, SCENE, serve};
 
 /// A viewer's connection.
 struct Viewer(TcpStream);
@@ -98,11 +98,7 @@ fn what_is_no_value_is_refused_and_the_file_stays() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
-    let listener = Listener::open("127.0.0.1:0").unwrap();
-    let address = listener.address().unwrap();
-    // It serves as long as the program runs.
-    let session: &'static Running = Box::leak(Box::new(running));
-    std::thread::spawn(move || listener.serve(&session.session).unwrap());
+    let (session, address) = serve(running);
     let mut viewer = Viewer::new(address);
 
     let radius = |value: &str| format!("{{\"set\":{{\"path\":\"shapes[0].radius\",\"value\":{value}}}}}");

@@ -1,7 +1,7 @@
 //! Files that are saved, broken, renamed, linked, deleted: what is shown is what they say last.
 
 use std::fs;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use wgray::dev::{Command, Move};
 use wgray::gpu::compose::Shaders;
@@ -31,6 +31,38 @@ fn the_first_picture_is_what_render_makes() {
         ]
     );
     assert_eq!(frame.pixel(40, 0), None);
+}
+
+#[test]
+fn half_of_a_scene_that_is_being_saved_is_no_error() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let half = &SCENE[..SCENE.find("radius").unwrap() + 3];
+    // On a busy machine a save may take too long; not each of ten.
+    let is_silent = (0..10).any(|i| {
+        let start = Instant::now();
+        files.write("scene.toml", half);
+        let mut was_silent = true;
+        let mut look = || was_silent &= running.state().problems.is_empty();
+        while start.elapsed() < Duration::from_millis(50) {
+            look();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        files.write(
+            "scene.toml",
+            &SCENE.replace("radius = 0.5", &format!("radius = 0.{}", 3 + i)),
+        );
+        while start.elapsed() < Duration::from_millis(300) {
+            look();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        was_silent
+    });
+    assert!(is_silent);
+    running.wait_rendered(&files);
+    files.write("scene.toml", half); // left like that it is one
+    running.wait_problem();
 }
 
 #[test]

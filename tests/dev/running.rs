@@ -1,12 +1,13 @@
 //! A scene and shaders in a folder of their own, and the development mode that watches them.
 
 use std::fs;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
-use wgray::dev::{Content, Diagnostic, Frame, Session, Settings, Sources, State};
+use wgray::dev::{Content, Diagnostic, Frame, Listener, Session, Settings, Sources, State};
 use wgray::film::{Film, Region, mean};
 use wgray::gpu::compose::{Shaders, built_in};
 use wgray::gpu::{Choice, Gpu, Options, choose};
@@ -178,6 +179,15 @@ impl Files {
 
 pub struct Running {
     pub session: Session,
+}
+
+/// Shows a session on a server; it runs as long as the program.
+pub fn serve(running: Running) -> (&'static Running, SocketAddr) {
+    let listener = Listener::open("127.0.0.1:0").unwrap();
+    let address = listener.address().unwrap();
+    let running: &'static Running = Box::leak(Box::new(running));
+    std::thread::spawn(move || listener.serve(&running.session).unwrap());
+    (running, address)
 }
 
 impl Running {

@@ -5,7 +5,7 @@ use std::net::{SocketAddr, TcpStream};
 
 use wgray::dev::{Command, Listener, Move};
 
-use super::running::{Files, LONGEST, Running, SCENE};
+use super::running::{Files, LONGEST, SCENE, serve};
 
 /// A request, and the answer's first line and whole text.
 fn ask(address: SocketAddr, request: &str) -> (String, String) {
@@ -48,11 +48,7 @@ fn the_server_answers_its_own_pages_only() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
-    let listener = Listener::open("127.0.0.1:0").unwrap();
-    let address = listener.address().unwrap();
-    // It serves as long as the program runs.
-    let session: &'static Running = Box::leak(Box::new(running));
-    std::thread::spawn(move || listener.serve(&session.session).unwrap());
+    let (session, address) = serve(running);
     let (own, port) = (address.to_string(), address.port());
 
     for path in [
@@ -158,11 +154,7 @@ fn pictures_are_given_to_who_asks_and_taken_from_the_page_alone() {
     let files = Files::new(SCENE);
     let running = files.start();
     running.wait_rendered(&files);
-    let listener = Listener::open("127.0.0.1:0").unwrap();
-    let address = listener.address().unwrap();
-    // It serves as long as the program runs.
-    let session: &'static Running = Box::leak(Box::new(running));
-    std::thread::spawn(move || listener.serve(&session.session).unwrap());
+    let (session, address) = serve(running);
     let own = address.to_string();
     for (path, kind) in [("/picture.png", "image/png"), ("/picture.exr", "image/x-exr")] {
         let (status, text) = ask(address, &get(path, &own, ""));
@@ -192,11 +184,7 @@ fn pictures_are_given_to_who_asks_and_taken_from_the_page_alone() {
 #[test]
 fn half_a_request_is_given_up_and_keeps_nobody_out() {
     let files = Files::new(SCENE);
-    let listener = Listener::open("127.0.0.1:0").unwrap();
-    let address = listener.address().unwrap();
-    // It serves as long as the program runs.
-    let session: &'static Running = Box::leak(Box::new(files.start()));
-    std::thread::spawn(move || listener.serve(&session.session).unwrap());
+    let (_, address) = serve(files.start());
     let halves = [
         "",
         "GET / HTTP/1.1\r\nHost: ",

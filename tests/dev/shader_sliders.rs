@@ -210,6 +210,19 @@ fn a_value_that_would_not_compile_is_not_written() {
     );
     assert!(notice.text.contains("kernels/render.wgsl:"), "{}", notice.text);
     assert_eq!(files.read(KERNEL), text);
+    // Where they are wrong already it is not the values' fault.
+    files.write(KERNEL, &text.replace("min(1.0 / c, 1.0)", "min(1.0 / d, 1.0)"));
+    running.wait_problem();
+    running.session.send(Command::WriteSliders);
+    running.wait("another notice", |running| {
+        let notice = running.state().notice.clone()?;
+        notice
+            .text
+            .contains("the shaders are wrong by themselves")
+            .then_some(())
+    });
+    files.write(KERNEL, &text);
+    running.wait_well();
     slide(&running, "c", Value::Number(0.25));
     running.session.send(Command::WriteSliders);
     running.wait("the file's value", |running| {

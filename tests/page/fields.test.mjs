@@ -318,3 +318,94 @@ test("forced colours show how far the picture is", async () => {
   await page.evaluate(() => (document.getElementById("bar").value = 0.5));
   assert.ok((await colors()) >= 3, "an edge, what is done and what is not");
 });
+
+test("a count of cells goes from square to square", async () => {
+  const page = await open(browser, studio);
+  await choose(page, "render");
+  const count = (number) => written(`count = ${number} }\nlight`);
+  const [range, field] = [0, 1].map((nth) => box(page, "render.pixel_samples.count", nth));
+  await range.focus();
+  await page.keyboard.press("ArrowRight");
+  await count(9);
+  await says(field, "9");
+  await field.focus();
+  await page.keyboard.press("ArrowUp");
+  await count(16);
+  await page.keyboard.press("ArrowDown");
+  await page.keyboard.press("ArrowDown");
+  await count(4);
+  // A drag that goes nowhere does not tremble between two of them.
+  const sent = await listen(page);
+  await page.locator("#pause").focus();
+  await field.scrollIntoViewIfNeeded();
+  const { x, y, width, height } = await field.boundingBox();
+  await page.mouse.move(x + width / 2, y + height / 2);
+  await page.mouse.down();
+  for (const dx of [20, 21, 22, 21, 22, 20]) await page.mouse.move(x + width / 2 + dx, y + height / 2);
+  await page.mouse.up();
+  await count(9);
+  await settled(page);
+  assert.deepEqual((await sent()).map((text) => JSON.parse(text).set.value), [9]);
+  // What is typed is what is asked for, and the rule is told.
+  await field.fill("5");
+  await page.keyboard.press("Enter");
+  await page.locator('[data-path="render.pixel_samples.count"] [role=alert]', { hasText: "square" }).waitFor();
+  // Of another pattern any number is one.
+  await box(page, "render.pixel_samples.pattern").selectOption("sobol");
+  await written('pattern = "sobol", count = 9');
+  await page.locator('[data-control="render.pixel_samples.count 0"][max="1000"]').waitFor();
+  await field.focus();
+  await page.keyboard.press("ArrowUp");
+  await count(10);
+  assert.deepEqual(page.faults, []);
+});
+
+test("the focus of what goes off stays near, and comes back with it", async () => {
+  const page = await open(browser, studio);
+  const isAround = (id) => page.evaluate((id) => document.activeElement === document.getElementById(id).parentElement, id);
+  await choose(page, "shapes[0]");
+  await box(page, "shapes[0].radius", 1).fill("0.4");
+  await page.keyboard.press("Enter");
+  await written("radius = 0.4");
+  await page.locator("#undo-write:enabled").focus();
+  await page.keyboard.press("Enter");
+  await page.locator("#undo-write:disabled").waitFor();
+  assert.ok(await isAround("undo-write"));
+  await page.keyboard.press("Tab");
+  assert.ok(await isFocused(page.locator("#redo-write")), "what is beside it is the next");
+  // What was hidden while it had the focus: the button beside a field, the canvas of another view.
+  await slider(page, "level").focus();
+  await page.keyboard.press("ArrowRight");
+  await page.getByRole("button", { name: "Reset level" }).focus();
+  await page.keyboard.press("Enter");
+  assert.ok(await isFocused(slider(page, "level")));
+  await page.locator("#pause").focus();
+  await page.keyboard.press("7");
+  await page.locator("[data-part=second] canvas").waitFor();
+  await page.locator("[data-part=second] canvas").focus();
+  await page.keyboard.press("1");
+  await page.locator("[data-part=second] canvas").waitFor({ state: "hidden" });
+  assert.ok(await isFocused(page.locator("[data-part=picture] canvas")));
+  // What was taken away.
+  await page.keyboard.press("b");
+  await page.getByRole("button", { name: "Delete view 1" }).focus();
+  await page.keyboard.press("Enter");
+  assert.ok(await isFocused(page.locator("#bookmarks")));
+  // Without a connection all is off, and with it what had the focus has it again, unless somebody has moved it.
+  for (const [moves, wanted] of [[[], "#pause"], [["Tab"], "#save-png"]]) {
+    await page.locator("#pause").focus();
+    await studio.stop();
+    await page.locator("#badge.lost").waitFor();
+    assert.ok(await isAround("pause"));
+    for (const key of moves) await page.keyboard.press(key);
+    await studio.start(studio.port);
+    await page.locator("#badge.live").waitFor({ state: "attached" });
+    assert.ok(await isFocused(page.locator(wanted)), wanted);
+  }
+  // Who clicks beside all of it has no focus, whatever goes off then.
+  await page.locator("#restart").focus();
+  await page.locator("h1").click();
+  await studio.stop();
+  await page.locator("#badge.lost").waitFor();
+  assert.ok(await isFocused(page.locator("body")));
+});

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import fs from "node:fs";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { SCENE, Studio, decoded, launch, open, settled, shown } from "./studio.mjs";
+import { SCENE, Studio, decoded, launch, open, same, settled, shown } from "./studio.mjs";
 
 const PATH = SCENE.replace("[render]", "[render]\nintegrator = \"path\"\nbackground = [0.1, 0.2, 0.4]");
 
@@ -38,7 +38,7 @@ test("layers of the film are views, with the pictures and the files of a render"
   for (const name of names) {
     await choose(page, name);
     const picture = await shown(page);
-    assert.deepEqual(picture, await decoded(page, [...fs.readFileSync(studio.path(`rendered.${name}.png`))]), name);
+    same(picture, await decoded(page, [...fs.readFileSync(studio.path(`rendered.${name}.png`))]), name);
     seen.add(String(picture));
     const saved = await page.evaluate(async () => [...new Uint8Array(await (await fetch("/picture.exr")).arrayBuffer())]);
     const header = Buffer.from(saved.slice(0, 1000)).toString("latin1");
@@ -53,7 +53,7 @@ test("layers of the film are views, with the pictures and the files of a render"
   await page.keyboard.press("1");
   await page.waitForFunction(() => document.getElementById("panels").dataset.view === "color");
   await settled(page);
-  assert.deepEqual(await shown(page), light);
+  same(await shown(page), light);
   assert.equal(await compiled(), one, "that of light is still there");
   assert.deepEqual(page.faults, []);
 });

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import http from "node:http";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { LONGEST, SCENE, Studio, decoded, finished, launch, open, revision, settled, shown, showsRendered } from "./studio.mjs";
+import { LONGEST, SCENE, Studio, decoded, finished, launch, open, revision, same, settled, shown, showsRendered } from "./studio.mjs";
 
 let browser;
 let studio;
@@ -68,7 +68,7 @@ test("a broken shader shows file and line and keeps the picture, a mended one re
   assert.match(await text(page, "#problems pre"), /\^\^\^\^\^\^/);
   assert.match(await page.title(), /^✗/);
   await page.waitForTimeout(500);
-  assert.deepEqual(await shown(page), seen);
+  same(await shown(page), seen);
   studio.mendShader();
   await page.locator("#problems h2").waitFor({ state: "detached" });
   await showsRendered(page, studio);
@@ -101,7 +101,7 @@ test("drags move the camera, and saving writes what the page shows", async () =>
   await page.click("#save");
   await page.locator("#notice", { hasText: "camera saved into scene.toml" }).waitFor();
   await page.locator("#save:disabled").waitFor();
-  assert.deepEqual(await decoded(page, studio.render()), seen);
+  same(await decoded(page, studio.render()), seen);
   const saved = studio.read("scene.toml");
   for (const kept of ["# a small scene\n", "[camera] # from the front\n", "] # a comment\n"]) {
     assert.ok(saved.includes(kept), saved);
@@ -166,7 +166,7 @@ test("the views show what they say, the GPU agrees with the CPU", async () => {
   }
   await page.getByLabel("Compare", { exact: true }).check();
   await page.locator("#differing", { hasText: /^0 pixels differ: all bits are the same$/ }).waitFor();
-  assert.deepEqual(await shown(page, "first"), await shown(page, "second"));
+  same(await shown(page, "first"), await shown(page, "second"));
   const captions = await page.locator("figure:not([hidden]) figcaption").allInnerTexts();
   assert.deepEqual(captions, ["GPU", "CPU", "Difference × 256"]);
   assert.match((await shown(page, "difference"))[2], /^[0,]+$/);
@@ -184,14 +184,14 @@ test("the views show what they say, the GPU agrees with the CPU", async () => {
 
 test("a second viewer sees the same, and what the first does", async () => {
   const [first, second] = [await open(browser, studio), await open(browser, studio)];
-  assert.deepEqual(await shown(second), await shown(first));
+  same(await shown(second), await shown(first));
   const old = await revision(second);
   await drag(first, 80, 10);
   await finished(second, old);
   await second.locator("#moved").waitFor();
   await settled(second, await settled(first));
   assert.equal(await text(second, "#camera-text"), await text(first, "#camera-text"));
-  assert.deepEqual(await shown(second), await shown(first));
+  same(await shown(second), await shown(first));
 });
 
 test("the page comes back when the program does", async () => {
@@ -318,7 +318,7 @@ test("all mistakes are shown at once, those of kernels that are not used now too
   const problem = (words) => page.locator("#problems article", { hasText: words }).waitFor();
   for (const words of ["simple", "(4, 4)", "must be called `first_hits`", "`moments.xyz` of type `vec3<f32>`"]) await problem(words);
   assert.equal(await page.locator("#problems article").count(), 4);
-  assert.deepEqual(await shown(page), seen);
+  same(await shown(page), seen);
   // The session goes on.
   const old = await revision(page);
   await page.locator("[data-part=picture] canvas").focus();

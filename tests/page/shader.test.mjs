@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { Studio, launch, open, settled, shown } from "./studio.mjs";
+import { Studio, launch, open, same, settled, shown } from "./studio.mjs";
 
 const KERNEL = "shaders/kernels/render.wgsl";
 const PLACE = "let place = vec2f(pixel) + at.xy;\n    var ray";
@@ -48,11 +48,11 @@ test("a slider changes the picture without the compiler, and is written into the
   await page.locator("#write-sliders:disabled").waitFor();
   assert.equal(studio.read(KERNEL), before.replace("f32 = 0.5", "f32 = 0.25"));
   await settled(page);
-  assert.deepEqual(await shown(page), quarter);
+  same(await shown(page), quarter);
   await page.click("#undo-sliders");
   await page.waitForFunction(() => document.querySelector("#sliders input[type=range]").value === "0.5");
   await settled(page);
-  assert.deepEqual(await shown(page), first);
+  same(await shown(page), first);
   assert.equal(await compiled(page), time, "nothing was compiled");
   // A colour: what is chosen is seen, and taken back.
   await page.getByRole("spinbutton", { name: "tint, green" }).fill("0");
@@ -62,7 +62,7 @@ test("a slider changes the picture without the compiler, and is written into the
   assert.ok(green.every((value) => value === "0"));
   await page.click("#reset-sliders");
   await settled(page);
-  assert.deepEqual(await shown(page), first);
+  same(await shown(page), first);
   assert.deepEqual(page.faults, []);
 });
 

@@ -144,7 +144,7 @@ export class Studio {
   }
 
   async stop() {
-    if (this.program?.exitCode === null) {
+    if (this.program?.exitCode === null && this.program.signalCode === null) {
       const ended = new Promise((resolve) => this.program.on("exit", resolve));
       this.program.kill("SIGKILL");
       await ended;
@@ -245,6 +245,15 @@ export function decoded(page, png) {
   }, png);
 }
 
+// Fails if two pictures are not the same, in few words.
+export function same(seen, wanted, what = "the pictures differ") {
+  if (String(seen) === String(wanted)) return;
+  const [a, b] = [seen, wanted].map(([, , bytes]) => bytes.split(","));
+  const places = [...a.keys()].filter((i) => a[i] !== b[i]);
+  const [first] = places;
+  assert.fail(`${what}: ${seen.slice(0, 2)} and ${wanted.slice(0, 2)} pixels, ${places.length} bytes differ, the first at ${first}: ${a[first]} and ${b[first]}`);
+}
+
 // Waits until the page shows the picture that `wgray render` makes.
 export async function showsRendered(page, studio) {
   const wanted = await decoded(page, studio.render());
@@ -256,6 +265,5 @@ export async function showsRendered(page, studio) {
     if (String(seen) === String(wanted)) return;
     await page.waitForTimeout(50);
   } while (Date.now() < deadline);
-  const differing = seen[2].split(",").filter((value, i) => value !== wanted[2].split(",")[i]).length;
-  assert.fail(`the page shows ${seen[0]} x ${seen[1]} with ${differing} bytes that differ from the rendered picture`);
+  same(seen, wanted, "the page shows another picture than is rendered");
 }

@@ -201,6 +201,38 @@ fn small() -> Seen {
 }
 
 #[test]
+fn counts_of_cells_are_squares() {
+    let squares = |more: &str| {
+        let text = format!(
+            "image = {{ width = 4, height = 4 }}\n[camera]\nposition = [0, 1, 0]\nlook_at = [0, 0, 0]\nfov = 40\n{more}"
+        );
+        let object = seen(&text, Path::new("s.toml"), Overrides::default()).object("render", None);
+        let fields = object.groups[0].fields.iter();
+        fields
+            .filter(|field| field.squares)
+            .map(|field| field.name.clone())
+            .collect::<Vec<_>>()
+    };
+    let (pixel, light) = ("pixel_samples.count", "light_samples.count");
+    assert_eq!(
+        squares("[render]\npixel_samples = { count = 4 }\nlight_samples = { count = 4 }"),
+        [pixel, light]
+    );
+    assert_eq!(
+        squares(
+            "[render]\npixel_samples = { pattern = 'halton', count = 5 }\nlight_samples = { pattern = 'jittered', count = 4 }"
+        ),
+        [light]
+    );
+    let path = "[render]\nintegrator = 'path'\n";
+    assert!(squares(&format!("{path}pixel_samples = {{ count = 5 }}")).is_empty());
+    assert_eq!(
+        squares(&format!("{path}pixel_samples = {{ pattern = 'grid', count = 4 }}")),
+        [pixel]
+    );
+}
+
+#[test]
 fn other_layouts_can_be_set_too() {
     assert!(set_all(&small()) > 60);
     // The control of the comparisons: another value, and another place, are told apart.

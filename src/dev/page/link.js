@@ -2,12 +2,12 @@
 
 const RETRY = 500; // milliseconds
 const ANSWER = 2000; // milliseconds in which a program that is there answers
+const ANSWERS = ["asked", "refused", "pixel", "object", "objects"]; // the names of messages that answer
 const listeners = { state: [], frame: [], link: [], refused: [] };
 const named = new Map(); // who listens to other messages, by their names
 let socket = null;
 let state = null;
-let answers = []; // resolve the commands that have no number yet, in order
-let pixels = []; // and the questions for pixels
+let answers = []; // what waits for an answer, {isCommand, resolve}: they come in the order of what was asked
 let asked = 0; // the number of the last command that has one
 let [received, drawn] = [0, 0]; // numbers of frames, so that a late one is not shown after a newer
 
@@ -22,27 +22,24 @@ export const onMessage = (name, f) => named.set(name, [...(named.get(name) ?? []
 const tell = (name, ...values) => listeners[name].forEach((f) => f(...values));
 const isOpen = () => socket?.readyState === WebSocket.OPEN;
 
-// Asks for something; resolves to the command's number, or to null if it was refused or nobody is there.
-export function ask(command) {
+// Resolves to the answer, or to null if it was refused or nobody is there.
+function send(message, isCommand) {
   if (!isOpen()) return Promise.resolve(null);
-  socket.send(JSON.stringify(command));
-  return new Promise((resolve) => answers.push(resolve));
+  socket.send(JSON.stringify(message));
+  return new Promise((resolve) => answers.push({ isCommand, resolve }));
 }
 
-// Sends a question that is no command: what comes of it is a message.
-export function put(question) {
-  if (isOpen()) socket.send(JSON.stringify(question));
-}
+// Asks for something; resolves to the command's number.
+export const ask = (command) => send(command, true);
 
-// What is known of a pixel: {x, y, values}, or null if nobody is there.
-export function askPixel(pixel) {
-  if (!isOpen()) return Promise.resolve(null);
-  socket.send(JSON.stringify({ pixel }));
-  return new Promise((resolve) => pixels.push(resolve));
-}
+// Asks a question that changes nothing. What comes of it goes to those who listen for messages too.
+export const put = (question) => send(question, false);
+
+// What is known of a pixel: {x, y, values}.
+export const askPixel = (pixel) => put({ pixel });
 
 // Whether the program has followed all that was asked for here: what is older than a choice must not undo it.
-export const isHeard = () => answers.length === 0 && state !== null && state.heard >= asked;
+export const isHeard = () => !answers.some(({ isCommand }) => isCommand) && state !== null && state.heard >= asked;
 export const lastState = () => state;
 
 export function connect() {
@@ -55,8 +52,8 @@ export function connect() {
   };
   socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : showFrame(data));
   socket.onclose = async () => {
-    for (const resolve of [...answers, ...pixels]) resolve(null);
-    [answers, pixels] = [[], []];
+    for (const { resolve } of answers) resolve(null);
+    answers = [];
     tell("link", false, !isIn && (await isServed()));
     setTimeout(connect, RETRY);
   };
@@ -75,17 +72,17 @@ function hear(message) {
   if (message.state) {
     state = message.state;
     tell("state", state, isHeard());
-  } else if (message.pixel) {
-    pixels.shift()?.(message.pixel);
-  } else if (message.asked !== undefined || message.refused !== undefined) {
-    const resolve = answers.shift();
-    asked = message.asked ?? asked;
-    if (message.refused !== undefined) tell("refused", message.refused);
-    resolve?.(message.asked ?? null);
-    if (state && isHeard()) tell("state", state, true);
-  } else {
-    for (const [name, value] of Object.entries(message)) named.get(name)?.forEach((f) => f(value));
+    return;
   }
+  const [[name, value]] = Object.entries(message);
+  if (ANSWERS.includes(name)) {
+    const { isCommand, resolve } = answers.shift();
+    if (name === "asked") asked = value;
+    if (name === "refused") tell("refused", value);
+    resolve(name === "refused" ? null : value);
+    if (isCommand && isHeard()) tell("state", state, true);
+  }
+  named.get(name)?.forEach((f) => f(value));
 }
 
 // A frame: the length of its header, the header as JSON, and the PNG files that it counts.

@@ -11,9 +11,10 @@ let typing = null; // the box with a number that is half typed: there is never m
 export const digits = (x, count) => Number(x.toPrecision(count));
 export const say = (x) => (x === undefined || x === null ? "" : String(x));
 
-// The nearest number that a field may have. Out of a gap it goes on in the direction in which it came.
-export function fit({ kind, range, gap }, x, from) {
+// The nearest number that a field may have. Out of a gap, and from square to square, it goes on in the direction in which it came.
+export function fit({ kind, range, gap, squares }, x, from) {
   let found = kind === "whole" ? Math.round(x) : digits(x, 12);
+  if (squares) found = (x < from ? Math.floor : Math.ceil)(Math.sqrt(Math.max(found, 0))) ** 2;
   if (gap && found > gap[0] && found < gap[1]) found = x < from ? gap[0] : gap[1];
   if (range) found = Math.min(Math.max(found, range[0]), range[1]);
   return found;
@@ -100,7 +101,7 @@ function steppable(box, field, numbers, use) {
     }
     press.moved += (event.clientX - press.at) * press.size * (event.shiftKey ? FINE : 1);
     press.at = event.clientX;
-    show(press.from + press.moved, now());
+    show(press.from + press.moved, press.from);
   });
   const end = () => {
     window.removeEventListener("keydown", giveUp, true);

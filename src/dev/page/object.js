@@ -40,7 +40,6 @@ function again() {
 }
 
 export function setUpObject() {
-  element("object-groups").tabIndex = -1; // the focus of what goes falls here
   const find = element("object-find");
   let timer = 0;
   const list = () => put({ objects: find.value });
@@ -136,7 +135,7 @@ function showObject(object) {
   stale = held !== null; // no control goes or comes while one is moved
   groups = keep(groups, object.groups, ({ name }) => name, groupOf);
   for (const group of object.groups) groups.get(group.name).show(group, object.file);
-  if (!stale) place(element("object-groups"), [element("object-groups"), [...groups.values()].map(({ item }) => item)]);
+  if (!stale) place([element("object-groups"), [...groups.values()].map(({ item }) => item)]);
 }
 
 // A table: its lines, the values that are there, and those that are not.
@@ -160,14 +159,14 @@ function groupOf({ name }) {
     absent.hidden = !missing.length;
     count.textContent = `${missing.length} not in the file`;
     if (missing.some((row) => row.contains(document.activeElement))) absent.open = true; // it goes there, and stays in sight
-    place(element("object-groups"), [there, itemsOf(false)], [absent, [count, ...missing]]);
+    place([there, itemsOf(false)], [absent, [count, ...missing]]);
   };
   return { item, show };
 }
 
 // What makes it another control.
-const keyOf = ({ path, kind, length, unit, range, gap, fixed, slider, about }) =>
-  JSON.stringify([path, kind, length, unit, range, gap, fixed, Boolean(slider), about]);
+const keyOf = ({ path, kind, length, unit, range, gap, squares, fixed, slider, about }) =>
+  JSON.stringify([path, kind, length, unit, range, gap, squares, fixed, Boolean(slider), about]);
 
 function showLines(pre, { line, text, more }, file) {
   pre.hidden = !line;
@@ -262,8 +261,19 @@ function pairOf(field, label, slider, change) {
   const box = numberBox(field, label);
   let now;
   const range = slider ? make("input", { type: "range" }) : null;
-  const placeOf = (x) => (slider.logarithmic ? (STEPS * Math.log(x / slider.from)) / Math.log(slider.to / slider.from) : x);
-  const number = (at) => (slider.logarithmic ? digits(slider.from * (slider.to / slider.from) ** (at / STEPS), 3) : at);
+  // Of squares it goes over the roots.
+  const placeOf = (x) => {
+    if (field.squares) return Math.sqrt(x);
+    return slider.logarithmic ? (STEPS * Math.log(x / slider.from)) / Math.log(slider.to / slider.from) : x;
+  };
+  const number = (at) => {
+    if (field.squares) return at * at;
+    return slider.logarithmic ? digits(slider.from * (slider.to / slider.from) ** (at / STEPS), 3) : at;
+  };
+  const ends = () => {
+    if (field.squares) return [Math.ceil(Math.sqrt(slider.from)), Math.floor(Math.sqrt(slider.to)), 1];
+    return slider.logarithmic ? [0, STEPS, 1] : [slider.from, slider.to, slider.step];
+  };
   const take = (x) => {
     now = x;
     if (!range) return;
@@ -289,7 +299,7 @@ function pairOf(field, label, slider, change) {
     show(x);
     slider = next ?? slider;
     if (range) {
-      const [low, high, step] = slider.logarithmic ? [0, STEPS, 1] : [slider.from, slider.to, slider.step];
+      const [low, high, step] = ends();
       Object.assign(range, { min: say(low), max: say(high), step: say(step) });
     }
     take(x);

@@ -3,6 +3,7 @@
 import { setUpCamera } from "/camera.js";
 import { setUpCompare } from "/compare.js";
 import { editorLink } from "/editor.js";
+import { setUpFocus } from "/focus.js";
 import { connect, element, isHeard, lastState, onFrame, onLink, onRefused, onState } from "/link.js";
 import { select, setUpObject } from "/object.js";
 import { Picture } from "/picture.js";
@@ -34,6 +35,7 @@ setUpShader();
 setUpTimes();
 setUpObject();
 setUpTouch();
+setUpFocus();
 picture.clicked = select;
 
 onLink((there, full) => {

@@ -16,9 +16,9 @@ export function keep(known, items, keyOf, makeOne) {
   }));
 }
 
-// Gives parents the children that they are to have, each as [parent, children]. What stays is not touched; the focus of what goes
-// falls to `home`, and what is half typed there is dropped.
-export function place(home, ...lists) {
+// Gives parents the children that they are to have, each as [parent, children]. What stays is not touched; what is half typed in
+// what goes is dropped.
+export function place(...lists) {
   const focus = document.activeElement;
   const all = new Set(lists.flatMap(([, children]) => children));
   for (const gone of lists.flatMap(([parent]) => [...parent.children]).filter((child) => !all.has(child))) {
@@ -34,9 +34,7 @@ export function place(home, ...lists) {
       else move(parent, child, next);
     }
   }
-  if (focus === document.activeElement || focus === document.body) return;
-  if (focus.isConnected) focus.focus({ preventScroll: true });
-  else home.focus({ preventScroll: true });
+  if (focus.isConnected && focus !== document.activeElement) focus.focus({ preventScroll: true });
 }
 
 function move(parent, child, before) {

@@ -54,11 +54,13 @@ export class Picture {
   arrange(layout) {
     this.layout = layout;
     const alone = { wipe: "first", flicker: "first", difference: "difference" }[layout];
+    const focused = this.panels.find((panel) => panel.canvas === document.activeElement);
     for (const panel of this.panels) {
       const compared = panel.part !== "picture";
       panel.figure.hidden = !panel.image || (compared && alone !== undefined && panel.part !== alone);
       if (compared) panel.caption(this.#caption(panel.part));
     }
+    if (focused?.figure.hidden) this.#visible()?.canvas.focus({ preventScroll: true });
     const wipes = layout === "wipe" && Boolean(this.#part("second")?.image);
     document.getElementById("wipe").hidden = !wipes;
     this.#schedule();

@@ -17,11 +17,10 @@ export function setUpShader() {
   element("write-sliders").addEventListener("click", () => ask("write_sliders"));
   element("undo-sliders").addEventListener("click", () => ask("undo_sliders"));
   element("reset-sliders").addEventListener("click", () => ask("reset_sliders"));
-  element("sliders").tabIndex = -1; // the focus of what goes falls here
   onState((state, heard) => {
     rows = keep(rows, state.sliders, rowKey, rowOf);
     for (const slider of state.sliders) rows.get(rowKey(slider)).show(slider, state, heard && !underWay);
-    place(element("sliders"), [element("sliders"), [...rows.values()].map(({ item }) => item)]);
+    place([element("sliders"), [...rows.values()].map(({ item }) => item)]);
     const moved = state.sliders.some(isMoved);
     element("write-sliders").disabled = !moved || !state.shaders;
     element("reset-sliders").disabled = !moved;

@@ -91,11 +91,17 @@ impl Painter {
         let (Some(loaded), Some(shaders)) = (&self.loaded, self.sliders.as_written()) else {
             return Ok(());
         };
-        let refused = check_kernels(&loaded.packed, &shaders, Forms::Buffers).err();
-        let first = refused.and_then(|errors| errors.0.into_iter().next());
-        first.map_or(Ok(()), |error| {
+        let first = |shaders: &Shaders| {
+            let refused = check_kernels(&loaded.packed, shaders, Forms::Buffers).err();
+            refused.and_then(|errors| errors.0.into_iter().next())
+        };
+        first(&shaders).map_or(Ok(()), |error| {
+            let why = match self.sliders.files().and_then(|files| first(files)) {
+                None => "with these values the shaders would be wrong",
+                Some(_) => "the shaders are wrong by themselves",
+            };
             Err(format!(
-                "with these values the shaders would be wrong, and stay as they are: {}: {}",
+                "{why}, and stay as they are: {}: {}",
                 error.place, error.message
             ))
         })

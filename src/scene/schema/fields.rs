@@ -37,6 +37,9 @@ pub struct Field {
     /// Between these, the ends left out, it may not be.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<(f64, f64)>,
+    /// Whether it must be the square of a whole number.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub squares: bool,
     /// A smaller range, around what it is; of a colour that shines around its strength, the largest of its numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slider: Option<Slider>,
@@ -351,6 +354,7 @@ impl Found<'_> {
             unit,
             range,
             gap,
+            squares: false,
             slider,
             choices,
             about: place.about.to_owned(),
