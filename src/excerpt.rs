@@ -8,6 +8,7 @@ const WIDTH: usize = 160;
 const BEFORE: usize = 60;
 
 /// A line with its number, counted from 1; of a long one the beginning.
+#[cfg(feature = "dev")]
 pub fn numbered(number: usize, line: &str) -> String {
     let (part, _) = window(line, 0);
     format!("{number:>5} | {part}").trim_end().to_string()
@@ -41,10 +42,17 @@ fn window(line: &str, place: usize) -> (String, usize) {
 mod tests {
     use super::*;
 
+    #[cfg(feature = "dev")]
     #[test]
-    fn short_lines_are_whole() {
+    fn lines_without_a_place_begin_at_their_beginning() {
         assert_eq!(numbered(7, "a = b"), "    7 | a = b");
         assert_eq!(numbered(7, ""), "    7 |");
+        let long = numbered(1, &"ab".repeat(5000));
+        assert!(long.starts_with("    1 | abab") && long.ends_with('…') && long.chars().count() == 8 + WIDTH);
+    }
+
+    #[test]
+    fn short_lines_are_whole() {
         assert_eq!(marked(12, "a = é c", 4, 1), "   12 | a = é c\n      |     ^");
         assert_eq!(marked(1, "ab", 2, 1), "    1 | ab\n      |   ^", "behind the last");
         assert_eq!(marked(1, "ab", 0, 99), "    1 | ab\n      | ^^");
@@ -72,6 +80,5 @@ mod tests {
             assert_eq!(shown.starts_with('…'), place > BEFORE, "{place}");
             assert_eq!(shown.ends_with('…'), place < 5000 - WIDTH + BEFORE, "{place}");
         }
-        assert!(numbered(1, &line).ends_with("…") && numbered(1, &line).chars().count() == 8 + WIDTH);
     }
 }

@@ -75,6 +75,7 @@ pub mod dev;
 #[doc(hidden)]
 pub mod device;
 pub mod error;
+#[cfg(feature = "gpu")]
 mod excerpt;
 pub mod film;
 mod gltf;

@@ -96,7 +96,7 @@ impl Painter {
             refused.and_then(|errors| errors.0.into_iter().next())
         };
         first(&shaders).map_or(Ok(()), |error| {
-            let why = match self.sliders.files().and_then(|files| first(files)) {
+            let why = match self.sliders.files().and_then(first) {
                 None => "with these values the shaders would be wrong",
                 Some(_) => "the shaders are wrong by themselves",
             };
