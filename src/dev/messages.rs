@@ -231,7 +231,7 @@ pub struct Notice {
     pub number: u64,
     /// Which command it answers, counted as [`State::heard`] does.
     pub command: u64,
-    /// What is said.
+    /// What is said; nothing where what was said before holds no more.
     pub text: String,
     /// Whether it is bad.
     pub bad: bool,

@@ -3,7 +3,8 @@
 use std::fs;
 use std::io::Write;
 use std::path::Path;
-use std::time::Duration;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
 use toml::Value;
 
@@ -13,6 +14,8 @@ use crate::scene::{CameraDescription, Description, KeyPath, Segment};
 
 /// Nobody takes so long from the first byte of a file to the last.
 const SAVING: Duration = Duration::from_millis(100);
+/// So long somebody else's save is waited for.
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Replaces a file in one step: whoever reads it sees the old content or the new.
 pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
@@ -32,17 +35,27 @@ pub fn replace_known(path: &Path, known: &[u8], content: &[u8]) -> std::io::Resu
     Ok(())
 }
 
-/// Refuses a file that somebody has changed so shortly ago that there may be more to come: that would go into the file that was
+/// Waits while somebody has changed a file so shortly ago that there may be more to come: that would go into the file that was
 /// replaced, and be lost.
-pub fn check_settled(path: &Path) -> Result<(), String> {
-    let changed = fs::metadata(path).and_then(|data| data.modified()).ok();
-    let age = changed.and_then(|changed| changed.elapsed().ok());
-    match age.is_some_and(|age| age < SAVING) {
-        true => Err(format!(
-            "{}: is being saved by somebody else; nothing is written into it",
-            path.display()
-        )),
-        false => Ok(()),
+///
+/// # Errors
+///
+/// It goes on for too long.
+pub fn wait_settled(path: &Path) -> Result<(), String> {
+    let start = Instant::now();
+    loop {
+        let changed = fs::metadata(path).and_then(|data| data.modified()).ok();
+        let age = changed.and_then(|changed| changed.elapsed().ok());
+        match age.and_then(|age| SAVING.checked_sub(age)) {
+            Some(rest) if start.elapsed() < PATIENCE => sleep(rest.max(Duration::from_millis(1))),
+            Some(_) => {
+                return Err(format!(
+                    "{}: is being saved by somebody else; nothing is written into it",
+                    path.display()
+                ));
+            }
+            None => return Ok(()),
+        }
     }
 }
 
@@ -95,6 +108,9 @@ pub fn with_camera(text: &str, origin: &str, camera: &CameraDescription) -> Resu
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+    use std::time::SystemTime;
+
     use super::*;
 
     const SCENE: &str = "# a scene\n[image]\nwidth = 4 # wide\nheight = 4\n\n[camera] # the view\nfov=45   # degrees\n\
@@ -173,15 +189,32 @@ mod tests {
         replace_known(&file, b"theirs", b"ours").unwrap();
         assert_eq!(fs::read_to_string(&file).unwrap(), "ours");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-        // What was changed just now may not be whole.
-        assert!(check_settled(&file).unwrap_err().contains("s.toml: is being saved"));
-        let long_ago = std::time::SystemTime::now() - 2 * SAVING;
-        fs::File::options()
-            .write(true)
-            .open(&file)
-            .and_then(|file| file.set_modified(long_ago))
-            .unwrap();
-        check_settled(&file).unwrap();
+        // What was changed just now may not be whole; what goes on being changed is given up.
+        let changed = |ago: Duration| {
+            let file = fs::File::options().write(true).open(&file).unwrap();
+            file.set_modified(SystemTime::now() - ago).unwrap();
+        };
+        for (ago, waits) in [(2 * SAVING, false), (SAVING / 4, true)] {
+            changed(ago);
+            let start = Instant::now();
+            wait_settled(&file).unwrap();
+            assert_eq!(start.elapsed() > SAVING / 2, waits, "{ago:?}");
+        }
+        changed(Duration::ZERO);
+        let is_done = AtomicBool::new(false);
+        let error = std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !is_done.load(Relaxed) {
+                    changed(Duration::ZERO);
+                    sleep(Duration::from_millis(1));
+                }
+            });
+            // On a busy machine the file may rest for once.
+            let error = (0..10).find_map(|_| wait_settled(&file).err());
+            is_done.store(true, Relaxed);
+            error.unwrap()
+        });
+        assert!(error.contains("s.toml: is being saved"), "{error}");
     }
 
     #[test]

@@ -108,6 +108,31 @@ impl Slider {
         }
     }
 
+    /// A value that is asked for, as a constant of its type has it.
+    ///
+    /// # Errors
+    ///
+    /// The rule that it breaks.
+    pub fn checked(&self, value: Value) -> Result<Value, String> {
+        let rounded = self.rounded(value).ok_or("cannot have a value of this kind")?;
+        let plain = |x: f64| format!("{x:?}").trim_end_matches(".0").to_owned();
+        let is_whole = matches!(self.kind, Kind::I32 | Kind::U32);
+        match (value, rounded) {
+            (Value::Number(x), _) if is_whole && x.fract() != 0.0 => {
+                Err(format!("{} must be a whole number", plain(x)))
+            }
+            // What is asked for has fewer digits than the ends have.
+            (Value::Number(x), Value::Number(y))
+                if (x - y).abs() > 1e-6 * y.abs().max(f64::from(f32::MIN_POSITIVE)) =>
+            {
+                let (min, max) = (self.short(self.min), self.short(self.max));
+                Err(format!("{} must be from {min} to {max}", plain(x)))
+            }
+            (Value::Color(c), _) if c.iter().any(|x| *x < 0.0) => Err(format!("{c:?} must not be negative")),
+            _ => Ok(rounded),
+        }
+    }
+
     /// A value's bits, as a kernel reads it.
     pub fn bits(&self, value: Value) -> [u32; 4] {
         match (self.kind, value) {
@@ -459,6 +484,26 @@ mod tests {
 
     fn read(text: &str) -> Marks {
         Marks::of_file("a.wgsl", text)
+    }
+
+    #[test]
+    fn what_a_slider_cannot_have_is_refused() {
+        let text = "const a: f32 = 0.5; // slider 0.3..0.7\nconst n: i32 = -3; // slider -5..5\n\
+            const c: vec3f = vec3f(0.5, .25, 1f); // color";
+        let [a, n, c] = read(text).sliders.try_into().unwrap();
+        for x in [0.3, 0.7, 0.5, f64::from(0.3f32), f64::from(0.7f32)] {
+            assert_eq!(a.checked(Value::Number(x)).map(|_| ()), Ok(()), "{x}");
+        }
+        let told = |slider: &Slider, value: Value| slider.checked(value).unwrap_err();
+        assert_eq!(told(&a, Value::Number(0.29999)), "0.29999 must be from 0.3 to 0.7");
+        assert_eq!(told(&a, Value::Number(-1e300)), "-1e300 must be from 0.3 to 0.7");
+        assert_eq!(n.checked(Value::Number(-5.0)), Ok(Value::Number(-5.0)));
+        assert_eq!(told(&n, Value::Number(0.1)), "0.1 must be a whole number");
+        assert_eq!(told(&n, Value::Number(6.0)), "6 must be from -5 to 5");
+        assert_eq!(told(&n, Value::Bool(true)), "cannot have a value of this kind");
+        let color = Value::Color([0.0, 2.0, 1e30]);
+        assert!(c.checked(color).is_ok());
+        assert!(told(&c, Value::Color([0.0, -1e-9, 0.0])).contains("must not be negative"));
     }
 
     #[test]

@@ -346,10 +346,24 @@ test("a count of cells goes from square to square", async () => {
   await count(9);
   await settled(page);
   assert.deepEqual((await sent()).map((text) => JSON.parse(text).set.value), [9]);
-  // What is typed is what is asked for, and the rule is told.
+  await field.focus();
+  await page.keyboard.press("PageUp");
+  await count(169); // ten squares further
+  // What is typed is what is asked for, and the rule is told, until a right one is.
+  const told = page.locator('[data-path="render.pixel_samples.count"] [role=alert]', { hasText: "square" });
   await field.fill("5");
   await page.keyboard.press("Enter");
-  await page.locator('[data-path="render.pixel_samples.count"] [role=alert]', { hasText: "square" }).waitFor();
+  await told.waitFor();
+  await page.locator("#notice.bad", { hasText: "square" }).waitFor();
+  await field.fill("9");
+  await page.keyboard.press("Enter");
+  await told.waitFor({ state: "hidden" });
+  await page.locator("#notice").waitFor({ state: "hidden" });
+  await count(9);
+  await page.locator("#most-samples").fill("1.5");
+  await page.keyboard.press("Enter");
+  await page.locator("#notice.bad", { hasText: "1.5 must be a whole number" }).waitFor();
+  assert.equal(await page.locator("#most-samples").inputValue(), "");
   // Of another pattern any number is one.
   await box(page, "render.pixel_samples.pattern").selectOption("sobol");
   await written('pattern = "sobol", count = 9');
@@ -402,6 +416,12 @@ test("the focus of what goes off stays near, and comes back with it", async () =
     await page.locator("#badge.live").waitFor({ state: "attached" });
     assert.ok(await isFocused(page.locator(wanted)), wanted);
   }
+  // The button that opens a file is scrolled to where its section is, and no more.
+  await page.evaluate(() => document.querySelectorAll("aside details").forEach((details) => (details.open = true)));
+  await page.locator("#reference-file").focus();
+  assert.equal(await page.evaluate(() => scrollY), 0);
+  const button = await page.locator("label[for=reference-file]").boundingBox();
+  assert.ok(button.y >= 0 && button.y + button.height <= 800, `${button.y}`);
   // Who clicks beside all of it has no focus, whatever goes off then.
   await page.locator("#restart").focus();
   await page.locator("h1").click();

@@ -261,3 +261,51 @@ test("one slider makes a light stronger and weaker, and its tint stays", async (
   assert.equal(await box(page, "materials.red.color", 4).count(), 0);
   assert.deepEqual(page.faults, []);
 });
+
+test("what others change of a vector while one of its numbers is dragged stays", async () => {
+  const page = await open(browser, studio);
+  await choose(page, "shapes[0]");
+  const x = box(page, "shapes[0].center");
+  await x.scrollIntoViewIfNeeded();
+  const area = await x.boundingBox();
+  const at = [area.x + area.width / 2, area.y + area.height / 2];
+  const drag = async (dx) => {
+    await page.mouse.move(at[0], at[1]);
+    await page.mouse.down();
+    await page.mouse.move(at[0] + dx, at[1]);
+  };
+  await drag(20);
+  await holds("center = [0.02, 0, 0.5]");
+  studio.edit("scene.toml", "center = [0.02, 0, 0.5]", "center = [0.02, 0.25, 0.75]");
+  await page.mouse.move(at[0] + 40, at[1]);
+  await page.mouse.up();
+  await holds("center = [0.04, 0.25, 0.75]");
+  // Given up, too.
+  await settled(page);
+  await drag(20);
+  await holds("center = [0.06, 0.25, 0.75]");
+  studio.edit("scene.toml", "center = [0.06, 0.25, 0.75]", "center = [0.06, 0.5, 0.75]");
+  await page.keyboard.press("Escape");
+  await page.mouse.up();
+  await holds("center = [0.04, 0.5, 0.75]");
+  await settled(page);
+  // Of quick hands every number counts, as a step of its own.
+  const notes = await page.evaluate(() => {
+    const boxes = [0, 1, 2].map((i) => document.querySelector(`[data-control="shapes[0].center ${i}"]`));
+    boxes.forEach((box, i) => {
+      box.focus();
+      box.value = String(i + 1);
+      box.dispatchEvent(new Event("input", { bubbles: true }));
+      box.dispatchEvent(new Event("change", { bubbles: true }));
+    });
+    return document.querySelectorAll("[data-path] [role=alert]:not([hidden])").length;
+  });
+  assert.equal(notes, 0);
+  await holds("center = [1, 2, 3]");
+  for (const center of ["[1, 2, 0.75]", "[1, 0.5, 0.75]", "[0.04, 0.5, 0.75]"]) {
+    await settled(page);
+    await page.click("#undo-write");
+    await holds(`center = ${center}`);
+  }
+  assert.deepEqual(page.faults, []);
+});

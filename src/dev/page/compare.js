@@ -40,6 +40,7 @@ export function setUpCompare(picture, onKey, showNotice) {
     try {
       const answer = await fetch(`/reference/${encodeURIComponent(file.name)}`, { method: "POST", body: file });
       if (!answer.ok) throw new Error((await answer.text()) || `${answer.status} ${answer.statusText}`);
+      showNotice("");
       document.querySelector("input[name=against][value=reference]").checked = true;
       choose("compare");
     } catch (error) {

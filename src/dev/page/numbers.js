@@ -20,6 +20,9 @@ export function fit({ kind, range, gap, squares }, x, from) {
   return found;
 }
 
+// The square that is so many squares from a number.
+const square = (x, steps) => Math.max((steps > 0 ? Math.floor : Math.ceil)(Math.sqrt(x)) + steps, 0) ** 2;
+
 // How far a step of a number goes that stands with others in a list: they are of about one size.
 function stepOf({ kind, unit, range, step }, list) {
   if (step) return step;
@@ -80,7 +83,7 @@ function steppable(box, field, numbers, use) {
     event.preventDefault();
     if (!event.repeat || !step) step = stepOf(field, [...numbers(), now()]);
     const way = event.shiftKey && field.kind !== "whole" ? FINE : 1;
-    show(now() + steps * way * step, now());
+    show(field.squares ? square(now(), steps) : now() + steps * way * step, now());
   });
   box.addEventListener("pointerdown", (event) => {
     // In a box that is typed into the pointer belongs to the text.

@@ -17,7 +17,7 @@ let held = null; // the path whose control is being moved
 let [pointer, key] = [false, false]; // whether it is by the pointer, and by a key that is down
 let stale = false; // whether all must be shown anew once it is let go
 let sending = null; // the change that waits for the program
-let waiting = null; // the newest one after it
+let waiting = new Map(); // those after it, of each value and gesture the newest
 
 // Selects what is at a pixel of the picture.
 export function select(pixel) {
@@ -74,7 +74,7 @@ export function setUpObject() {
   }
   onLink(() => {
     scenes = null;
-    [sending, waiting] = [null, null];
+    [sending, waiting] = [null, new Map()];
   });
   onState((state) => {
     for (const [id, what, word] of [["undo-write", state.undo, "Undo"], ["redo-write", state.redo, "Redo"]]) {
@@ -89,20 +89,26 @@ export function setUpObject() {
   });
 }
 
-// One change at a time: the next goes when the last was followed, so that a slider never runs ahead of the file.
-function write(field, value, note) {
-  const change = { path: field.path, value, gesture, note };
-  if (sending) waiting = change;
-  else send(change);
+// Writes a value, or the number `i` of a list: what others do to its other numbers stays. One change goes at a time, the next when
+// the last was followed, so that a slider never runs ahead of the file.
+function write(field, value, i, note) {
+  const isPart = i !== undefined && valueOf(field) !== undefined;
+  const set = { path: isPart ? `${field.path}[${i}]` : field.path, value: isPart ? value[i] : value, gesture };
+  waiting.set(`${set.path} ${gesture}`, { field: field.path, set, note, number: null });
+  if (!sending) send();
 }
 
-async function send({ note, ...set }) {
-  const change = { note, number: null, set };
+async function send() {
+  const [first] = waiting;
+  if (!first) return;
+  const [key, change] = first;
+  waiting.delete(key);
   sending = change;
-  change.number = await ask({ set });
+  change.number = await ask({ set: change.set });
   if (sending !== change) return;
-  if (change.number === null) sending = null; // it was refused, which is told by itself
-  else settle(lastState());
+  if (change.number !== null) return settle(lastState());
+  sending = null; // it was refused, which is told by itself
+  send();
 }
 
 function settle(state) {
@@ -110,9 +116,8 @@ function settle(state) {
   const { number, note } = sending;
   const { command, bad, text } = state.notice ?? {};
   note(command === number && bad ? text : "");
-  const next = waiting;
-  [sending, waiting] = [null, null];
-  if (next) send(next);
+  sending = null;
+  send();
 }
 
 function letGo() {
@@ -123,7 +128,7 @@ function letGo() {
 }
 
 // What is being changed shows what the user wants, and not what the file says yet.
-const isBusy = (path) => path === held || path === sending?.set.path || path === waiting?.path;
+const isBusy = (path) => path === held || [sending, ...waiting.values()].some((change) => change?.field === path);
 
 function showObject(object) {
   // Another may have been asked for since.
@@ -196,7 +201,8 @@ function fieldOf(field) {
     error.hidden = !text;
     item.classList.toggle("invalid", Boolean(text));
   };
-  const change = (value) => write(field, value, note);
+  let newest = field;
+  const change = (value, i) => write(newest, value, i, note);
   const made = { number: numberOf, whole: numberOf, color: colorsOf, vector: vectorOf, choice: choiceOf, switch: switchOf, text: textOf }[field.kind](field, change);
   if (field.fixed) {
     head.append(make("small", { className: "fixed", textContent: field.fixed }));
@@ -234,6 +240,7 @@ function fieldOf(field) {
   item.append(...made.elements, error);
   let isNew = true;
   const show = (next) => {
+    newest = next;
     const isAbsent = next.value === undefined;
     origin.textContent = !isAbsent || next.fixed ? "" : next.default === undefined ? "absent" : "default";
     origin.hidden = !origin.textContent;
@@ -331,10 +338,10 @@ function colorsOf(field, change) {
     parts.show(now);
     change(now);
   });
-  const parts = numbersOf(field, ["red", "green", "blue"].map((name) => `${field.name}, linear ${name}`), (list) => {
+  const parts = numbersOf(field, ["red", "green", "blue"].map((name) => `${field.name}, linear ${name}`), (list, i) => {
     take(list);
     picker.value = hexOf(now);
-    change(now);
+    change(now, i);
   });
   // Light has no natural end: one slider makes it stronger and weaker, and the tint stays.
   const strength = field.slider && pairOf({ ...field, kind: "number" }, `${field.name}, strength`, field.slider, (most) => {
@@ -357,7 +364,7 @@ function colorsOf(field, change) {
   return { inputs: [picker, ...parts.inputs, ...(strength?.inputs ?? [])], elements, update };
 }
 
-// Number boxes for a list.
+// Number boxes for a list: `change(list, i)` takes it with another number at a place.
 function numbersOf(field, labels, change) {
   let now = [];
   const boxes = labels.map((label) => numberBox(field, label));
@@ -365,7 +372,7 @@ function numbersOf(field, labels, change) {
     const use = (x) => {
       now = boxes.map((other, j) => now[j] ?? (Number.isFinite(other.valueAsNumber) ? other.valueAsNumber : 0));
       now[i] = x;
-      change([...now]);
+      change([...now], i);
     };
     return numberField(box, field, () => now, use);
   });

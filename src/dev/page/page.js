@@ -30,7 +30,7 @@ setUpView(picture, onKey);
 setUpCamera(picture, onPictureKey, showNotice);
 setUpCompare(picture, onKey, showNotice);
 setUpProbes(picture, onPictureKey);
-setUpRender(onKey);
+setUpRender(onKey, showNotice);
 setUpShader();
 setUpTimes();
 setUpObject();
@@ -143,8 +143,13 @@ function showProblems(state) {
 }
 
 let noticeTimer = 0;
+// Without a text what was wrong is no longer told.
 function showNotice(text, bad) {
   const notice = element("notice");
+  if (!text) {
+    notice.hidden ||= notice.classList.contains("bad");
+    return;
+  }
   notice.textContent = text;
   notice.classList.toggle("bad", Boolean(bad));
   notice.hidden = false;

@@ -1,16 +1,25 @@
 // How far the picture is: progress, pause, limits, and the picture as a file.
 
-import { ask, element, onFrame, onState } from "/link.js";
+import { ask, element, lastState, onFrame, onState } from "/link.js";
 import { viewName } from "/view.js";
 
-export function setUpRender(onKey) {
+const MOST = 65536; // samples
+
+export function setUpRender(onKey, showNotice) {
   const pause = () => ask({ pause: element("pause").getAttribute("aria-pressed") !== "true" });
   element("pause").addEventListener("click", pause);
   onKey(" ", pause);
   element("restart").addEventListener("click", () => ask("restart"));
   element("most-samples").addEventListener("change", ({ target }) => {
-    const most = Math.floor(target.valueAsNumber);
-    ask({ samples: most >= 1 ? Math.min(most, 65536) : null });
+    const { value, valueAsNumber: most, validity } = target;
+    const isNone = value === "" && !validity.badInput;
+    if (isNone || (Number.isInteger(most) && most >= 1 && most <= MOST)) {
+      showNotice("");
+      ask({ samples: isNone ? null : most });
+    } else {
+      showNotice(`Samples at most: ${value || "this"} must be a whole number from 1 to ${MOST}`, true);
+      target.value = lastState()?.samples[0] ?? "";
+    }
   });
   element("preview").addEventListener("change", ({ target }) => ask({ preview: Number(target.value) }));
   onState((state, heard) => {

@@ -98,6 +98,13 @@ impl Painter {
         });
     }
 
+    /// A value was taken, which is seen: what was wrong with one before is no news any more.
+    pub(super) fn taken(&mut self) {
+        if self.state.notice.as_ref().is_some_and(|notice| notice.bad) {
+            self.notice(&Ok(()), String::new());
+        }
+    }
+
     /// The camera that is looked through, for a scene.
     pub(super) fn packed_camera(&self, loaded: &Loaded) -> Camera {
         let (own, origin) = (loaded.packed.camera, loaded.packed.origin);

@@ -43,8 +43,12 @@ impl Painter {
 
     pub(super) fn slide(&mut self, file: &str, name: &str, value: Value) {
         match self.sliders.slide(file, name, value) {
-            Ok(true) => self.slid(),
-            Ok(false) => {}
+            Ok(is_new) => {
+                self.taken();
+                if is_new {
+                    self.slid();
+                }
+            }
             Err(error) => self.notice(&Err(error), String::new()),
         }
     }

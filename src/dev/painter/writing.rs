@@ -7,14 +7,16 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
+use serde_json::Value as Json;
+
 use super::Painter;
 use crate::dev::edit::edited_in;
 use crate::dev::history::Step;
 use crate::dev::messages::{Report, Set};
 use crate::dev::object::{Seen, object_of};
-use crate::dev::save::{check_settled, replace_known, with_camera};
+use crate::dev::save::{replace_known, wait_settled, with_camera};
 use crate::dev::source::{Loaded, Stamp};
-use crate::scene::{Draft, KeyPath, Segment, cut, folder_of, is_course, is_gltf, read_text};
+use crate::scene::{Draft, Field, KeyPath, Segment, cut, folder_of, is_course, is_gltf, read_text};
 use crate::visible::visible;
 
 impl Painter {
@@ -22,8 +24,9 @@ impl Painter {
     pub(super) fn set(&mut self, set: &Set) {
         // Who looks may send anything, and the terminal shows what is told.
         let result = self.try_set(set).map_err(|why| visible(&why).into_owned());
-        if result.is_err() {
-            self.notice(&result, String::new()); // what is written is seen
+        match &result {
+            Ok(()) => self.taken(),
+            Err(_) => self.notice(&result, String::new()),
         }
         // A slider that is drawn writes many times, and the terminal is told of none but what goes wrong.
         if result.is_err() || set.gesture.is_none() {
@@ -33,20 +36,22 @@ impl Painter {
 
     fn try_set(&mut self, set: &Set) -> Result<(), String> {
         let path: KeyPath = set.path.parse().map_err(|problem| format!("{problem}"))?;
-        let (file, before) = self.scene_file("a value")?;
+        let (file, before) = self.settled_file("a value")?;
         let loaded = self.read_again(&before)?;
         let seen = Seen {
             camera: self.packed_camera(&loaded),
             loaded: Arc::clone(&loaded),
             sources: self.sources.clone(),
         };
-        let (Some(object), Some(field)) = (object_of(&path), seen.field(&path)) else {
+        let whole = || Some((path.clone(), seen.field(&path)?, set.value.clone()));
+        let found = whole().or_else(|| with_element(&seen, &path, &set.value));
+        let (Some(object), Some((path, field, given))) = (object_of(&path), found) else {
             return Err(format!("{path}: is nothing that can be changed"));
         };
-        let value = match (&set.value, &field.fixed) {
+        let value = match (&given, &field.fixed) {
             (_, Some(why)) => Err(why.clone()),
-            (serde_json::Value::Null, None) if field.required => Err("must be there".to_owned()),
-            (serde_json::Value::Null, None) => Ok(None),
+            (Json::Null, None) if field.required => Err("must be there".to_owned()),
+            (Json::Null, None) => Ok(None),
             (given, None) => field.value_of(given, &seen.names()).map(Some),
         };
         let value = value.map_err(|why| format!("{path}: {why}"))?;
@@ -64,7 +69,7 @@ impl Painter {
     }
 
     fn try_save_camera(&mut self) -> Result<(), String> {
-        let (file, before) = self.scene_file("a camera")?;
+        let (file, before) = self.settled_file("a camera")?;
         let loaded = self.read_again(&before)?;
         let camera = self.camera.as_ref().unwrap_or(&loaded.camera);
         let after = with_camera(&before, &self.sources.scene.display().to_string(), camera)?;
@@ -130,6 +135,16 @@ impl Painter {
         Ok((file, text))
     }
 
+    /// The same once nobody else is saving it: what is not known yet may not be whole.
+    fn settled_file(&self, what: &str) -> Result<(PathBuf, String), String> {
+        let (file, text) = self.scene_file(what)?;
+        if self.loaded.as_ref().is_some_and(|loaded| loaded.text == text) {
+            return Ok((file, text));
+        }
+        wait_settled(&self.sources.scene)?;
+        self.scene_file(what)
+    }
+
     /// The scene of a text: that which is known, if nobody has changed the file since.
     fn read_again(&self, text: &str) -> Result<Arc<Loaded>, String> {
         if let Some(loaded) = self.loaded.as_ref().filter(|loaded| loaded.text == text) {
@@ -140,7 +155,6 @@ impl Painter {
         let read = Draft::read(text, &origin, folder, &self.sources.overrides);
         let read = read.and_then(|draft| draft.check(&mut BTreeSet::new()));
         let (scene, description) = read.map_err(|error| format!("mend the file first: {error}"))?;
-        check_settled(&self.sources.scene)?;
         Ok(Arc::new(Loaded::new(text.to_owned(), scene, description)))
     }
 
@@ -195,4 +209,16 @@ impl Painter {
         }
         self.take_scene(Ok(read))
     }
+}
+
+/// For a number of a list the list with that number: its path, what it is, and its value.
+fn with_element(seen: &Seen, path: &KeyPath, given: &Json) -> Option<(KeyPath, Field, Json)> {
+    let (Segment::Index(i), list) = path.0.split_last()? else {
+        return None;
+    };
+    let list = KeyPath(list.to_vec());
+    let field = seen.field(&list)?;
+    let mut numbers = field.value.as_ref().or(field.default.as_ref())?.as_array()?.clone();
+    *numbers.get_mut(*i)? = given.clone();
+    Some((list, field, numbers.into()))
 }
