@@ -170,6 +170,19 @@ test("boxes of numbers are dragged and stepped, and each way is one step back", 
     await settled(page);
   }
   assert.equal(studio.read("scene.toml"), SCENE);
+  // So is one that follows a click at once.
+  await x.evaluate(async (box) => {
+    const fire = (Kind, type, more) => box.dispatchEvent(new Kind(type, { bubbles: true, ...more }));
+    fire(PointerEvent, "pointerdown", { button: 1 });
+    fire(PointerEvent, "pointerup", { button: 1 });
+    fire(KeyboardEvent, "keydown", { key: "ArrowUp" });
+    await new Promise((resolve) => setTimeout(resolve, 50));
+    fire(KeyboardEvent, "keydown", { key: "ArrowUp", repeat: true });
+    fire(KeyboardEvent, "keyup", { key: "ArrowUp" });
+  });
+  await holds("position = [0.2, -4, 1]");
+  await page.click("#undo-write");
+  await holds("position = [0, -4, 1]");
   assert.deepEqual(page.faults, []);
 });
 

@@ -65,10 +65,10 @@ export function setUpObject() {
     event.preventDefault();
     ask(event.shiftKey ? "redo_write" : "undo_write");
   });
-  // However a press ends, and wherever: as a click, as a scroll, in another window.
+  // However a press ends, and wherever: as a click, as a scroll, in another window. A key may be down by then.
   for (const end of ["pointerup", "pointercancel", "blur"]) {
     window.addEventListener(end, () => setTimeout(() => {
-      if (pointer) letGo();
+      if (pointer && !key) letGo();
       pointer = false;
     }));
   }
