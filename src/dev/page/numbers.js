@@ -21,7 +21,7 @@ export function fit({ kind, range, gap, squares }, x, from) {
 }
 
 // The square that is so many squares from a number.
-const square = (x, steps) => Math.max((steps > 0 ? Math.floor : Math.ceil)(Math.sqrt(x)) + steps, 0) ** 2;
+const square = (x, steps) => Math.max((steps > 0 ? Math.floor : Math.ceil)(Math.sqrt(Math.max(x, 0))) + steps, 0) ** 2;
 
 // How far a step of a number goes that stands with others in a list: they are of about one size.
 function stepOf({ kind, unit, range, step }, list) {
