@@ -60,18 +60,18 @@ type Ready<'a> = (Box<dyn Backend + 'a>, DeviceInfo);
 
 /// What is done about a fault of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Remedy {
+pub enum Recovery {
     /// The device is opened anew.
-    Anew,
+    Reopen,
     /// The CPU renders from now on.
     Cpu,
 }
 
 /// What is told of a fault that does not end the work.
-pub type Tell<'a> = Box<dyn FnMut(&RenderError, Remedy) + 'a>;
+pub type Tell<'a> = Box<dyn FnMut(&RenderError, Recovery) + 'a>;
 
 /// Whom a renderer turns to at a fault.
-pub struct OnFault<'a> {
+pub struct FaultHandler<'a> {
     /// Is told of a fault that does not end the work, and what is done about it.
     pub tell: Tell<'a>,
     /// Tells whether to give up while a lost device is waited for.
@@ -108,7 +108,7 @@ pub struct Renderer<'a> {
     backend: Box<dyn Backend + 'a>,
     info: DeviceInfo,
     why: Option<String>,
-    on_fault: OnFault<'a>,
+    on_fault: FaultHandler<'a>,
     /// The film that work may be cut for, once that is known: a device that takes the place of another must have room for it.
     needed_film: Option<u64>,
     /// The device that was lost, and why, while there is no other.
@@ -128,7 +128,7 @@ impl<'a> Renderer<'a> {
     ///
     /// No device that fits the choice, scenes that it has no room for, what its driver refuses or loses, and
     /// [`Options::exact_rounding`] on an adapter that is not reached by Vulkan.
-    pub fn new(scene: &'a Packed, options: &Options, on_fault: OnFault<'a>) -> Result<Renderer<'a>, Error> {
+    pub fn new(scene: &'a Packed, options: &Options, on_fault: FaultHandler<'a>) -> Result<Renderer<'a>, Error> {
         let (backend, info) = cpu(scene);
         let mut renderer = Renderer {
             scene,
@@ -241,7 +241,7 @@ impl<'a> Renderer<'a> {
         while let Some(pause) = PAUSES.get(self.losses) {
             self.losses += 1;
             if reason.is_none() {
-                (self.on_fault.tell)(&of(message.clone()), Remedy::Anew);
+                (self.on_fault.tell)(&of(message.clone()), Recovery::Reopen);
             }
             self.pause(*pause)?;
             let last = self.losses == PAUSES.len();
@@ -305,7 +305,7 @@ impl<'a> Renderer<'a> {
     }
 
     fn go_on_cpu(&mut self, why: &RenderError) {
-        (self.on_fault.tell)(why, Remedy::Cpu);
+        (self.on_fault.tell)(why, Recovery::Cpu);
         self.take(cpu(self.scene));
     }
 }

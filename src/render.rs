@@ -5,11 +5,11 @@ use std::ops::ControlFlow;
 use tracing::warn;
 
 use crate::backend::Backend;
-use crate::device::{Device, DeviceInfo, OnFault, Remedy, Renderer};
+use crate::device::{Device, DeviceInfo, FaultHandler, Recovery, Renderer};
 use crate::error::{Error, RenderError};
 use crate::film::{Film, Form, Region};
 use crate::image::{Aov, AovSource, Layout};
-use crate::job::{self, Bands, Cut, Flow, Nowhere, Order};
+use crate::job::{self, Bands, Cut, Flow, NoCheckpoint, Order};
 use crate::pack::{FirstHit, Packed, pack};
 use crate::picture::Picture;
 use crate::scene::{Problem, Scene};
@@ -87,8 +87,15 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
     let region = prepared.layout.region;
     let mut film = empty(region, packed.form())?;
     let (cut, most) = (Cut::of(packed.form()), prepared.renderer.largest_film());
-    let mut nowhere = Nowhere;
-    let mut bands = Bands::new(region, packed.pixel_samples, &cut, Order::Rows, most, &mut nowhere);
+    let mut no_checkpoint = NoCheckpoint;
+    let mut bands = Bands::new(
+        region,
+        packed.pixel_samples,
+        &cut,
+        Order::Rows,
+        most,
+        &mut no_checkpoint,
+    );
     let progress = prepared.renderer.progress();
     let mut next = || {
         prepared
@@ -118,8 +125,15 @@ pub fn render_growing(
     let Prepared { renderer, hits, layout } = &mut prepared;
     let (cut, order) = (Cut::of(packed.form()), Order::Pixels);
     let most = renderer.largest_film();
-    let mut nowhere = Nowhere;
-    let mut bands = Bands::new(layout.region, packed.pixel_samples, &cut, order, most, &mut nowhere);
+    let mut no_checkpoint = NoCheckpoint;
+    let mut bands = Bands::new(
+        layout.region,
+        packed.pixel_samples,
+        &cut,
+        order,
+        most,
+        &mut no_checkpoint,
+    );
     let progress = renderer.progress();
     let mut whole = empty(layout.region, packed.form())?;
     let mut failed = None;
@@ -210,10 +224,10 @@ struct Prepared<'a> {
 impl<'a> Prepared<'a> {
     fn new(scene: &Scene, packed: &'a Packed, options: &Options) -> Result<Prepared<'a>, Error> {
         let region = options.region(scene).map_err(Error::Option)?;
-        let on_fault = OnFault {
+        let on_fault = FaultHandler {
             tell: Box::new(|why, remedy| match remedy {
-                Remedy::Anew => warn!("{why}; it is opened anew"),
-                Remedy::Cpu => warn!("rendering on the CPU: {why}"),
+                Recovery::Reopen => warn!("{why}; it is opened anew"),
+                Recovery::Cpu => warn!("rendering on the CPU: {why}"),
             }),
             stopped: Box::new(|| false), // the pauses are short
         };
@@ -234,7 +248,7 @@ impl<'a> Prepared<'a> {
             aovs,
             alpha: packed.has_alpha(),
             middle_depth: renderer.work(|backend, _| middle_depth(packed, &options.aovs, backend))?,
-            most_samples: packed.pixel_samples,
+            max_samples: packed.pixel_samples,
             view: scene.view,
         };
         Ok(Prepared { renderer, hits, layout })

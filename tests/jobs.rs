@@ -10,7 +10,7 @@ use wgray::cpu::Cpu;
 use wgray::error::RenderError;
 use wgray::film::{Film, Region};
 use wgray::job::checkpoint::{Checkpoint, CheckpointError, Opening};
-use wgray::job::{Bands, Cut, Flow, Identity, Keeper, Kept, Order, Piece, Tile};
+use wgray::job::{Bands, CheckpointStore, Cut, Flow, Identity, Order, Piece, StoredPiece, Tile};
 use wgray::pack::Packed;
 
 use crate::contract::{bits, subjects};
@@ -25,9 +25,9 @@ struct Shelf {
     forgetful: bool,
 }
 
-impl Keeper for Shelf {
-    fn pieces(&self) -> Vec<Kept> {
-        let kept = |(y, piece): (&u32, &Piece)| Kept {
+impl CheckpointStore for Shelf {
+    fn pieces(&self) -> Vec<StoredPiece> {
+        let kept = |(y, piece): (&u32, &Piece)| StoredPiece {
             number: *y as usize,
             region: piece.region,
             film: piece.film.region,
@@ -66,13 +66,13 @@ impl Keeper for Shelf {
 fn some_calls(
     packed: &Packed,
     backend: &mut dyn Backend,
-    keeper: &mut dyn Keeper,
+    store: &mut dyn CheckpointStore,
     cut: &Cut,
     at_once: bool,
     calls: usize,
 ) -> Option<Film> {
     let (region, order) = (whole(packed), if at_once { Order::Pixels } else { Order::Rows });
-    let mut bands = Bands::new(region, packed.pixel_samples, cut, order, backend.largest_film(), keeper);
+    let mut bands = Bands::new(region, packed.pixel_samples, cut, order, backend.largest_film(), store);
     if at_once {
         bands = bands.as_a_whole(packed.form()).expect("memory");
     }
@@ -101,7 +101,7 @@ fn some_calls(
 }
 
 /// The film of work that was broken off again and again; `None` if it never came to its end.
-fn in_pieces(packed: &Packed, keeper: &mut dyn Keeper, cut: &Cut, at_once: bool, calls: usize) -> Option<Film> {
+fn in_pieces(packed: &Packed, store: &mut dyn CheckpointStore, cut: &Cut, at_once: bool, calls: usize) -> Option<Film> {
     (0..1000).find_map(|round| {
         // Each time another backend goes on.
         let mut backend: Box<dyn Backend> = match round % 3 {
@@ -109,7 +109,7 @@ fn in_pieces(packed: &Packed, keeper: &mut dyn Keeper, cut: &Cut, at_once: bool,
             1 => Box::new(Cpu::new(packed)),
             _ => pictures::backend(packed, Way::Baked),
         };
-        some_calls(packed, &mut *backend, keeper, cut, at_once, calls)
+        some_calls(packed, &mut *backend, store, cut, at_once, calls)
     })
 }
 
@@ -153,7 +153,7 @@ fn work_that_is_broken_off_and_gone_on_with_makes_the_same_film() {
     }
 }
 
-/// The control: a keeper that loses where a piece stands makes another film.
+/// The control: a store that loses where a piece stands makes another film.
 #[test]
 fn a_keeper_that_forgets_is_found() {
     let [packed, ..] = subjects();
@@ -188,7 +188,7 @@ fn when_the_time_is_up_every_pixel_has_a_sample() {
         let mut watch = |_: &mut dyn Backend, _: Region, _: f64| Ok(Flow::TimeIsUp);
         let mut pixels = 0;
         while let Some(band) = bands.render_next(&mut cpu, &mut watch, &mut || {}).expect("bands") {
-            assert!(band.least_samples >= 1);
+            assert!(band.min_samples >= 1);
             assert!(band.film.sums.iter().all(|sum| sum.w != 0.0));
             pixels += band.film.region.pixels();
         }

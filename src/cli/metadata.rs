@@ -9,13 +9,13 @@ use wgray::pack::Packed;
 use wgray::scene::Scene;
 
 /// What is known of a render before it begins.
-pub struct Told {
+pub struct RenderMetadata {
     metadata: Metadata,
 }
 
-impl Told {
+impl RenderMetadata {
     /// What a scene says, and what the program is.
-    pub fn of(scene: &Scene, packed: &Packed, time_limit: Option<Duration>) -> Told {
+    pub fn of(scene: &Scene, packed: &Packed, time_limit: Option<Duration>) -> RenderMetadata {
         let mut pairs = vec![(
             Metadata::SOFTWARE.to_owned(),
             concat!("wgray ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -39,7 +39,7 @@ impl Told {
         if let Some(limit) = time_limit {
             tell("time_limit", format!("{} s", limit.as_secs_f64()));
         }
-        Told {
+        RenderMetadata {
             metadata: Metadata { pairs },
         }
     }

@@ -307,10 +307,10 @@ fn has_place_for(aovs: &[Aov], pictures: &[(&Path, Output)], formats: &[Format])
         .iter()
         .zip(formats)
         .map(|((_, output), format)| match format.layers() {
-            Layers::Beside if !output.is_file() => Layers::Nowhere,
+            Layers::Beside if !output.is_file() => Layers::Unsupported,
             layers => layers,
         });
-    let (Some(aov), true) = (aovs.first(), layers.all(|layers| layers == Layers::Nowhere)) else {
+    let (Some(aov), true) = (aovs.first(), layers.all(|layers| layers == Layers::Unsupported)) else {
         return Ok(());
     };
     let aov = aov.name();

@@ -24,7 +24,7 @@ pub struct Stats {
     /// Samples of every pixel; under adaptive sampling the most of one.
     pub pixel_samples: u32,
     /// The samples that each pixel has at least: fewer than that where the time was up.
-    pub least_samples: u32,
+    pub min_samples: u32,
     /// Samples of light at every hit, over all lights.
     pub light_samples: u64,
     /// From the start of the process, or of a further frame, up to and with the warm-up dispatch.
@@ -36,10 +36,10 @@ pub struct Stats {
     /// Rays from the camera for the picture's samples.
     pub camera_rays: u64,
     /// The share of the samples that were rendered, and not found in a checkpoint.
-    pub share_rendered: f64,
+    pub fraction_rendered: f64,
     /// Rays to lights; the kernels do not count them.
     pub shadow_rays: Option<u64>,
-    /// camera_rays * share_rendered * (1 + light_samples) / render_s / 1e6
+    /// camera_rays * fraction_rendered * (1 + light_samples) / render_s / 1e6
     pub nominal_mrays_per_s: f64,
 }
 

@@ -220,7 +220,7 @@ impl Aov {
                 Vec3::from(film.layer(Layer::Normal, i)) * 0.5 + 0.5 * film.alpha(i)
             }
             Aov::SampleCount => {
-                let [count, most] = [band.film.sample_count(i), layout.most_samples].map(|n| n.max(1) as f32);
+                let [count, most] = [band.film.sample_count(i), layout.max_samples].map(|n| n.max(1) as f32);
                 Vec3::splat(count.ln() / most.max(2.0).ln())
             }
             Aov::Variance => Vec3::from(band.film.variance(i)).map(|v| v.sqrt().powf(1.0 / 2.2)),

@@ -46,7 +46,7 @@ pub struct Layout {
     /// The distance that is half bright in a PNG of the depth.
     pub middle_depth: f32,
     /// The number of samples that is bright in a PNG of their counts.
-    pub most_samples: u32,
+    pub max_samples: u32,
     /// How it is shown, but in an EXR.
     pub view: ViewSettings,
 }

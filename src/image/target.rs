@@ -46,7 +46,7 @@ impl Format {
         match self {
             Format::Exr => Layers::Inside,
             Format::Png => Layers::Beside,
-            Format::Jpeg | Format::WebP => Layers::Nowhere,
+            Format::Jpeg | Format::WebP => Layers::Unsupported,
         }
     }
 
@@ -92,8 +92,8 @@ pub enum Layers {
     Inside,
     /// In files of their own.
     Beside,
-    /// Nowhere.
-    Nowhere,
+    /// Unsupported.
+    Unsupported,
 }
 
 /// A picture's files.

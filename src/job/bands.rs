@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use super::piece::{Keeper, Kept, Piece};
+use super::piece::{CheckpointStore, Piece, StoredPiece};
 use super::steps::{Order, Reached, Steps};
 use super::{CALL, Cut, bands};
 use crate::backend::Backend;
@@ -35,7 +35,7 @@ pub type Watch<'a> = dyn FnMut(&mut dyn Backend, Region, f64) -> Result<Flow, Re
 /// The bands of a region, rendered from the top at the pace that was learnt so far. What is kept of them is not rendered
 /// again.
 pub struct Bands<'a> {
-    keeper: &'a mut dyn Keeper,
+    store: &'a mut dyn CheckpointStore,
     bands: VecDeque<Band>,
     samples: u32,
     /// Whether all bands grow together, and whether they have done so.
@@ -55,7 +55,7 @@ pub struct Finished {
     /// Its pixels.
     pub film: Film,
     /// The samples that each of them has at least; under adaptive sampling those that it was asked for.
-    pub least_samples: u32,
+    pub min_samples: u32,
     /// Rays from the camera that they have got.
     pub camera_rays: u64,
 }
@@ -76,7 +76,7 @@ impl Finished {
         };
         Finished {
             film,
-            least_samples: pass.start,
+            min_samples: pass.start,
             camera_rays,
         }
     }
@@ -91,8 +91,8 @@ struct Band {
 enum State {
     /// Nothing is rendered.
     New,
-    /// The keeper has what is rendered.
-    Kept(Kept),
+    /// The store has what is rendered.
+    Stored(StoredPiece),
     /// This is rendered.
     Here(Piece),
 }
@@ -108,14 +108,14 @@ enum End {
 const LEAST_ROWS: [u32; 2] = [16, 64];
 
 impl<'a> Bands<'a> {
-    /// The bands of a region, as far as a keeper has them. A region without pixels has none. The keeper's pieces lie in the region.
+    /// The bands of a region, as far as a store has them. A region without pixels has none. The store's pieces lie in the region.
     pub fn new(
         region: Region,
         samples: u32,
         cut: &Cut,
         order: Order,
         largest_film: u64,
-        keeper: &'a mut dyn Keeper,
+        store: &'a mut dyn CheckpointStore,
     ) -> Bands<'a> {
         let mut all = VecDeque::new();
         let mut y = region.y0;
@@ -127,7 +127,7 @@ impl<'a> Bands<'a> {
             });
             all.extend(new);
         };
-        for piece in keeper.pieces() {
+        for piece in store.pieces() {
             if piece.film.pixels() > largest_film && !piece.reached.pass.is_empty() {
                 continue; // another backend had room for it
             }
@@ -135,12 +135,12 @@ impl<'a> Bands<'a> {
             y = piece.region.y1;
             all.push_back(Band {
                 region: piece.region,
-                state: State::Kept(piece),
+                state: State::Stored(piece),
             });
         }
         add_new(&mut all, y, region.y1);
         Bands {
-            keeper,
+            store,
             bands: all,
             samples,
             whole: None,
@@ -195,13 +195,13 @@ impl<'a> Bands<'a> {
         self.done += band.region.pixels() as f64 * f64::from(self.samples);
         match band.state {
             State::Here(piece) => Ok(Some(Finished::of(piece))),
-            State::Kept(kept) => Ok(Some(Finished::of(self.keeper.load(kept.number)?))),
+            State::Stored(kept) => Ok(Some(Finished::of(self.store.load(kept.number)?))),
             State::New => Err(RenderError::NoFilm), // the work has made a piece of it
         }
     }
 
     /// The share of the samples of all bands handed out that were rendered, and not found where they were kept: 0 to 1.
-    pub fn share_rendered(&self) -> f64 {
+    pub fn fraction_rendered(&self) -> f64 {
         if self.done > 0.0 {
             (self.rendered / self.done).min(1.0)
         } else {
@@ -247,12 +247,12 @@ impl<'a> Bands<'a> {
         else {
             return;
         };
-        if !self.keeper.small_pieces() {
+        if !self.store.small_pieces() {
             return;
         }
         let least = LEAST_ROWS[usize::from(backend.samples_of_all() < self.samples)];
         let of_a_row = f64::from(region.width()) * f64::from(self.samples);
-        let of_a_piece = self.steps.speed().unwrap_or(0.0) * self.keeper.interval().as_secs_f64();
+        let of_a_piece = self.steps.speed().unwrap_or(0.0) * self.store.interval().as_secs_f64();
         let rows = ((of_a_piece / of_a_row) as u32).max(least);
         if rows < region.height() {
             let (first, rest) = (
@@ -295,8 +295,8 @@ impl<'a> Bands<'a> {
         watch: &mut Watch,
         made: &mut dyn FnMut(),
     ) -> Result<End, RenderError> {
-        if let State::Kept(kept) = &self.bands[i].state {
-            let piece = self.keeper.load(kept.number)?;
+        if let State::Stored(kept) = &self.bands[i].state {
+            let piece = self.store.load(kept.number)?;
             self.bands[i].state = State::Here(piece);
         }
         let region = self.bands[i].region;
@@ -342,7 +342,7 @@ impl<'a> Bands<'a> {
     fn is_time_to_keep(&self) -> bool {
         // Keeping should take no more than a tenth of the time.
         let (last, took) = self.kept;
-        last.elapsed() >= self.keeper.interval().max(9 * took)
+        last.elapsed() >= self.store.interval().max(9 * took)
     }
 
     /// Takes what the backend has of a band, and keeps it where it is finished, or it is time to.
@@ -359,14 +359,14 @@ impl<'a> Bands<'a> {
         };
         let is_time = at_the_end || self.is_time_to_keep();
         if is_finished || is_time {
-            self.keeper.keep(&piece);
+            self.store.keep(&piece);
         }
         self.bands[i].state = State::Here(piece);
         if is_time {
             if self.whole.is_some() {
                 self.keep_others(i);
             }
-            self.keeper.sync();
+            self.store.sync();
             self.kept = (Instant::now(), start.elapsed());
         }
         Ok(())
@@ -374,12 +374,12 @@ impl<'a> Bands<'a> {
 
     /// Keeps the other bands of a picture that grows as a whole, as far as they have grown since they were kept.
     fn keep_others(&mut self, i: usize) {
-        let kept = self.keeper.pieces();
+        let kept = self.store.pieces();
         for (k, band) in self.bands.iter().enumerate() {
             let State::Here(piece) = &band.state else { continue };
-            let is_kept = |kept: &Kept| kept.region == piece.region && kept.reached == piece.reached;
+            let is_kept = |kept: &StoredPiece| kept.region == piece.region && kept.reached == piece.reached;
             if k != i && !kept.iter().any(is_kept) {
-                self.keeper.keep(piece);
+                self.store.keep(piece);
             }
         }
     }
@@ -389,7 +389,7 @@ impl Band {
     fn reached(&self) -> Option<&Reached> {
         match &self.state {
             State::New => None,
-            State::Kept(kept) => Some(&kept.reached),
+            State::Stored(kept) => Some(&kept.reached),
             State::Here(piece) => Some(&piece.reached),
         }
     }

@@ -11,7 +11,7 @@ use tempfile::NamedTempFile;
 use thiserror::Error;
 
 use super::identity::Identity;
-use super::piece::{Keeper, Kept, Piece};
+use super::piece::{CheckpointStore, Piece, StoredPiece};
 use super::pieces_file::{self, Entry, FORMAT, Header, Key};
 use crate::error::RenderError;
 use crate::film::Form;
@@ -62,7 +62,7 @@ pub struct Opening<'a> {
     pub interval: Duration,
     /// Called now and then while another process writes it: whether to wait on.
     pub wait: Box<dyn FnMut() -> bool + 'a>,
-    /// Told what went wrong where the work goes on.
+    /// RenderMetadata what went wrong where the work goes on.
     pub tell: Box<dyn FnMut(&str) + 'a>,
 }
 
@@ -346,11 +346,11 @@ impl<'a> Checkpoint<'a> {
     }
 }
 
-impl Keeper for Checkpoint<'_> {
-    fn pieces(&self) -> Vec<Kept> {
+impl CheckpointStore for Checkpoint<'_> {
+    fn pieces(&self) -> Vec<StoredPiece> {
         let kept = |i: &usize| {
             let entry = &self.entries[*i];
-            Kept {
+            StoredPiece {
                 number: *i,
                 region: entry.region,
                 film: entry.film,

@@ -20,7 +20,7 @@ use crate::pack::FirstHit;
 pub use bands::{Bands, Finished, Flow, Watch, there_is_memory};
 pub use identity::{Identity, hash_of_scene, hash_of_shaders};
 pub use part::{PartError, PartHeader, Parts, Tile, read_part_header, write_part};
-pub use piece::{INTERVAL, Keeper, Kept, Nowhere, Piece};
+pub use piece::{CheckpointStore, INTERVAL, NoCheckpoint, Piece, StoredPiece};
 pub use steps::{Order, Reached, Steps};
 
 /// How long one call of [`Backend::render`] aims to take: long enough to hide what a call costs, short enough for
@@ -98,8 +98,15 @@ pub fn render(
     progress: &mut dyn FnMut(f64) -> bool,
     output: &mut dyn FnMut(Film) -> Result<(), RenderError>,
 ) -> Result<(), RenderError> {
-    let mut nowhere = Nowhere;
-    let mut bands = Bands::new(region, samples, cut, Order::Rows, backend.largest_film(), &mut nowhere);
+    let mut no_checkpoint = NoCheckpoint;
+    let mut bands = Bands::new(
+        region,
+        samples,
+        cut,
+        Order::Rows,
+        backend.largest_film(),
+        &mut no_checkpoint,
+    );
     let mut watch = |_: &mut dyn Backend, _: Region, share: f64| Ok(progress(share).into());
     while let Some(band) = bands.render_next(backend, &mut watch, &mut || {})? {
         output(band.film)?;

@@ -287,7 +287,7 @@ impl Parts {
             aovs: self.header.aovs.iter().filter_map(known).collect(),
             alpha: self.header.alpha,
             middle_depth: f32::from_bits(self.header.middle_depth),
-            most_samples: pixel_samples,
+            max_samples: pixel_samples,
             view: ViewSettings {
                 transform: transform.unwrap_or_default(),
                 exposure: f64::from_bits(self.header.exposure),

@@ -19,8 +19,8 @@ pub struct Piece {
 
 /// A piece that is kept somewhere.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Kept {
-    /// What the keeper knows it by.
+pub struct StoredPiece {
+    /// What the store knows it by.
     pub number: usize,
     /// Its pixels.
     pub region: Region,
@@ -31,9 +31,9 @@ pub struct Kept {
 }
 
 /// What keeps pieces while others are rendered.
-pub trait Keeper {
+pub trait CheckpointStore {
     /// The pieces that it has, from the top. No two have a row in common.
-    fn pieces(&self) -> Vec<Kept>;
+    fn pieces(&self) -> Vec<StoredPiece>;
 
     /// One of its pieces.
     ///
@@ -57,13 +57,13 @@ pub trait Keeper {
 
 /// Keeps nothing: what was rendered outlives a lost device, and not the program.
 #[derive(Debug)]
-pub struct Nowhere;
+pub struct NoCheckpoint;
 
 /// How often unfinished pieces are kept, if nothing else is said.
 pub const INTERVAL: Duration = Duration::from_secs(30);
 
-impl Keeper for Nowhere {
-    fn pieces(&self) -> Vec<Kept> {
+impl CheckpointStore for NoCheckpoint {
+    fn pieces(&self) -> Vec<StoredPiece> {
         Vec::new()
     }
 

@@ -1,8 +1,8 @@
 //! `wgray render`: a scene file to a picture, or to several.
 
 mod args;
+mod once_log;
 mod plan;
-mod said;
 mod trial;
 mod work;
 
@@ -15,12 +15,12 @@ use tracing::info;
 use wgray::device::DeviceInfo;
 use wgray::error::RenderError;
 use wgray::film::Region;
-use wgray::job::{Keeper, Nowhere};
+use wgray::job::{CheckpointStore, NoCheckpoint};
 use wgray::scene::{Problem, Scene, is_gltf};
 
+use self::once_log::OnceLog;
 use self::plan::Plan;
-use self::said::Said;
-use self::work::Took;
+use self::work::RenderTotals;
 use super::frames::Frame;
 use super::log::{self, Level};
 use super::outputs::Outputs;
@@ -44,7 +44,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
             continue;
         }
         job.go_to(frame)?;
-        let plan = Plan::resolve(&args, &job.scene, &job.said, frame, start)?;
+        let plan = Plan::resolve(&args, &job.scene, &job.log, frame, start)?;
         outputs.check_size(plan.region())?;
         if let Some(part) = outputs.part().filter(|_| is_there) {
             if plan.is_done(part) {
@@ -53,14 +53,14 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
             }
             let name = part.display();
             let told = format!("{name} is of another scene or other options, and is rendered anew");
-            job.said.again(Level::Note, &told);
+            job.log.log(Level::Note, &told);
         }
         picture(&plan, outputs, &mut signals, start)?;
         start = Instant::now();
     }
     if skipped > 0 {
         let told = format!("{skipped} of {count} left out, as their files are there");
-        job.said.once(Level::Note, &told);
+        job.log.log_once(Level::Note, &told);
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -68,7 +68,7 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
 /// What the options ask for, looked at as a whole.
 pub struct Job<'a> {
     args: &'a Args,
-    pub said: Said,
+    pub log: OnceLog,
     /// The scene, at the frame that was gone to.
     pub scene: Scene,
     fps: Option<f64>,
@@ -93,13 +93,13 @@ impl<'a> Job<'a> {
         let frames = args.frames().into_iter();
         let frames = frames.map(|frame| Ok((frame, args.outputs(frame)?)));
         let frames: Vec<(Frame, Outputs)> = frames.collect::<anyhow::Result<_>>()?;
-        let said = Said::new(args.quiet);
-        let scene = read(args, &said)?;
+        let log = OnceLog::new(args.quiet);
+        let scene = read(args, &log)?;
         let fps = args.fps(&scene)?;
         check(args, &scene, frames.iter().map(|(frame, outputs)| (frame, outputs)))?;
         Ok(Job {
             args,
-            said,
+            log,
             scene,
             fps,
             frames,
@@ -132,7 +132,7 @@ impl<'a> Job<'a> {
 }
 
 /// Reads the scene, and tells what is odd about it.
-fn read(args: &Args, said: &Said) -> anyhow::Result<Scene> {
+fn read(args: &Args, log: &OnceLog) -> anyhow::Result<Scene> {
     let (path, overrides) = (&args.scene, args.overrides());
     let scene = progress::named(args.shown_progress(), "reading the scene", || {
         super::load(path, &overrides)
@@ -144,7 +144,7 @@ fn read(args: &Args, said: &Said) -> anyhow::Result<Scene> {
     let moves = scene.camera_path.is_some() || args.fps(&scene)?.is_some();
     let still = (args.frames.is_some() && !moves).then_some(still);
     for note in scene.notes.iter().map(String::as_str).chain(still) {
-        said.once(Level::Warning, &format!("{}: {note}", path.display()));
+        log.log_once(Level::Warning, &format!("{}: {note}", path.display()));
     }
     Ok(scene)
 }
@@ -176,10 +176,10 @@ fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame
 fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant) -> anyhow::Result<()> {
     let before = signals.heeded().cloned();
     let mut checkpoint = plan.open_checkpoint(before.as_ref())?;
-    let mut nowhere = Nowhere;
-    let keeper: &mut dyn Keeper = match &mut checkpoint {
+    let mut no_checkpoint = NoCheckpoint;
+    let store: &mut dyn CheckpointStore = match &mut checkpoint {
         Some(checkpoint) => checkpoint,
-        None => &mut nowhere,
+        None => &mut no_checkpoint,
     };
     let names: Vec<String> = outputs.files().map(|(_, name, _)| name.to_owned()).collect();
     let outputs = outputs.begin().map_err(RenderError::Output)?;
@@ -190,12 +190,12 @@ fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant)
     let mut renderer = plan.renderer(stop).map_err(|error| interrupted(error, stop))?;
     let setup = start.elapsed().as_secs_f64();
     info!(seconds = setup, "ready");
-    let took = work::write(plan, &mut renderer, outputs.places, keeper, stop);
+    let took = work::write(plan, &mut renderer, outputs.places, store, stop);
     let took = took.map_err(|error| interrupted(error.into(), stop));
     if let (Err(error), Some(kept)) = (&took, &checkpoint) {
         let path = kept.name().display();
         if error.is::<Interrupted>() {
-            plan.said.again(
+            plan.log.log(
                 Level::Note,
                 &format!("{path} has what was rendered; --resume goes on from it"),
             );
@@ -206,15 +206,15 @@ fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant)
     if !log::is_json() {
         info!(render = took.time.as_secs_f64(), seconds = total, "picture written"); // else its figures tell it
     }
-    let (least, all) = (took.least_samples, plan.scene.pixel_samples);
+    let (least, all) = (took.min_samples, plan.scene.pixel_samples);
     if least < all {
-        plan.said.again(
+        plan.log.log(
             Level::Note,
             &format!("the time was up: each pixel has {least} of {all} samples, or more"),
         );
     }
     let stats = stats(plan, renderer.info(), &took, setup, total);
-    if log::is_json() && !plan.said.is_quiet() {
+    if log::is_json() && !plan.log.is_quiet() {
         let stats = serde_json::to_value(&stats)?;
         let facts = facts_of([("files", names.into()), ("stats", stats)]);
         log::tell(Level::Info, "render done", facts);
@@ -233,10 +233,10 @@ fn interrupted(error: anyhow::Error, stop: &Stop) -> anyhow::Error {
     }
 }
 
-fn stats(plan: &Plan, device: &DeviceInfo, took: &Took, setup: f64, total: f64) -> Stats {
+fn stats(plan: &Plan, device: &DeviceInfo, took: &RenderTotals, setup: f64, total: f64) -> Stats {
     let (region, scene) = (plan.region(), &plan.scene);
     let render = took.time.as_secs_f64();
-    let rays_now = took.camera_rays as f64 * took.share_rendered;
+    let rays_now = took.camera_rays as f64 * took.fraction_rendered;
     Stats {
         frame: plan.frame.number,
         device: device.name.clone(),
@@ -245,13 +245,13 @@ fn stats(plan: &Plan, device: &DeviceInfo, took: &Took, setup: f64, total: f64) 
         width: region.width(),
         height: region.height(),
         pixel_samples: scene.pixel_samples,
-        least_samples: took.least_samples,
+        min_samples: took.min_samples,
         light_samples: scene.light_samples(),
         setup_s: setup,
         render_s: render,
         total_s: total,
         camera_rays: took.camera_rays,
-        share_rendered: took.share_rendered,
+        fraction_rendered: took.fraction_rendered,
         shadow_rays: None,
         nominal_mrays_per_s: Stats::nominal(rays_now, scene.light_samples(), render),
     }

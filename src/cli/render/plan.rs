@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use wgray::device::{OnFault, Remedy, Renderer};
+use wgray::device::{FaultHandler, Recovery, Renderer};
 use wgray::error::RenderError;
 use wgray::film::Region;
 use wgray::image::Layout;
@@ -15,10 +15,10 @@ use wgray::render::Options;
 use wgray::scene::{Scene, ViewSettings};
 
 use super::args::Args;
-use super::said::Said;
+use super::once_log::OnceLog;
 use crate::cli::frames::Frame;
 use crate::cli::log::Level;
-use crate::cli::metadata::Told;
+use crate::cli::metadata::RenderMetadata;
 use crate::cli::picture_options::PictureOptions;
 use crate::cli::progress::{self, Mode};
 use crate::cli::signal::Stop;
@@ -39,15 +39,15 @@ pub struct Plan<'a> {
     resume: bool,
     pub pictures: PictureOptions,
     pub view: ViewSettings,
-    pub told: Told,
+    pub told: RenderMetadata,
     pub progress: Mode,
-    pub said: &'a Said,
+    pub log: &'a OnceLog,
     pub frame: Frame,
 }
 
 impl<'a> Plan<'a> {
     /// What the options come to for one picture of the scene, begun at `start`.
-    pub fn resolve(args: &Args, scene: &Scene, said: &'a Said, frame: Frame, start: Instant) -> anyhow::Result<Self> {
+    pub fn resolve(args: &Args, scene: &Scene, log: &'a OnceLog, frame: Frame, start: Instant) -> anyhow::Result<Self> {
         if args.time_limit.is_some() {
             can_end_early(scene)?;
         }
@@ -69,10 +69,10 @@ impl<'a> Plan<'a> {
             resume: args.resume,
             view: args.pictures.view(scene.view),
             pictures: args.pictures.clone(),
-            told: Told::of(scene, &packed, args.time_limit),
+            told: RenderMetadata::of(scene, &packed, args.time_limit),
             scene: packed,
             progress,
-            said,
+            log,
             frame,
         })
     }
@@ -90,7 +90,7 @@ impl<'a> Plan<'a> {
             aovs: self.options.aovs.clone(),
             alpha: self.scene.has_alpha(),
             middle_depth,
-            most_samples: self.scene.pixel_samples,
+            max_samples: self.scene.pixel_samples,
             view: self.view,
         }
     }
@@ -122,7 +122,7 @@ impl<'a> Plan<'a> {
             resume: self.resume,
             interval: self.checkpoint_interval,
             wait: Box::new(move || asked().is_none() && self.deadline.is_none_or(|end| Instant::now() < end)),
-            tell: Box::new(|what| self.said.again(Level::Warning, what)),
+            tell: Box::new(|what| self.log.log(Level::Warning, what)),
         };
         let identity = Identity::of(&self.scene, self.region(), self.options.exact_rounding);
         match Checkpoint::open(opening, identity, self.scene.form()) {
@@ -141,16 +141,18 @@ impl<'a> Plan<'a> {
 
     /// Makes the device ready for the scene.
     pub fn renderer<'b>(&'b self, stop: &'b Stop) -> anyhow::Result<Renderer<'b>> {
-        let on_fault = OnFault {
+        let on_fault = FaultHandler {
             tell: Box::new(|why, remedy| match remedy {
-                Remedy::Anew => self.said.again(Level::Warning, &format!("{why}; it is opened anew")),
-                Remedy::Cpu => self.said.once(Level::Warning, &format!("rendering on the CPU: {why}")),
+                Recovery::Reopen => self.log.log(Level::Warning, &format!("{why}; it is opened anew")),
+                Recovery::Cpu => self
+                    .log
+                    .log_once(Level::Warning, &format!("rendering on the CPU: {why}")),
             }),
             stopped: Box::new(|| stop.signal().is_some()),
         };
         let renderer = Renderer::new(&self.scene, &self.options, on_fault).map_err(plain)?;
         if let Some(why) = renderer.why() {
-            self.said.once(Level::Note, why);
+            self.log.log_once(Level::Note, why);
         }
         Ok(renderer)
     }

@@ -36,7 +36,7 @@ impl Trial {
     /// Tries one frame of a job, in a program that was begun at `start`.
     pub fn of(job: &mut Job, frame: Frame, start: Instant) -> anyhow::Result<Trial> {
         job.go_to(frame)?;
-        let plan = Plan::resolve(job.args, &job.scene, &job.said, frame, start)?;
+        let plan = Plan::resolve(job.args, &job.scene, &job.log, frame, start)?;
         let stop = signal::stop().context("signal handler")?;
         let mut renderer = plan.renderer(&stop).map_err(|error| interrupted(error, &stop))?;
         let fixed = start.elapsed();

@@ -7,7 +7,7 @@ use wgray::device::Renderer;
 use wgray::error::RenderError;
 use wgray::film::Region;
 use wgray::image::{self, Band, Layout, Pending, Sink};
-use wgray::job::{self, Bands, Cut, Flow, Keeper, Order, PartHeader};
+use wgray::job::{self, Bands, CheckpointStore, Cut, Flow, Order, PartHeader};
 use wgray::render::{middle_depth, needs_first_hits};
 
 use super::plan::Plan;
@@ -18,16 +18,16 @@ use crate::cli::signal::Stop;
 
 /// What a render took.
 #[derive(Default)]
-pub struct Took {
+pub struct RenderTotals {
     /// The time without writing.
     pub time: Duration,
     /// Rays from the camera in the picture, and the share of them that were not found in a checkpoint.
     pub camera_rays: u64,
-    pub share_rendered: f64,
+    pub fraction_rendered: f64,
     /// Pixels that are no finite numbers.
     strange: usize,
     /// The fewest samples of a pixel.
-    pub least_samples: u32,
+    pub min_samples: u32,
 }
 
 /// Renders band by band into files.
@@ -35,27 +35,27 @@ pub fn write(
     plan: &Plan,
     renderer: &mut Renderer,
     places: Places,
-    keeper: &mut dyn Keeper,
+    store: &mut dyn CheckpointStore,
     stop: &Stop,
-) -> Result<Took, RenderError> {
+) -> Result<RenderTotals, RenderError> {
     let middle_depth = renderer.work(|backend, _| middle_depth(&plan.scene, &plan.options.aovs, backend))?;
     let layout = plan.layout(middle_depth);
-    let mut took = Took::default();
+    let mut took = RenderTotals::default();
     let name = places.name().unwrap_or_default().to_owned();
     let metadata = plan.told.on(renderer.info(), plan.pictures.reproducible);
-    let mut fill = |sink: &mut Sink| render(plan, renderer, keeper, stop, &mut took, sink);
+    let mut fill = |sink: &mut Sink| render(plan, renderer, store, stop, &mut took, sink);
     match places {
         Places::Pictures(targets) => {
             let options = plan.pictures.save_options(metadata);
             let saved = image::save(targets, &layout, &options, &mut fill)?;
             plan.pictures
-                .warn(&saved, &mut |line| plan.said.again(Level::Warning, line));
+                .warn(&saved, &mut |line| plan.log.log(Level::Warning, line));
         }
         Places::Part(file) => write_part(plan, &layout, file, &mut fill)?,
     }
     if took.strange > 0 {
         let count = took.strange;
-        plan.said.again(
+        plan.log.log(
             Level::Warning,
             &format!("{name}: {count} pixels are not finite numbers"),
         );
@@ -80,9 +80,9 @@ fn write_part(
 fn render(
     plan: &Plan,
     renderer: &mut Renderer,
-    keeper: &mut dyn Keeper,
+    store: &mut dyn CheckpointStore,
     stop: &Stop,
-    took: &mut Took,
+    took: &mut RenderTotals,
     sink: &mut Sink,
 ) -> Result<(), RenderError> {
     let mut progress = Progress::new(plan.progress, plan.frame.label(), plan.frame.number);
@@ -92,7 +92,7 @@ fn render(
         Some(_) => Order::Pixels,
         None => Order::Rows,
     };
-    let mut bands = Bands::new(plan.region(), samples, &cut, order, most, keeper);
+    let mut bands = Bands::new(plan.region(), samples, &cut, order, most, store);
     if plan.deadline.is_some() {
         bands = bands.as_a_whole(scene.form())?;
     }
@@ -110,18 +110,18 @@ fn render(
             _ => Flow::GoOn,
         })
     };
-    took.least_samples = samples;
+    took.min_samples = samples;
     loop {
         let start = Instant::now();
         let made = renderer.progress();
         let next = renderer.work(|backend, _| bands.render_next(backend, &mut watch, &mut || made.made()));
         took.time += start.elapsed();
         let Some(band) = next? else {
-            took.share_rendered = bands.share_rendered();
+            took.fraction_rendered = bands.fraction_rendered();
             return Ok(());
         };
         let film = band.film;
-        took.least_samples = took.least_samples.min(band.least_samples);
+        took.min_samples = took.min_samples.min(band.min_samples);
         took.camera_rays += band.camera_rays;
         let colors = film.means();
         took.strange += colors

@@ -1,0 +1,46 @@
+//! Messages on standard error; over several frames each warning is printed once.
+
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+
+use crate::cli::log::{Facts, Level, say, tell};
+
+/// The messages of a command and the lines that it printed.
+pub struct OnceLog {
+    quiet: bool,
+    lines: RefCell<BTreeSet<String>>,
+}
+
+impl OnceLog {
+    /// Returns a log that prints nothing if `quiet`.
+    pub fn new(quiet: bool) -> OnceLog {
+        OnceLog {
+            quiet,
+            lines: RefCell::default(),
+        }
+    }
+
+    /// Returns true if only errors are printed.
+    pub fn is_quiet(&self) -> bool {
+        self.quiet
+    }
+
+    /// Prints a line unless it was printed before.
+    pub fn log_once(&self, level: Level, line: &str) {
+        if !self.quiet && self.lines.borrow_mut().insert(line.to_owned()) {
+            say(level, line);
+        }
+    }
+
+    /// Prints a line.
+    pub fn log(&self, level: Level, line: &str) {
+        self.log_with(level, line, Facts::new());
+    }
+
+    /// Prints a line with facts for programs.
+    pub fn log_with(&self, level: Level, line: &str, facts: Facts) {
+        if !self.quiet {
+            tell(level, line, facts);
+        }
+    }
+}
