@@ -18,6 +18,10 @@ pub struct SceneOptions {
     #[arg(long, value_name = "COLOR|none", allow_hyphen_values = true)]
     pub background: Option<Background>,
 
+    /// Refuse damaged inputs, such as missing textures, instead of rendering stand-ins with a warning
+    #[arg(long)]
+    pub strict: bool,
+
     #[command(flatten)]
     gltf: GltfOptions,
 }
@@ -69,6 +73,7 @@ impl SceneOptions {
         Overrides {
             environment: self.environment.clone(),
             background: self.background,
+            strict: self.strict,
             gltf: self.gltf.choice(),
             ..overrides
         }

@@ -80,7 +80,7 @@ impl Buffers {
                 }
                 (Some(name), _) => {
                     let fault = |rule| Fault::key(format!("buffers[{i}].uri"), rule);
-                    let path = folder.find(&name).map_err(fault)?;
+                    let path = folder.find(&name).map_err(|unfound| fault(unfound.into()))?;
                     let left = MOST_BYTES.saturating_sub(total);
                     let bytes =
                         uri::read(&path, left).map_err(|error| fault(format!("{name:?} cannot be read: {error}")))?;

@@ -1,6 +1,7 @@
 //! A glTF file, opened and checked: its JSON, and the bytes of its buffers and images.
 
 use std::collections::BTreeSet;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -11,7 +12,7 @@ use super::budget::Budget;
 use super::buffer::{Buffers, MOST_BYTES};
 use super::error::{Fault, GltfError};
 use super::json::missing;
-use super::uri::{self, Folder};
+use super::uri::{self, Folder, Unfound};
 use super::{extension, glb, json};
 
 /// The largest file of an image, in bytes.
@@ -34,6 +35,20 @@ pub(super) struct Document {
     buffers: Buffers,
     /// How many bytes of images were asked for.
     given: AtomicU64,
+}
+
+/// Why an image has no bytes.
+enum ImageFault {
+    /// It is missing or cannot be read.
+    Missing(String),
+    /// It breaks a rule.
+    Refused(Fault),
+}
+
+impl From<Fault> for ImageFault {
+    fn from(fault: Fault) -> Self {
+        ImageFault::Refused(fault)
+    }
 }
 
 impl Document {
@@ -143,16 +158,25 @@ impl Document {
         }
     }
 
-    /// The bytes of an image, encoded as the file has it.
-    pub fn image_bytes(&self, image: usize) -> Result<Arc<[u8]>, GltfError> {
-        self.encoded(image).map_err(|fault| fault.of(&self.path))
+    /// Returns the bytes of an image, encoded as in the file, or why they are missing.
+    ///
+    /// # Errors
+    ///
+    /// Files outside of the asset root, and images that are too large.
+    pub fn image_bytes(&self, image: usize) -> Result<Result<Arc<[u8]>, String>, GltfError> {
+        match self.encoded(image) {
+            Ok(bytes) => Ok(Ok(bytes)),
+            Err(ImageFault::Missing(why)) => Ok(Err(format!("images[{image}].uri: {why}"))),
+            Err(ImageFault::Refused(fault)) => Err(fault.of(&self.path)),
+        }
     }
 
-    fn encoded(&self, index: usize) -> Result<Arc<[u8]>, Fault> {
+    fn encoded(&self, index: usize) -> Result<Arc<[u8]>, ImageFault> {
         let images = &self.json.images;
         let image = images
             .get(index)
             .ok_or_else(|| missing("images", index, images.len()))?;
+        let fault = |rule| Fault::key(format!("images[{index}].uri"), rule);
         if let Some(view) = image.buffer_view {
             let bytes = self.bytes_of(view.value())?;
             self.has_room(index, bytes.len() as u64)?;
@@ -164,18 +188,25 @@ impl Document {
                 .extensions
                 .as_ref()
                 .and_then(|all| extension::unknown(&all.others));
-            return Err(match others {
+            return Err(ImageFault::Refused(match others {
                 Some(name) => extension::only_in(&key, name),
                 None => Fault::key(key, "it must have a uri or a bufferView"),
-            });
+            }));
         };
-        let fault = |rule| Fault::key(format!("images[{index}].uri"), rule);
         let bytes = match uri::is_data(name) {
-            true => uri::data(name).map_err(fault)?,
+            true => uri::data(name).map_err(ImageFault::Missing)?,
             false => {
-                let path = self.folder.find(name).map_err(fault)?;
-                uri::read(&path, LARGEST_IMAGE)
-                    .map_err(|error| fault(format!("{} cannot be read: {error}", super::error::shown(name))))?
+                let path = self.folder.find(name).map_err(|unfound| match unfound {
+                    Unfound::Absent(why) => ImageFault::Missing(why),
+                    Unfound::Refused(rule) => ImageFault::Refused(fault(rule)),
+                })?;
+                uri::read(&path, LARGEST_IMAGE).map_err(|error| {
+                    let why = format!("{} cannot be read: {error}", super::error::shown(name));
+                    match error.kind() {
+                        io::ErrorKind::FileTooLarge => ImageFault::Refused(fault(why)),
+                        _ => ImageFault::Missing(why),
+                    }
+                })?
             }
         };
         self.has_room(index, bytes.len() as u64)?;

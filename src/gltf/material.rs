@@ -18,8 +18,16 @@ use crate::scene::{
     TextureReference, ValueDescription, VertexColors,
 };
 
-/// A material's images and textures by their names.
-type Images = BTreeMap<String, Arc<[u8]>>;
+/// The images of all materials by their names.
+#[derive(Default)]
+pub struct Images {
+    /// Their files.
+    pub read: BTreeMap<String, Arc<[u8]>>,
+    /// Why there is no file.
+    pub absent: BTreeMap<String, String>,
+}
+
+/// A material's textures by their names.
 type Textures = BTreeMap<String, TextureDescription>;
 
 /// The largest radiance of a surface of a scene.
@@ -104,7 +112,7 @@ impl<'a> Materials<'a> {
 
     /// The materials as a scene has them, and the images that they need.
     pub fn finish(self, notes: &mut Vec<String>) -> Result<(Vec<ImportedMaterial>, Images), GltfError> {
-        let mut images = Images::new();
+        let mut images = Images::default();
         let mut names = BTreeSet::new();
         // The number that is tried next for each name.
         let mut next: BTreeMap<String, usize> = BTreeMap::new();
@@ -551,15 +559,19 @@ impl Maker<'_> {
     fn image(&mut self, slot: &Slot) -> Result<String, GltfError> {
         let image = self.document.image_of(slot.texture)?;
         let name = format!("images[{image}]");
-        if !self.images.contains_key(&name) {
-            self.images.insert(name.clone(), self.document.image_bytes(image)?);
+        if self.images.read.contains_key(&name) || self.images.absent.contains_key(&name) {
+            return Ok(name);
+        }
+        match self.document.image_bytes(image)? {
+            Ok(bytes) => _ = self.images.read.insert(name.clone(), bytes),
+            Err(why) => _ = self.images.absent.insert(name.clone(), why),
         }
         Ok(name)
     }
 
     fn has_alpha(&mut self, slot: &Slot) -> Result<bool, GltfError> {
         let name = self.image(slot)?;
-        Ok(self.images.get(&name).is_some_and(|bytes| has_alpha(bytes)))
+        Ok(self.images.read.get(&name).is_some_and(|bytes| has_alpha(bytes)))
     }
 
     /// Numbers of an extension's list.

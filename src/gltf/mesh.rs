@@ -1,12 +1,13 @@
 //! Meshes: section 3.7, with morph targets and skins as they are at the time that is shown.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::{Mutex, PoisonError};
 
 use ::gltf::json::mesh::{Mode, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 
+use super::Damage;
 use super::budget::Thing;
 use super::document::Document;
 use super::error::GltfError;
@@ -100,8 +101,10 @@ pub struct Meshes<'a> {
     /// The first primitive that lacks texture coordinates which its material needs, with their set; and how many there are.
     bare: Option<(String, u32)>,
     bare_count: usize,
-    /// By attributes the first primitive that has numbers which are not finite, and how many have.
+    /// By attribute, the first primitive that has numbers which are not finite, and how many have.
     strange: Mutex<BTreeMap<&'static str, (String, usize)>>,
+    /// The first primitive that has triangles without a position, and how many of these all have.
+    unplaced: Mutex<Option<(String, usize)>>,
 }
 
 /// A primitive.
@@ -127,6 +130,7 @@ impl<'a> Meshes<'a> {
             bare: None,
             bare_count: 0,
             strange: Mutex::default(),
+            unplaced: Mutex::default(),
         };
         for key in keys {
             if meshes.parts.contains_key(&key.mesh) {
@@ -172,9 +176,9 @@ impl<'a> Meshes<'a> {
     pub fn notes(&self) -> impl Iterator<Item = String> {
         let told = |count: usize, of: &str| match count {
             0 => None,
-            1 => Some(format!("1 primitive of {of} is left out: triangles alone are rendered")),
+            1 => Some(format!("1 primitive of {of} is left out: only triangles are rendered")),
             _ => Some(format!(
-                "{count} primitives of {of} are left out: triangles alone are rendered"
+                "{count} primitives of {of} are left out: only triangles are rendered"
             )),
         };
         let bare = self.bare.as_ref().map(|(place, set)| {
@@ -186,21 +190,65 @@ impl<'a> Meshes<'a> {
                 count => format!("{rule} (and {} more primitives)", count - 1),
             }
         });
-        let strange = self.strange.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let strange = strange.into_iter().map(|(name, (place, count))| {
-            let rule = format!(
-                "{place}.attributes.{name} has numbers that are not finite, which is as if they were not there"
-            );
-            match count {
-                1 => rule,
-                2 => format!("{rule} (and so has 1 more primitive)"),
-                count => format!("{rule} (and so have {} more primitives)", count - 1),
-            }
-        });
         [told(self.points, "points"), told(self.lines, "lines"), bare]
             .into_iter()
             .flatten()
-            .chain(strange)
+    }
+
+    /// Returns the vertices that are damaged.
+    pub fn damage(&self) -> Vec<Damage> {
+        let strange = self.strange.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let strange = strange.into_iter().map(|(name, (place, count))| {
+            let what = format!("{place}.attributes.{name} has numbers that are not finite");
+            Damage {
+                what: match count {
+                    1 => what,
+                    2 => format!("{what}, as has 1 more primitive"),
+                    count => format!("{what}, as have {} more primitives", count - 1),
+                },
+                stand_in: "they are ignored",
+            }
+        });
+        let unplaced = self.unplaced.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let unplaced = unplaced.map(|(place, count)| {
+            let triangles = match count {
+                1 => "1 triangle has".to_owned(),
+                _ => format!("{count} triangles have"),
+            };
+            let rule = "that is not finite or beyond 1e9";
+            Damage {
+                what: format!("{place}.attributes.POSITION: {triangles} a vertex with a coordinate {rule}"),
+                stand_in: if count == 1 {
+                    "it is left out"
+                } else {
+                    "they are left out"
+                },
+            }
+        });
+        unplaced.into_iter().chain(strange).collect()
+    }
+
+    /// Returns why there are no triangles.
+    pub fn nothing(&self) -> String {
+        match (self.points, self.lines, self.damage().first()) {
+            (0, 0, None) => "has no triangles".to_owned(),
+            (0, 0, Some(damage)) => format!("has no triangles: {}", damage.what),
+            _ => "has no triangles: points and lines are not rendered".to_owned(),
+        }
+    }
+
+    /// Counts triangles of a primitive that have no position.
+    fn lacks_positions(&self, place: &str, triangles: usize) {
+        if triangles == 0 {
+            return;
+        }
+        let mut unplaced = self.unplaced.lock().unwrap_or_else(PoisonError::into_inner);
+        let (first, count) = unplaced.get_or_insert_with(|| (place.to_owned(), 0));
+        *count += triangles;
+        // Meshes are built in any order.
+        if (place.len(), place) < (first.len(), first.as_str()) {
+            place.clone_into(first);
+        }
     }
 
     /// Keeps in mind that an attribute has numbers that are none.
@@ -224,7 +272,16 @@ impl<'a> Meshes<'a> {
             let used = materials.get(part.material);
             let first = whole.vertices(self, part, used, key, skin.as_ref())?;
             let count = whole.counts[&first];
-            let triangles = self.triangles(part, count)?;
+            let mut triangles = self.triangles(part, count)?;
+            if !whole.unplaced.is_empty() {
+                let has_positions = |triangle: &[u32; 3]| {
+                    let is_unplaced = |vertex: &u32| whole.unplaced.contains(&(first + *vertex as usize));
+                    !triangle.iter().any(is_unplaced)
+                };
+                let before = triangles.len();
+                triangles.retain(has_positions);
+                self.lacks_positions(&part.place, before - triangles.len());
+            }
             let mirrors = key.flat().is_some_and(|map| map.matrix3.determinant() < 0.0);
             let triangles = match mirrors {
                 true => triangles.into_iter().map(|[a, b, c]| [a, c, b]).collect(),
@@ -329,6 +386,8 @@ struct Whole {
     /// The first vertices of what primitives share, by the accessors that they are from, and how many there are.
     known: HashMap<Vec<usize>, usize>,
     counts: HashMap<usize, usize>,
+    /// Vertices whose coordinates are not finite, or too large.
+    unplaced: HashSet<usize>,
 }
 
 impl Whole {
@@ -426,12 +485,11 @@ impl Whole {
         if let Some(map) = key.flat() {
             (0..count).for_each(|i| carry(&map, i, &mut placed, normals.as_mut(), tangents.as_mut()));
         }
-        if let Some(i) = placed
-            .iter()
-            .position(|p| !(p.is_finite() && p.abs().max_element() <= LARGEST_COORDINATE))
-        {
-            let rule = format!("vertex {i} is at {}; coordinates must be from -1e9 to 1e9", placed[i]);
-            return Err(fault("attributes.POSITION", rule));
+        for (i, position) in placed.iter_mut().enumerate() {
+            if !(position.is_finite() && position.abs().max_element() <= LARGEST_COORDINATE) {
+                *position = DVec3::ZERO;
+                self.unplaced.insert(first + i);
+            }
         }
         self.draft.positions.extend(placed.iter().map(|p| *p + DVec3::ZERO));
         if let Some(normals) = normals {

@@ -100,6 +100,8 @@ pub struct Imported {
     pub instances: Vec<Placed>,
     /// Image files by the names that textures have for them.
     pub images: BTreeMap<String, Arc<[u8]>>,
+    /// Why image files are missing, by the names that textures have for them.
+    pub absent: BTreeMap<String, String>,
     pub materials: Vec<ImportedMaterial>,
     pub lights: Vec<LightDescription>,
     pub cameras: Vec<ImportedCamera>,
@@ -107,8 +109,19 @@ pub struct Imported {
     pub animations: usize,
     /// What a user should know of it.
     pub notes: Vec<String>,
+    /// Damaged parts.
+    pub damage: Vec<Damage>,
     /// The files that it is made of.
     files: BTreeSet<PathBuf>,
+}
+
+/// A damaged part of a file, for which a stand-in is rendered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Damage {
+    /// The place and what is wrong with it.
+    pub what: String,
+    /// What is rendered instead.
+    pub stand_in: &'static str,
 }
 
 /// A mesh in the scene.
@@ -353,9 +366,10 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
         ));
     }
     notes.extend(meshes.notes());
+    imported.damage = meshes.damage();
     // What is scaled to nothing may be so at this moment of an animation alone.
     if imported.instances.is_empty() && flat == 0 {
-        return Err(document.fault("scene", "has no triangles".to_owned()));
+        return Err(document.fault("scene", meshes.nothing()));
     }
     let corners = imported.corners();
     let first = corners.first().copied().unwrap_or_default();
@@ -372,16 +386,17 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
     notes.extend(light::brightness(&imported.lights, (low + high) / 2.0));
     let (materials, images) = materials.finish(&mut notes)?;
     imported.materials = materials;
-    imported.images = images;
+    imported.images = images.read;
+    imported.absent = images.absent;
     notes.splice(0..0, document.notes.iter().cloned());
     imported.notes = notes;
     Ok(imported)
 }
 
-/// Whether a map keeps a mesh a mesh: it is finite, and no axis is squeezed to nothing.
+/// Returns whether an instance of a scene may have this transform. Where it may not, the transform is applied to the vertices.
 fn is_placeable(map: &DAffine3) -> bool {
     let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis];
     let lengths = [x, y, z].map(DVec3::length);
     let volume = x.cross(y).dot(z).abs() / (lengths[0] * lengths[1] * lengths[2]);
-    map.is_finite() && lengths.iter().all(|length| *length >= 1e-6) && volume > 1e-6
+    map.is_finite() && lengths.iter().all(|length| (1e-6..=1e6).contains(length)) && volume > 1e-6
 }

@@ -41,6 +41,29 @@ pub(super) fn data(uri: &str) -> Result<Vec<u8>, String> {
     }
 }
 
+/// Why a file that a URI names is not read. The text is the value with the rule.
+#[derive(Debug)]
+pub(super) enum Unfound {
+    /// It cannot be found.
+    Absent(String),
+    /// Its name or its place breaks a rule.
+    Refused(String),
+}
+
+impl From<String> for Unfound {
+    fn from(rule: String) -> Self {
+        Unfound::Refused(rule)
+    }
+}
+
+impl From<Unfound> for String {
+    fn from(unfound: Unfound) -> Self {
+        match unfound {
+            Unfound::Absent(why) | Unfound::Refused(why) => why,
+        }
+    }
+}
+
 /// Where the files that a model names are.
 #[derive(Clone, Debug)]
 pub(super) struct Folder {
@@ -51,11 +74,11 @@ pub(super) struct Folder {
 }
 
 impl Folder {
-    /// Finds a file that a URI names; the path is without links. The error is the value with the rule.
-    pub fn find(&self, uri: &str) -> Result<PathBuf, String> {
+    /// Finds a file that a URI names; the path is without links.
+    pub fn find(&self, uri: &str) -> Result<PathBuf, Unfound> {
         if let Some(scheme) = scheme(uri) {
             let rule = "it must be a relative path, or a data URI";
-            return Err(format!("{} begins with \"{scheme}:\"; {rule}", shown(uri)));
+            return Err(format!("{} begins with \"{scheme}:\"; {rule}", shown(uri)).into());
         }
         let decoded = percent_decode_str(uri)
             .decode_utf8()
@@ -65,11 +88,11 @@ impl Folder {
         let names = [&*decoded, uri, &turned];
         for name in names {
             if name.starts_with(['/', '\\']) || Path::new(name).has_root() || Path::new(name).is_absolute() {
-                return Err(format!("{} must be a relative path", shown(uri)));
+                return Err(format!("{} must be a relative path", shown(uri)).into());
             }
         }
         if decoded.is_empty() {
-            return Err("\"\" must be the path of a file".to_owned());
+            return Err("\"\" must be the path of a file".to_owned().into());
         }
         let mut found = names.iter().map(|name| self.folder.join(name).canonicalize());
         let first = found.next().unwrap_or_else(|| Err(io::ErrorKind::NotFound.into()));
@@ -77,17 +100,17 @@ impl Folder {
             Err(error) if error.kind() == io::ErrorKind::NotFound => found.find_map(Result::ok).ok_or(error),
             first => first,
         };
-        let path = path.map_err(|error| format!("{} cannot be read: {error}", shown(uri)))?;
+        let path = path.map_err(|error| Unfound::Absent(format!("{} cannot be read: {error}", shown(uri))))?;
         let root = self.root.canonicalize().map_err(|error| {
             let root = self.root.display();
             format!("{} must lie in {root}, which cannot be found: {error}", shown(uri))
         })?;
         if !path.starts_with(&root) {
             let root = self.root.display();
-            return Err(format!("{} must not leave the folder {root}", shown(uri)));
+            return Err(format!("{} must not leave the folder {root}", shown(uri)).into());
         }
         if !path.is_file() {
-            return Err(format!("{} must be a file", shown(uri)));
+            return Err(format!("{} must be a file", shown(uri)).into());
         }
         Ok(path)
     }
@@ -179,7 +202,7 @@ mod tests {
             let path = folder.find(uri).unwrap();
             assert_eq!(read(&path, 3).unwrap(), b"yes", "{uri}");
         }
-        let told = |uri: &str| folder.find(uri).unwrap_err();
+        let told = |uri: &str| String::from(folder.find(uri).unwrap_err());
         let outside = "must not leave the folder";
         for uri in [
             "../secret.bin",
@@ -242,11 +265,14 @@ mod tests {
         };
         assert!(folder.find("in.bin").is_ok());
         for uri in ["out.bin", "up/secret.bin"] {
-            assert!(folder.find(uri).unwrap_err().contains("must not leave"), "{uri}");
+            assert!(
+                String::from(folder.find(uri).unwrap_err()).contains("must not leave"),
+                "{uri}"
+            );
         }
         let made = std::process::Command::new("mkfifo").arg(root.join("pipe")).status();
         if made.is_ok_and(|status| status.success()) {
-            assert!(folder.find("pipe").unwrap_err().ends_with("must be a file"));
+            assert!(String::from(folder.find("pipe").unwrap_err()).ends_with("must be a file"));
             assert!(read(&root.join("pipe"), 9).is_err());
         }
     }

@@ -119,13 +119,18 @@ pub(super) fn invalid(text: &str, origin: &str, problem: Problem, defines: &Defi
     let key = key_in_file(text, &problem.key, defines);
     // There it has another name.
     let message = problem.message.replace("\"conductor\"", "\"specular\"");
+    let problem = Problem {
+        key: key.clone(),
+        message,
+        ..problem
+    };
     if defines.brought(&key) {
-        return SceneError::Override(Problem { key, message }.at("define"));
+        return SceneError::Override(problem.at("define"));
     }
     SceneError::Invalid {
         origin: origin.to_owned(),
         line: place(text, begin(text, &key)).0,
-        problem: Problem { key, message },
+        problem,
     }
 }
 
@@ -157,7 +162,15 @@ impl Broken {
                         "recursion limit exceeded",
                         "lists and objects must be in each other at most 127 deep",
                     );
-                (line, column, Problem { key, message }.to_string())
+                (
+                    line,
+                    column,
+                    Problem {
+                        key,
+                        ..Problem::new(message)
+                    }
+                    .to_string(),
+                )
             }
             Broken::Value(problem) => {
                 let (line, column) = place(text, begin(text, &problem.key));

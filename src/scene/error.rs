@@ -99,6 +99,14 @@ pub struct Problem {
     pub key: KeyPath,
     /// The value and the rule.
     pub message: String,
+    /// Whether it is damage to a file that the scene names, for which a stand-in exists ([`Assets::strict`](super::Assets::strict)).
+    pub(crate) is_damage: bool,
+}
+
+impl From<String> for Problem {
+    fn from(message: String) -> Self {
+        Problem::new(message)
+    }
 }
 
 impl Problem {
@@ -116,6 +124,15 @@ impl Problem {
         Self {
             key: KeyPath::default(),
             message: cut_to(LONGEST_MESSAGE, &message.into()).into_owned(),
+            is_damage: false,
+        }
+    }
+
+    /// Returns the problem of a damaged file.
+    pub(super) fn damage(message: impl Into<String>) -> Self {
+        Self {
+            is_damage: true,
+            ..Self::new(message)
         }
     }
 }

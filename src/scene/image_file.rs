@@ -10,6 +10,7 @@ use std::sync::Arc;
 use image::error::LimitErrorKind;
 use image::{DynamicImage, ImageError, ImageFormat};
 
+use super::Problem;
 use super::decode::{Channels, Header, LONGEST_SIDE, Refused, decode};
 use super::halves::halved;
 use super::parse::list;
@@ -38,8 +39,12 @@ pub struct Assets {
     pub encoded: BTreeMap<String, Arc<[u8]>>,
     /// The longest side of what is kept of those, in texels: larger ones are halved until they are no longer than it.
     pub longest_side: Option<u32>,
+    /// Image files that are missing, by the names that textures have for them, with the reason.
+    pub(super) absent: BTreeMap<String, String>,
     /// Meshes in memory by their names.
     pub meshes: BTreeMap<String, Arc<Mesh>>,
+    /// Whether damage to a file is an error. Otherwise it is a warning, and a stand-in is rendered.
+    pub strict: bool,
 }
 
 /// A place that an image comes from.
@@ -74,7 +79,21 @@ impl Assets {
             images: BTreeMap::new(),
             encoded: BTreeMap::new(),
             longest_side: None,
+            absent: BTreeMap::new(),
             meshes: BTreeMap::new(),
+            strict: false,
+        }
+    }
+
+    /// Returns the warning about damage to a file, which names the stand-in for what is missing.
+    ///
+    /// # Errors
+    ///
+    /// The damage itself if [`Assets::strict`] is set.
+    pub(super) fn tolerate(&self, damage: Problem, stand_in: &str) -> Result<String, Problem> {
+        match self.strict {
+            true => Err(damage),
+            false => Ok(format!("{}; {stand_in}", damage.message)),
         }
     }
 
@@ -115,6 +134,7 @@ impl Assets {
             default,
             encoding: default,
             is_alpha: false,
+            damage: None,
         })
     }
 
@@ -126,13 +146,15 @@ impl Assets {
         place: &Place,
         part: Part,
         fits: impl Fn(Header) -> Result<(), String>,
-    ) -> Result<File, String> {
+    ) -> Result<File, Problem> {
         let encoding = part.encoding();
         let bytes = match place {
             Place::Memory(_) if part == Part::Alpha => {
-                return Err(format!("{file:?} is an image in memory, which has no alpha channel"));
+                return Err(Problem::new(format!(
+                    "{file:?} is an image in memory, which has no alpha channel"
+                )));
             }
-            Place::Memory(_) => return self.image_in_memory(file, encoding, fits),
+            Place::Memory(_) => return Ok(self.image_in_memory(file, encoding, fits)?),
             Place::File(path) => Cow::Owned(read(file, path)?),
             Place::Encoded(name) => Cow::Borrowed(self.encoded.get(name).map_or(&[][..], |bytes| bytes)),
         };
@@ -140,22 +162,24 @@ impl Assets {
             .ok()
             .filter(|format| NAMES.iter().any(|(known, _)| known == format));
         let is_named = matches!(place, Place::File(_));
-        let format = format.ok_or_else(|| match is_named {
-            true => format!("{file:?} must be a PNG, JPEG, WebP, EXR or HDR file"),
-            false if bytes.starts_with(KTX2) => {
-                format!("{file:?} is a KTX2 file, which is not read; it must be a PNG, JPEG or WebP file")
-            }
-            false => format!("{file:?} must be a PNG, JPEG or WebP file"),
+        let format = format.ok_or_else(|| {
+            Problem::damage(match is_named {
+                _ if bytes.starts_with(KTX2) => {
+                    format!("{file:?} is a KTX2 file, which is not supported; convert it to PNG or JPEG")
+                }
+                true => format!("{file:?} must be a PNG, JPEG, WebP, EXR or HDR file"),
+                false => format!("{file:?} must be a PNG, JPEG or WebP file"),
+            })
         })?;
         if is_named {
             check_name(file, format)?;
         }
         let is_float = matches!(format, ImageFormat::OpenExr | ImageFormat::Hdr);
         if is_float && encoding == Some(Encoding::Srgb) {
-            return Err(format!(
+            return Err(Problem::new(format!(
                 "{file:?} must not be \"srgb\": files of type {} are linear",
                 name(format)
-            ));
+            )));
         }
         let longest = self.longest_side.filter(|_| matches!(place, Place::Encoded(_)));
         let halvings = |width: u32, height: u32| {
@@ -171,10 +195,13 @@ impl Assets {
             })
         };
         let decoded = decode(&bytes, format, fits).map_err(|refused| match refused {
-            Refused::Rule(rule) => rule,
-            Refused::Large(rule) => format!("{file:?} {rule}"),
-            Refused::Channels(channels) => format!("{file:?} {}", refused_channels(&channels)),
-            Refused::Image(error) => format!("{file:?} {}", refused_image(&error)),
+            Refused::Rule(rule) => Problem::new(rule),
+            Refused::Large(rule) => Problem::new(format!("{file:?} {rule}")),
+            Refused::Channels(channels) => Problem::new(format!("{file:?} {}", refused_channels(&channels))),
+            Refused::Image(error) => Problem {
+                is_damage: !matches!(error, ImageError::Limits(_)),
+                ..Problem::new(format!("{file:?} {}", refused_image(&error)))
+            },
         })?;
         drop(bytes);
         let (width, height) = (decoded.width(), decoded.height());
@@ -185,7 +212,7 @@ impl Assets {
             Part::Alpha => alpha(decoded).ok_or_else(|| format!("{file:?} must have an alpha channel"))?,
         };
         let mut image = Image { width, height, texels };
-        in_range(file, &image)?;
+        let damage = clamp(&mut image).map(|damage| format!("{file:?} {damage}"));
         for _ in 0..halvings(width, height) {
             image = halved(&image);
         }
@@ -195,11 +222,15 @@ impl Assets {
             default,
             encoding: encoding.unwrap_or(default),
             is_alpha: part == Part::Alpha,
+            damage,
         })
     }
 
     /// Where an image is.
-    pub(super) fn find(&self, file: &str) -> Result<Place, String> {
+    pub(super) fn find(&self, file: &str) -> Result<Place, Problem> {
+        if let Some(why) = self.absent.get(file) {
+            return Err(Problem::damage(why));
+        }
         if self.images.contains_key(file) {
             return Ok(Place::Memory(file.to_owned()));
         }
@@ -207,14 +238,14 @@ impl Assets {
             return Ok(Place::Encoded(file.to_owned()));
         }
         let path = self.folder.join(file).canonicalize();
-        let path = path.map_err(|error| unreadable(file, &error))?;
+        let path = path.map_err(|error| Problem::damage(unreadable(file, &error)))?;
         let root = self.root.canonicalize().map_err(|error| {
             let root = self.root.display();
             format!("{file:?} must lie in {root}, the asset root, which cannot be found: {error}")
         })?;
         if !path.starts_with(&root) && !self.elsewhere.contains(Path::new(file)) {
             let root = self.root.display();
-            return Err(match self.root == self.folder {
+            return Err(Problem::new(match self.root == self.folder {
                 true => format!(
                     "{file:?} must not leave the scene's folder, {root}, unless another asset root is given that it lies in"
                 ),
@@ -222,10 +253,10 @@ impl Assets {
                     "{file:?} is {}, which must lie in {root}, the asset root",
                     path.display()
                 ),
-            });
+            }));
         }
         if !path.is_file() {
-            return Err(format!("{file:?} must be a file"));
+            return Err(Problem::new(format!("{file:?} must be a file")));
         }
         Ok(Place::File(path))
     }
@@ -253,6 +284,32 @@ fn in_range(name: &str, image: &Image) -> Result<(), String> {
     Ok(())
 }
 
+/// Clamps the values of texels that no image has. Returns what was wrong with them, if anything was.
+fn clamp(image: &mut Image) -> Option<String> {
+    let Texels::Floats(values) = &mut image.texels else {
+        return None;
+    };
+    let is_bad = |value: &f32| !(0.0..=BRIGHTEST).contains(value);
+    let (mut first, mut count) = (0, 0_usize);
+    for (i, texel) in values
+        .iter_mut()
+        .enumerate()
+        .filter(|(_, texel)| texel.iter().any(is_bad))
+    {
+        first = if count == 0 { i } else { first };
+        count += 1;
+        // The comparison is false for NaN, which becomes 0.
+        *texel = texel.map(|x| if x > 0.0 { x.min(BRIGHTEST) } else { 0.0 });
+    }
+    let (x, y) = (first as u32 % image.width, first as u32 / image.width);
+    let rule = "the values of each must be finite, from 0 to 1e6";
+    match count {
+        0 => None,
+        1 => Some(format!("has 1 bad texel, at ({x}, {y}); {rule}")),
+        _ => Some(format!("has {count} bad texels, the first at ({x}, {y}); {rule}")),
+    }
+}
+
 /// A file that was read, or an image that was in memory.
 #[derive(Clone)]
 pub(super) struct File {
@@ -262,6 +319,8 @@ pub(super) struct File {
     default: Encoding,
     encoding: Encoding,
     is_alpha: bool,
+    /// Bad texels of the file, which were clamped.
+    pub damage: Option<String>,
 }
 
 /// What is taken of a file.
@@ -304,16 +363,16 @@ fn check_name(file: &str, format: ImageFormat) -> Result<(), String> {
     }
 }
 
-fn read(file: &str, path: &Path) -> Result<Vec<u8>, String> {
+fn read(file: &str, path: &Path) -> Result<Vec<u8>, Problem> {
     let mut bytes = Vec::new();
-    let too_large = || format!("{file:?} must not be larger than {} MiB", LARGEST_FILE >> 20);
+    let too_large = || Problem::new(format!("{file:?} must not be larger than {} MiB", LARGEST_FILE >> 20));
     // What says so at once is not read.
     if fs::metadata(path).is_ok_and(|data| data.len() > LARGEST_FILE) {
         return Err(too_large());
     }
     fs::File::open(path)
         .and_then(|opened| opened.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
-        .map_err(|error| unreadable(file, &error))?;
+        .map_err(|error| Problem::damage(unreadable(file, &error)))?;
     if bytes.len() as u64 > LARGEST_FILE {
         return Err(too_large());
     }
@@ -332,7 +391,7 @@ fn refused_image(error: &ImageError) -> String {
         }
         ImageError::Limits(_) => "takes more memory when it is read than its header tells".to_string(),
         ImageError::Unsupported(_) => format!("must be of a kind that can be read: {error}"),
-        _ => format!("is damaged or cut short: {error}"),
+        _ => format!("is damaged or truncated: {error}"),
     }
 }
 

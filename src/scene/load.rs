@@ -60,6 +60,8 @@ pub struct Overrides {
     /// So many frames, 1 to 100,000, around what the camera looks at, in place of the way that it goes by itself: a picture of one is that of
     /// [`Overrides::frame`], from 1 on.
     pub turntable: Option<u32>,
+    /// Whether damage to a file that the scene names is an error. Otherwise it is a warning, and a stand-in is rendered.
+    pub strict: bool,
     /// What is shown of a glTF file, and from where.
     pub gltf: GltfChoice,
     /// Values for any keys of the file, one after the other; the fields above go before them.
@@ -234,23 +236,26 @@ fn load_gltf(
         description = description.defined(&mut defines).map_err(SceneError::Override)?;
     }
     overrides.apply(&mut description).map_err(SceneError::Override)?;
-    // What is said of the shape of the file is said of the file.
+    // Messages about the shape are about the file, whose name stands before them.
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let place = format!("{name}: ");
+    let own = |message: &str| {
+        let message = message.strip_prefix(&place).unwrap_or(message);
+        message.replace(&format!("\"{name}/"), "\"")
+    };
     let invalid = |problem: Problem| {
         SceneError::Gltf(GltfError::File {
             path: path.to_owned(),
             message: match problem.key.to_string() == "shapes[0].file" {
-                true => problem.message,
+                true => own(&problem.message),
                 false => problem.to_string(),
             },
         })
     };
     let assets = overrides.assets(folder_of(path), folder_of(path));
     let mut scene = overrides.finish(description.validate_and_list(&assets, files), invalid, |_| {})?;
-    let name = format!("{}: ", path.file_name().unwrap_or_default().to_string_lossy());
     for note in &mut scene.notes {
-        if let Some(rest) = note.strip_prefix(&name) {
-            *note = rest.to_owned();
-        }
+        *note = own(note);
     }
     Ok((scene, description))
 }
@@ -372,6 +377,7 @@ impl Overrides {
         }
         let around = self.environment.as_ref().and_then(|around| around.file.clone());
         assets.elsewhere.extend(around.map(PathBuf::from));
+        assets.strict = self.strict;
         assets
     }
 
@@ -459,6 +465,7 @@ light_samples = { pattern = 'random', count = 5 }
             environment: None,
             background: None,
             turntable: None,
+            strict: false,
             gltf: GltfChoice::default(),
             define: Vec::new(),
         };

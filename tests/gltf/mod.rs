@@ -5,6 +5,7 @@ mod agreement;
 mod animations;
 mod build;
 mod cameras;
+mod damage;
 mod geometry;
 mod lights;
 mod materials;

@@ -1,7 +1,7 @@
 //! EXR files of one channel are gray images.
 
 use exr::prelude::*;
-use wgray::scene::{Scene, Texels, TextureKind};
+use wgray::scene::{Overrides, Scene, Texels, TextureKind};
 
 const SIZE: (usize, usize) = (3, 2);
 
@@ -21,7 +21,11 @@ fn load(folder: &std::path::Path) -> std::result::Result<Texels, String> {
         camera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }\n\
         [textures.t]\ntype = 'image'\nfile = 't.exr'\n";
     std::fs::write(folder.join("s.toml"), text).unwrap();
-    let scene = Scene::load(folder.join("s.toml")).map_err(|error| error.to_string())?;
+    let strict = Overrides {
+        strict: true,
+        ..Overrides::default()
+    };
+    let scene = Scene::load_with(folder.join("s.toml"), &strict).map_err(|error| error.to_string())?;
     let TextureKind::Image { image, .. } = &scene.textures[0].kind else {
         panic!("an image");
     };
@@ -76,6 +80,6 @@ fn two_channels_that_are_no_colour_are_refused_and_damage_is_told() {
     for length in [20, bytes.len() / 2, bytes.len() - 1] {
         std::fs::write(&path, &bytes[..length]).unwrap();
         let message = load(folder.path()).unwrap_err();
-        assert!(message.contains("\"t.exr\" is damaged or cut short: "), "{message}");
+        assert!(message.contains("\"t.exr\" is damaged or truncated: "), "{message}");
     }
 }

@@ -3,6 +3,7 @@
 
 mod agreement;
 mod bad_input;
+mod damage;
 mod differentials;
 mod filters;
 

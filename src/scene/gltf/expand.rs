@@ -94,10 +94,16 @@ impl Expanded {
             _ => false,
         });
         match (brought, problem.key.0.as_slice()) {
-            (Some(origin), _) => Problem::new(problem.to_string())
-                .at("file")
-                .at(origin.shape)
-                .at("shapes"),
+            (Some(origin), _) => Problem {
+                is_damage: problem.is_damage,
+                ..match problem.is_damage {
+                    true => Problem::new(problem.message),
+                    false => Problem::new(problem.to_string()),
+                }
+            }
+            .at("file")
+            .at(origin.shape)
+            .at("shapes"),
             (None, [Segment::Key(list), Segment::Index(i), rest @ ..]) if list == "shapes" => {
                 let plain = |(_, shape): &(usize, &ShapeDescription)| !matches!(shape, ShapeDescription::Gltf(_));
                 let number = description.shapes.iter().enumerate().filter(plain).nth(*i);
@@ -114,7 +120,7 @@ impl Expanded {
 
     fn add(&mut self, shape: usize, gltf: &GltfDescription, files: &mut BTreeSet<PathBuf>) -> Result<(), Problem> {
         let transform = placement(gltf.translate, gltf.rotate, gltf.scale, gltf.matrix.as_ref())?;
-        let Place::File(path) = self.assets.find(&gltf.file).map_err(Problem::new).at("file")? else {
+        let Place::File(path) = self.assets.find(&gltf.file).at("file")? else {
             return Err(Problem::of(
                 "file",
                 format!("{:?} is in memory, and no glTF file", gltf.file),
@@ -155,6 +161,10 @@ impl Expanded {
             let name = format!("{prefix}{name}");
             self.assets.encoded.insert(name, Arc::clone(bytes));
         }
+        for (name, why) in &imported.absent {
+            let why = format!("{}: {why}", gltf.file);
+            self.assets.absent.insert(format!("{prefix}{name}"), why);
+        }
         let first = self.description.instances.len();
         for placed in &imported.instances {
             let materials = placed.materials.iter().enumerate();
@@ -174,6 +184,11 @@ impl Expanded {
         (self.description.lights).extend(lights.map(|light| moved(light, &transform)));
         let notes = imported.notes.iter().map(|note| format!("{}: {note}", gltf.file));
         self.notes.extend(notes);
+        for damage in &imported.damage {
+            let what = Problem::damage(format!("{}: {}", gltf.file, damage.what));
+            let note = self.assets.tolerate(what, damage.stand_in).at("file")?;
+            self.notes.push(note);
+        }
         self.origins.push(Origin {
             shape,
             prefix,

@@ -489,7 +489,7 @@ fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator)
     };
     Problem {
         key: KeyPath(path),
-        message,
+        ..Problem::new(message)
     }
 }
 

@@ -18,19 +18,39 @@ use super::super::{
     ValueDescription,
 };
 use super::path::needs_path;
-use super::{At, BTreeMap, Checked, Color, Problem, between, check, color, list, number, show_pair};
+use super::{At, BTreeMap, BTreeSet, Checked, Color, Problem, between, check, color, list, number, show_pair};
 
 /// What all texels together may take, in bytes, as they are rendered from.
 pub(in crate::scene) const TEXEL_MEMORY: u64 = 1 << 30;
 
+/// Returns the textures, and the indices of those whose image is damaged: a constant, their factor, stands in for each.
 pub(super) fn textures(
     descriptions: &BTreeMap<String, TextureDescription>,
     images: &mut Images,
-) -> Checked<Vec<Texture>> {
-    let textures = descriptions
-        .iter()
-        .map(|(name, description)| texture(description, images).at(name.as_str()));
-    textures.collect()
+) -> Checked<(Vec<Texture>, BTreeSet<usize>)> {
+    let mut damaged = BTreeSet::new();
+    let mut textures = Vec::with_capacity(descriptions.len());
+    for (name, description) in descriptions {
+        let texture = texture(description, images).at(name.as_str());
+        textures.push(match (texture, description) {
+            (Err(problem), TextureDescription::Image(image)) if problem.is_damage => {
+                images.tolerate(problem, "its factor alone stands in for it")?;
+                damaged.insert(textures.len());
+                constant(DVec3::from_slice(&image.factor))
+            }
+            (texture, _) => texture?,
+        });
+    }
+    Ok((textures, damaged))
+}
+
+/// Returns a texture of one colour.
+fn constant(color: DVec3) -> Texture {
+    Texture {
+        kind: TextureKind::Constant(color),
+        transform: [DVec3::X, DVec3::Y],
+        uv_set: 0,
+    }
 }
 
 /// The images so far: each file is read and kept once, whatever its names and however many textures have it.
@@ -40,6 +60,8 @@ pub(super) struct Images<'a> {
     files: BTreeMap<Place, Vec<(File, u64)>>,
     /// The memory of all of them, in bytes.
     taken: u64,
+    /// Warnings about damage to their files, once for each.
+    pub(super) notes: Vec<String>,
 }
 
 impl<'a> Images<'a> {
@@ -49,10 +71,20 @@ impl<'a> Images<'a> {
             assets,
             files: BTreeMap::new(),
             taken: 0,
+            notes: Vec::new(),
         }
     }
 
-    fn image(&mut self, texture: &ImageTextureDescription, part: Part) -> Result<Arc<Image>, String> {
+    /// Warns of damage to a file, or returns it as an error ([`Assets::tolerate`]).
+    fn tolerate(&mut self, damage: Problem, stand_in: &str) -> Checked<()> {
+        let note = self.assets.tolerate(damage, stand_in)?;
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+        Ok(())
+    }
+
+    fn image(&mut self, texture: &ImageTextureDescription, part: Part) -> Checked<Arc<Image>> {
         let needs_levels = texture.filter.needs_levels();
         self.with_words(&texture.file, part, |header| {
             let Header { width, height, is_deep } = header;
@@ -62,7 +94,7 @@ impl<'a> Images<'a> {
     }
 
     /// The image that surrounds the scene: its texels lie apart from those of a texture of the same file.
-    pub(super) fn around(&mut self, file: &str) -> Result<Arc<Image>, String> {
+    pub(super) fn around(&mut self, file: &str) -> Checked<Arc<Image>> {
         let others = self.taken;
         let image = self.with_words(file, Part::Colors(None), |header| {
             words_around(header.width, header.height)
@@ -72,7 +104,7 @@ impl<'a> Images<'a> {
         if self.taken - others < 4 * words {
             let bytes = others + 4 * words;
             if bytes > TEXEL_MEMORY {
-                return Err(too_much(file, (image.width, image.height), 4 * words, others));
+                return Err(too_much(file, (image.width, image.height), 4 * words, others).into());
             }
             self.taken = bytes;
         }
@@ -90,9 +122,8 @@ impl<'a> Images<'a> {
     }
 
     /// An image of a file or of memory, of which so many words are rendered from.
-    fn with_words(&mut self, file: &str, part: Part, wanted: impl Fn(Header) -> u64) -> Result<Arc<Image>, String> {
+    fn with_words(&mut self, file: &str, part: Part, wanted: impl Fn(Header) -> u64) -> Checked<Arc<Image>> {
         let place = self.assets.find(file)?;
-        let known = self.files.entry(place.clone()).or_default();
         let taken = self.taken;
         // With what it takes already.
         let fits = |header: Header, before: u64| {
@@ -103,7 +134,11 @@ impl<'a> Images<'a> {
                 false => Err(too_much(file, (header.width, header.height), bytes, others)),
             }
         };
-        if let Some((known, before)) = known.iter_mut().find(|(known, _)| known.is(part)) {
+        let known = self
+            .files
+            .get_mut(&place)
+            .and_then(|files| files.iter_mut().find(|(known, _)| known.is(part)));
+        if let Some((known, before)) = known {
             known.check_name(file)?;
             let words = fits(Header::of(&known.image), *before)?;
             self.taken += 4 * (words - *before);
@@ -113,7 +148,11 @@ impl<'a> Images<'a> {
         let read = self
             .assets
             .image(file, &place, part, |header| fits(header, 0).map(|_| ()))?;
+        if let Some(damage) = &read.damage {
+            self.tolerate(Problem::damage(damage), "they are clamped")?;
+        }
         let words = fits(Header::of(&read.image), 0)?;
+        let known = self.files.entry(place).or_default();
         self.taken += 4 * words;
         let image = Arc::clone(&read.image);
         known.push((read, words));
@@ -131,11 +170,7 @@ fn too_much(file: &str, (width, height): (u32, u32), bytes: u64, others: u64) ->
 
 pub(super) fn texture(description: &TextureDescription, images: &mut Images) -> Checked<Texture> {
     Ok(match description {
-        TextureDescription::Constant(constant) => Texture {
-            kind: TextureKind::Constant(color(constant.color).at("color")?),
-            transform: [DVec3::X, DVec3::Y],
-            uv_set: 0,
-        },
+        TextureDescription::Constant(plain) => constant(color(plain.color).at("color")?),
         TextureDescription::Checker(checker) => Texture {
             kind: TextureKind::Checker {
                 even: color(checker.even).at("even")?,
@@ -176,7 +211,7 @@ fn image_texture(texture: &ImageTextureDescription, part: Part, images: &mut Ima
         format!("{} must be from 0 to {}", texture.uv_set, UV_SETS - 1)
     })
     .at("uv_set")?;
-    let image = images.image(texture, part).map_err(Problem::new).at("file")?;
+    let image = images.image(texture, part).at("file")?;
     Ok(Texture {
         kind: TextureKind::Image {
             image,
@@ -224,6 +259,8 @@ pub(super) struct Textures<'a> {
     pub(super) textures: &'a [Texture],
     /// Those of the alpha of images, which lie behind the others, by their names; or what is wrong with them.
     pub(super) alphas: BTreeMap<&'a str, Result<usize, String>>,
+    /// Those whose image is damaged.
+    pub(super) damaged: BTreeSet<usize>,
     /// Which materials there are depends on it.
     pub(super) integrator: Integrator,
 }
@@ -245,8 +282,10 @@ pub(super) fn alphas<'a>(
         };
         alphas.entry(texture.as_str()).or_insert_with(|| match description {
             TextureDescription::Image(image) => {
-                let added = image_texture(image, Part::Alpha, images).map_err(|problem| problem.message)?;
-                textures.push(added);
+                textures.push(match image_texture(image, Part::Alpha, images) {
+                    Err(problem) if problem.is_damage => constant(DVec3::splat(image.factor[3])),
+                    added => added.map_err(|problem| problem.message)?,
+                });
                 Ok(textures.len() - 1)
             }
             _ => Err(format!("{texture:?} must be a texture of type \"image\" to have alpha")),
@@ -311,6 +350,9 @@ impl Textures<'_> {
             return Ok(None);
         };
         let texture = self.find(name)?;
+        if self.damaged.contains(&texture) {
+            return Ok(None);
+        }
         let TextureKind::Image { image, factor, .. } = &self.textures[texture].kind else {
             return Err(Problem::new(format!("{name:?} must be a texture of type \"image\"")).at("texture"));
         };
@@ -332,6 +374,9 @@ impl Textures<'_> {
             return Ok(None);
         };
         let texture = self.find_name(name)?;
+        if self.damaged.contains(&texture) {
+            return Ok(None);
+        }
         let TextureKind::Image { image, factor, .. } = &self.textures[texture].kind else {
             return Err(Problem::new(format!("{name:?} must be a texture of type \"image\"")));
         };
@@ -369,7 +414,10 @@ impl Textures<'_> {
             return Ok(Color::BLACK);
         };
         needs_path(self.integrator)?;
-        self.color(emission)
+        let color = self.color(emission)?;
+        // Only parts of a surface shine, as a rule: its factor alone would light the whole scene.
+        let is_damaged = matches!(color, Color::Texture(texture) if self.damaged.contains(&texture));
+        Ok(if is_damaged { Color::BLACK } else { color })
     }
 
     /// Only paths have this type.

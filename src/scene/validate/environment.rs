@@ -83,7 +83,7 @@ fn described(description: &EnvironmentDescription, images: &mut Images) -> Check
             visible: description.visible,
             background,
         }),
-        (None, Some(file), None) => Ok(with(images.around(file).map_err(Problem::new).at("file")?)),
+        (None, Some(file), None) => Ok(with(images.around(file).at("file")?)),
         (None, None, Some(EnvironmentName::Studio)) => own("studio", studio(), images),
         (None, None, Some(EnvironmentName::Sky)) => own("sky", self::sky(&sky), images),
         _ => Err(Problem::new("must have one of \"color\", \"file\" and \"name\"")),

@@ -146,7 +146,7 @@ fn load(file: &str, normals: Option<Normals>, known: &mut Known) -> Checked<Arc<
     if let Some(mesh) = known.assets.meshes.get(file) {
         return Ok(Arc::clone(mesh));
     }
-    let place = known.assets.find(file).map_err(Problem::new).at("file")?;
+    let place = known.assets.find(file).at("file")?;
     let Place::File(path) = place else {
         return Err(Problem::new(format!("{file:?} is an image in memory, and no mesh"))).at("file");
     };

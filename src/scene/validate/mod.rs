@@ -87,12 +87,13 @@ impl Description {
         let names = self.materials.keys().map(String::as_str);
         let indices: BTreeMap<_, _> = names.zip(0..).collect();
         let mut images = Images::new(assets);
-        let mut textures = appearance::textures(&self.textures, &mut images).at("textures")?;
+        let (mut textures, damaged) = appearance::textures(&self.textures, &mut images).at("textures")?;
         let alphas = appearance::alphas(&self.materials, &self.textures, &mut images, &mut textures);
         let known = Textures {
             names: self.textures.keys().map(String::as_str).collect(),
             textures: &textures,
             alphas,
+            damaged,
             integrator: self.render.integrator,
         };
         let materials = (self.materials.iter())

@@ -133,11 +133,12 @@ impl<'a> Looks<'a> {
 
     /// What is odd about the materials that are used.
     pub fn notes(self) -> impl Iterator<Item = String> {
-        self.oddities.into_values().map(|(first, count)| match count {
+        let oddities = self.oddities.into_values().map(|(first, count)| match count {
             1 => first,
             2 => format!("{first} (and 1 more material)"),
             _ => format!("{first} (and {} more materials)", count - 1),
-        })
+        });
+        self.images.notes.into_iter().chain(oddities)
     }
 
     /// `Ka` is not looked at: exporters write what they like there, and one ambient light wants the colour of the surface.
@@ -217,7 +218,7 @@ impl<'a> Looks<'a> {
     /// The texture of an image, or why there is none.
     fn map(&mut self, path: &Path) -> Result<usize, String> {
         let file = self.shown(path).to_string_lossy().into_owned();
-        let place = self.images.assets.find(&file)?;
+        let place = self.images.assets.find(&file).map_err(|problem| problem.message)?;
         if let Some(texture) = self.maps.get(&place) {
             return Ok(*texture);
         }

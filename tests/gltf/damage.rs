@@ -1,0 +1,163 @@
+//! Damaged parts of files: a stand-in with a warning, or an error under `strict`.
+
+use std::path::Path;
+
+use serde_json::json;
+use wgray::scene::{Color, Overrides, Reflection, Scene, TextureKind, Value};
+
+use super::build::{Builder, Component, Packing, QUAD, QUAD_INDICES};
+use crate::place::Place;
+
+fn load(file: &Path, strict: bool) -> Result<Scene, String> {
+    let overrides = Overrides {
+        strict,
+        ..Overrides::default()
+    };
+    Scene::load_with(file, &overrides).map_err(|error| error.to_string())
+}
+
+/// The triangles of all meshes.
+fn triangles(scene: &Scene) -> usize {
+    let meshes = wgray::pack::pack(scene).meshes;
+    meshes.iter().map(|mesh| mesh.triangles.len()).sum()
+}
+
+#[test]
+fn a_missing_texture_leaves_the_factor() {
+    let place = Place::with_file("a", "");
+    std::fs::write(place.folder().join("broken.png"), b"\x89PNG\r\n\x1a\nno more").unwrap();
+    for (uri, why) in [
+        ("missing.png", "images[0].uri: \"missing.png\" cannot be read: "),
+        (
+            "data:image/png;base64,*",
+            "images[0].uri: the data URI must be base64: ",
+        ),
+        ("broken.png", "\"images[0]\" is damaged or truncated: "),
+        (
+            "data:image/png;base64,",
+            "\"images[0]\" must be a PNG, JPEG or WebP file",
+        ),
+    ] {
+        let mut builder = Builder::new();
+        let image = builder.add("images", json!({ "uri": uri }));
+        let texture = builder.add("textures", json!({ "source": image }));
+        let info = json!({ "index": texture });
+        let material = builder.add(
+            "materials",
+            json!({
+                "pbrMetallicRoughness": {
+                    "baseColorFactor": [0.5, 0.25, 1, 1], "baseColorTexture": info,
+                    "metallicRoughnessTexture": info, "roughnessFactor": 0.75,
+                },
+                "normalTexture": info, "emissiveTexture": info, "emissiveFactor": [1, 1, 1],
+            }),
+        );
+        let mesh = builder.quad(Some(material));
+        builder.root_node(json!({ "mesh": mesh }));
+        let file = builder.write_unsound(place.folder(), "texture", Packing::Binary);
+        let scene = load(&file, false).unwrap();
+        assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
+        let note = &scene.notes[0];
+        assert!(
+            note.starts_with(why) && note.ends_with("; its factor alone stands in for it"),
+            "{note}"
+        );
+        let Reflection::Principled(principled) = &scene.materials[0].reflection else {
+            panic!("{:?}", scene.materials);
+        };
+        let constant = |texture: usize| match scene.textures[texture].kind {
+            TextureKind::Constant(color) => color.to_array(),
+            ref other => panic!("{other:?}"),
+        };
+        let Color::Texture(base) = principled.base_color else {
+            panic!("{principled:?}");
+        };
+        assert_eq!(constant(base), [0.5, 0.25, 1.0]);
+        let Value::Texture(rough, _) = principled.roughness else {
+            panic!("{principled:?}");
+        };
+        assert_eq!(constant(rough), [1.0, 0.75, 1.0]);
+        assert_eq!(
+            (scene.materials[0].emission, scene.materials[0].normal_map),
+            (Color::BLACK, None)
+        );
+        let error = load(&file, true).unwrap_err();
+        assert!(error.starts_with(&format!("{}: {why}", file.display())), "{error}");
+    }
+}
+
+#[test]
+fn triangles_without_a_position_are_left_out() {
+    let place = Place::with_file("a", "");
+    for (bad, left) in [(0, 0), (1, 1), (3, 1), (4, 2)] {
+        for value in [f64::NAN, f64::INFINITY, -2e9] {
+            let mut builder = Builder::new();
+            let mut points = QUAD.to_vec();
+            points.push([9.0, 9.0, 0.0]); // no triangle has it
+            points[bad][1] = value;
+            let position = builder.attribute(Component::F32, false, &points);
+            let indices = builder.indices(&QUAD_INDICES);
+            let primitive = json!({ "attributes": { "POSITION": position }, "indices": indices });
+            let mesh = builder.add("meshes", json!({ "primitives": [primitive] }));
+            builder.root_node(json!({ "mesh": mesh }));
+            let whole = builder.quad(None);
+            builder.root_node(json!({ "mesh": whole }));
+            // JSON has no NaN: the bounds are of what is sound.
+            builder.get("accessors")[position]["min"] = json!([-1, -1, 0]);
+            builder.get("accessors")[position]["max"] = json!([9, 9, 0]);
+            let file = builder.write_unsound(place.folder(), "positions", Packing::Binary);
+            let scene = load(&file, false).unwrap();
+            let context = format!("{bad} {value}: {:?}", scene.notes);
+            assert_eq!(triangles(&scene), left + 2, "{context}");
+            let rule = "a vertex with a coordinate that is not finite or beyond 1e9";
+            let what = match left {
+                0 => format!("meshes[0].primitives[0].attributes.POSITION: 2 triangles have {rule}"),
+                1 => format!("meshes[0].primitives[0].attributes.POSITION: 1 triangle has {rule}"),
+                _ => String::new(),
+            };
+            let strict = load(&file, true);
+            if what.is_empty() {
+                assert!(scene.notes.is_empty() && strict.is_ok(), "{context}");
+                continue;
+            }
+            let note = &scene.notes[0];
+            assert!(note.starts_with(&what) && note.ends_with(" left out"), "{context}");
+            assert_eq!(strict.unwrap_err(), format!("{}: {what}", file.display()));
+        }
+    }
+}
+
+#[test]
+fn a_node_may_have_any_scale() {
+    let place = Place::with_file("a", "");
+    for scale in [1e-8, 1e-6, 1e6, 1e8, 5e8] {
+        let mut builder = Builder::new();
+        let mesh = builder.quad(None);
+        builder.root_node(json!({ "mesh": mesh, "scale": [scale, scale, scale] }));
+        let file = builder.write(place.folder(), "scaled", Packing::Binary);
+        let scene = load(&file, true).unwrap_or_else(|error| panic!("{error}"));
+        assert!(scene.notes.is_empty(), "{:?}", scene.notes);
+        assert_eq!(triangles(&scene), 2, "{scale}");
+        let (low, high) = scene.bounds().expect("bounds");
+        let wide = high - low;
+        assert!(
+            (wide.max_element() / (2.0 * scale) - 1.0).abs() < 1e-6,
+            "{scale}: {wide}"
+        );
+    }
+    // Nothing is left of what is too large.
+    let mut builder = Builder::new();
+    let mesh = builder.quad(None);
+    builder.root_node(json!({ "mesh": mesh }));
+    builder.root_node(json!({ "mesh": mesh, "scale": [1e12, 1e12, 1e12] }));
+    let file = builder.write(place.folder(), "large", Packing::Binary);
+    let scene = load(&file, false).unwrap();
+    assert_eq!(triangles(&scene), 2);
+    assert_eq!(
+        scene.notes,
+        [
+            "meshes[0].primitives[0].attributes.POSITION: 2 triangles have a vertex with a coordinate that is not finite or \
+             beyond 1e9; they are left out"
+        ]
+    );
+}
