@@ -156,8 +156,20 @@ pub fn rust(relative: &str) -> syn::File {
     syn::parse_file(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// All functions of a Rust file outside of its tests and `impl`s, in its order.
+/// All functions of a Rust file outside of its tests and `impl`s, in its order. A function that updates an argument in
+/// place has the signature of the WGSL function that takes the value before and returns the value after.
 pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
+    let updated = |function: &syn::ItemFn| {
+        let arguments = function.sig.inputs.iter();
+        let mut exclusive = arguments.filter_map(|input| match input {
+            FnArg::Typed(typed) => match &*typed.ty {
+                Type::Reference(reference) if reference.mutability.is_some() => Some(rust_type(&reference.elem)),
+                _ => None,
+            },
+            FnArg::Receiver(_) => None,
+        });
+        exclusive.next()
+    };
     let argument = |input: &FnArg| match input {
         FnArg::Typed(typed) => match &*typed.pat {
             Pat::Ident(name) => (name.ident.to_string(), rust_type(&typed.ty)),
@@ -170,7 +182,7 @@ pub fn rust_functions(file: &syn::File) -> Vec<Signature> {
             name: function.sig.ident.to_string(),
             parts: function.sig.inputs.iter().map(argument).collect(),
             result: match &function.sig.output {
-                ReturnType::Default => None,
+                ReturnType::Default => updated(function),
                 ReturnType::Type(_, ty) => Some(rust_type(ty)),
             },
         }),

@@ -97,6 +97,17 @@ fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String
         .filter(two_sided)
         .collect();
     let mut twins: Vec<_> = rust_functions(twin).into_iter().filter(two_sided).collect();
+    // WGSL names an argument `before` where Rust updates it in place.
+    let in_place = |wgsl: &Signature, twin: &Signature| {
+        let names = |s: &Signature, name: &str| s.parts.iter().any(|(n, ty)| n == name && Some(ty) == s.result.as_ref());
+        names(wgsl, "before") && names(twin, "state")
+    };
+    for twin in &mut twins {
+        if functions.iter().any(|f| f.name == twin.name && in_place(f, twin)) {
+            let state = twin.parts.iter_mut().find(|(name, _)| name == "state");
+            state.expect("the argument just found").0 = "before".to_string();
+        }
+    }
     if !is_shared(file) {
         for twin in &mut twins {
             if twin.parts.first().is_some_and(|(_, ty)| ty == "Packed") {
@@ -181,6 +192,15 @@ fn a_twin_that_drifted_is_found() {
             "{what}"
         );
     }
+}
+
+#[test]
+fn an_argument_updated_in_place_stands_for_a_result() {
+    let functions = |text: &str| rust_functions(&syn::parse_file(text).expect("Rust"));
+    let by_value = functions("fn advance(state: PathState, pixel: UVec2) -> PathState { state }");
+    assert_eq!(functions("fn advance(state: &mut PathState, pixel: UVec2) {}"), by_value);
+    assert_ne!(functions("fn advance(state: &PathState, pixel: UVec2) {}"), by_value);
+    assert_ne!(functions("fn advance(state: &mut Path, pixel: UVec2) {}"), by_value);
 }
 
 #[test]

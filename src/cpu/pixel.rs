@@ -27,7 +27,7 @@ pub fn pixel_radiance(scene: &Packed, pixel: UVec2, sample: u32) -> (Vec4, Layer
         Integrator::Path => {
             let mut state = path::begin_path(scene, pixel, sample);
             while !state.ended {
-                state = path::advance(scene, state, pixel);
+                path::advance(scene, &mut state, pixel);
             }
             (path::path_value(&state), path::path_layers(&state))
         }
