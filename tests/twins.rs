@@ -99,7 +99,8 @@ fn twin_differences(source: &Source, file: &str, twin: &syn::File) -> Vec<String
     let mut twins: Vec<_> = rust_functions(twin).into_iter().filter(two_sided).collect();
     // WGSL names an argument `before` where Rust updates it in place.
     let in_place = |wgsl: &Signature, twin: &Signature| {
-        let names = |s: &Signature, name: &str| s.parts.iter().any(|(n, ty)| n == name && Some(ty) == s.result.as_ref());
+        let names =
+            |s: &Signature, name: &str| s.parts.iter().any(|(n, ty)| n == name && Some(ty) == s.result.as_ref());
         names(wgsl, "before") && names(twin, "state")
     };
     for twin in &mut twins {
@@ -198,7 +199,10 @@ fn a_twin_that_drifted_is_found() {
 fn an_argument_updated_in_place_stands_for_a_result() {
     let functions = |text: &str| rust_functions(&syn::parse_file(text).expect("Rust"));
     let by_value = functions("fn advance(state: PathState, pixel: UVec2) -> PathState { state }");
-    assert_eq!(functions("fn advance(state: &mut PathState, pixel: UVec2) {}"), by_value);
+    assert_eq!(
+        functions("fn advance(state: &mut PathState, pixel: UVec2) {}"),
+        by_value
+    );
     assert_ne!(functions("fn advance(state: &PathState, pixel: UVec2) {}"), by_value);
     assert_ne!(functions("fn advance(state: &mut Path, pixel: UVec2) {}"), by_value);
 }
