@@ -198,6 +198,30 @@ pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
     if new.validate().is_ok() { new } else { camera.clone() }
 }
 
+/// Nearest and farthest distance to the look-at point that a dolly reaches, relative to that of the file's camera.
+const DOLLY_RANGE: [f64; 2] = [0.01, 1000.0];
+
+/// Dollies like [`moved`], but within bounds. At the near bound the look-at point moves along, so that the camera never gets stuck
+/// in front of it; at the far bound the camera stops.
+pub fn dollied(camera: &CameraDescription, by: f64, file: &CameraDescription) -> CameraDescription {
+    let size = |camera: &CameraDescription| match camera {
+        CameraDescription::Orthographic(c) => c.height,
+        other => {
+            let View { position, look_at, .. } = view(other);
+            position.distance(look_at)
+        }
+    };
+    let [near, far] = DOLLY_RANGE.map(|factor| factor * size(file));
+    let now = size(camera);
+    let wanted = now * (-by).exp();
+    let reached = wanted.max(near.min(now)).min(far.max(now));
+    let near_end = moved(camera, Move::Dolly((now / reached).ln()));
+    if wanted < reached && !matches!(camera, CameraDescription::Orthographic(_)) {
+        return moved(&near_end, Move::Fly(0.0, 0.0, 1.0 - wanted / reached));
+    }
+    near_end
+}
+
 /// A moved camera after the file's was edited: what the edit changed is the file's, the rest stays. `None` if that is
 /// the file's camera.
 pub fn merged(
@@ -389,6 +413,30 @@ mod tests {
             panic!()
         };
         assert_eq!(near.height, 1.0);
+    }
+
+    #[test]
+    fn a_dolly_never_sticks_nor_leaves_the_scene() {
+        let file = perspective();
+        let distance = |camera: &CameraDescription| view(camera).position.distance(view(camera).look_at);
+        let (mut near, mut far) = (file.clone(), file.clone());
+        for _ in 0..80 {
+            near = dollied(&near, 0.1, &file);
+            far = dollied(&far, -0.1, &file);
+        }
+        assert!((distance(&near) - 0.04).abs() < 1e-3, "{}", distance(&near));
+        let further = dollied(&near, 0.1, &file);
+        let step = view(&further).position.y - view(&near).position.y;
+        assert!((step - 0.04 * 0.095).abs() < 1e-3, "it moves on: {step}");
+        assert!((distance(&further) - distance(&near)).abs() < 1e-4);
+        assert!(distance(&dollied(&near, -0.1, &file)) > distance(&near));
+        assert!(distance(&far) < 4001.0, "{}", distance(&far));
+        assert_eq!(distance(&dollied(&far, -0.1, &file)), distance(&far));
+        assert!(distance(&dollied(&far, 0.1, &file)) < distance(&far));
+        for by in [1e9, -1e9, f64::NAN] {
+            dollied(&file, by, &file).validate().unwrap();
+            dollied(&orthographic(), by, &orthographic()).validate().unwrap();
+        }
     }
 
     #[test]

@@ -77,9 +77,10 @@ impl History {
         }
     }
 
-    /// Somebody else has changed the file.
-    pub fn forget(&mut self) {
-        *self = History::default();
+    /// Drops all steps because another program has changed the file. Returns whether there were any.
+    pub fn forget(&mut self) -> bool {
+        let History { done, undone } = std::mem::take(self);
+        !(done.is_empty() && undone.is_empty())
     }
 
     /// What was changed last, and what was taken back last.

@@ -178,6 +178,10 @@ pub struct State {
     pub scenes: u64,
     /// What was written into the scene file last, and can be taken back: `camera`, `materials.red.color`.
     pub undo: Option<String>,
+    /// Why nothing can be undone, if another program's change of the file dropped the history.
+    pub undo_blocked: Option<String>,
+    /// Why the scene file cannot be edited here, if that is so: it is glTF or JSON.
+    pub read_only: Option<String>,
     /// What was taken back last, and can be written again.
     pub redo: Option<String>,
     /// Whether the camera's last step can be taken back, and one be made again.

@@ -10,7 +10,7 @@ use super::edit::{Layout, line_end, line_start};
 use super::source::{Loaded, Sources};
 use crate::cpu::geometry::pixel_first_hit;
 use crate::pack::{Camera, NOTHING, Packed};
-use crate::scene::{Description, Field, KeyPath, Names, Pieces, Segment, ShapeDescription, fields, is_course, is_gltf};
+use crate::scene::{Description, Field, KeyPath, Names, Pieces, Segment, ShapeDescription, fields};
 
 /// So many lines of a table are told.
 const MOST_LINES: usize = 40;
@@ -181,10 +181,9 @@ impl Seen {
         else {
             return not_there();
         };
-        let kind = match &self.sources.scene {
-            scene if is_gltf(scene) => "glTF",
-            scene if is_course(scene) => "JSON",
-            _ => {
+        let reason = match self.sources.read_only() {
+            Some(reason) => reason,
+            None => {
                 let pieces = self.loaded.pieces();
                 let names = self.names();
                 let mut groups: Vec<Group> = self.group(&pieces, &path, &names).into_iter().collect();
@@ -210,12 +209,7 @@ impl Seen {
                 };
             }
         };
-        let mut object = self.gone(
-            name,
-            format!("the scene file is {kind}: wgray convert makes a scene of it that can be changed"),
-        );
-        object.name = name.to_owned();
-        object
+        self.gone(name, reason)
     }
 
     /// The table of the scene file at a path.

@@ -137,19 +137,24 @@ struct Shared {
 }
 
 /// The page's modules.
-const MODULES: [(&str, &str); 17] = [
+const MODULES: [(&str, &str); 22] = [
     ("/camera.js", include_str!("page/camera.js")),
     ("/color.js", include_str!("page/color.js")),
     ("/compare.js", include_str!("page/compare.js")),
-    ("/object.js", include_str!("page/object.js")),
+    ("/controls.js", include_str!("page/controls.js")),
     ("/editor.js", include_str!("page/editor.js")),
     ("/focus.js", include_str!("page/focus.js")),
+    ("/invalid.js", include_str!("page/invalid.js")),
     ("/link.js", include_str!("page/link.js")),
+    ("/motion.js", include_str!("page/motion.js")),
     ("/numbers.js", include_str!("page/numbers.js")),
+    ("/object.js", include_str!("page/object.js")),
+    ("/overlay.js", include_str!("page/overlay.js")),
     ("/page.js", include_str!("page/page.js")),
     ("/parts.js", include_str!("page/parts.js")),
     ("/picture.js", include_str!("page/picture.js")),
     ("/probes.js", include_str!("page/probes.js")),
+    ("/problems.js", include_str!("page/problems.js")),
     ("/render.js", include_str!("page/render.js")),
     ("/shader.js", include_str!("page/shader.js")),
     ("/times.js", include_str!("page/times.js")),
@@ -267,6 +272,8 @@ enum Ask {
     Inspect(Inspect),
     /// Which objects have this in their names?
     Objects(String),
+    /// The viewer has displayed this frame and all before it.
+    Shown(u64),
     #[serde(untagged)]
     Command(Command),
 }
@@ -378,6 +385,10 @@ async fn answer(asked: &str, shared: &Shared) -> Option<Tell<'static>> {
         Ok(Ask::Objects(part)) => {
             let found = of_scene(shared, Listed::default, move |seen| seen.objects(&part)).await;
             Some(Tell::Objects(found))
+        }
+        Ok(Ask::Shown(frame)) => {
+            let _ = frame; // frames are not counted yet
+            None
         }
         Ok(Ask::Command(command)) => {
             let dropped = || Tell::Refused("busy: a command was dropped".to_string());

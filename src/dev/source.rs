@@ -12,7 +12,7 @@ use crate::gpu::compose::{self, Shaders};
 use crate::image::AovSource;
 use crate::pack::{Packed, Specialization, pack};
 use crate::scene::{
-    CameraDescription, Description, Draft, Integrator, Overrides, Pieces, Places, Scene, folder_of, is_gltf,
+    CameraDescription, Description, Draft, Integrator, Overrides, Pieces, Places, Scene, folder_of, is_course, is_gltf,
     read_bytes, read_text,
 };
 
@@ -145,6 +145,18 @@ pub enum Stamp {
 }
 
 impl Sources {
+    /// Returns why the scene file cannot be edited here, if that is so.
+    pub fn read_only(&self) -> Option<String> {
+        let kind = match &self.scene {
+            scene if is_gltf(scene) => "glTF",
+            scene if is_course(scene) => "JSON",
+            _ => return None,
+        };
+        Some(format!(
+            "{kind} files are read-only here; run `wgray convert` for an editable scene"
+        ))
+    }
+
     /// Reads everything.
     pub fn read(&self) -> Snapshot {
         self.read_scene(self.read_shaders())

@@ -236,17 +236,14 @@ fn a_gltf_file_is_told_to_be_one_and_stays() {
     let scene = seen(&running);
     let clicked = scene.at([12, 11]);
     assert_eq!((clicked.name.as_str(), clicked.groups.len()), ("shapes[0]", 0));
-    let told = "the scene file is glTF: wgray convert makes a scene of it that can be changed";
+    let told = "glTF files are read-only here; run `wgray convert` for an editable scene";
     assert_eq!(clicked.gone.as_deref(), Some(told));
     for (name, _) in scene.objects("").objects {
         assert_eq!(scene.object(&name, None).gone.as_deref(), Some(told), "{name}");
     }
     for path in ["shapes[0].file", "camera.fov", "render.seed"] {
         let said = set(&running, path, json!(1)).unwrap();
-        assert!(
-            said.ends_with("it is glTF, and wgray convert makes a scene of it"),
-            "{said}"
-        );
+        assert!(said.ends_with("run `wgray convert` for an editable scene"), "{said}");
     }
     assert_eq!(fs::read(files.path("box.glb")).unwrap(), before);
     assert_eq!(running.state().undo, None);

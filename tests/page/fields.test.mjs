@@ -303,7 +303,7 @@ test("whoever finds no place is told so, and gets one that falls free", async ()
     await Promise.all(window.others.map((socket) => new Promise((resolve) => (socket.onopen = resolve))));
   });
   const late = await visit(browser, studio);
-  await late.locator("#badge", { hasText: "as many look as may at once" }).waitFor();
+  await late.locator("#badge", { hasText: "Viewer limit reached" }).waitFor();
   await page.evaluate(() => window.others[0].close());
   await late.locator("#badge.live").waitFor({ state: "attached" });
 });
@@ -362,7 +362,7 @@ test("a count of cells goes from square to square", async () => {
   await count(9);
   await page.locator("#most-samples").fill("1.5");
   await page.keyboard.press("Enter");
-  await page.locator("#notice.bad", { hasText: "1.5 must be a whole number" }).waitFor();
+  await page.locator("#notice.bad", { hasText: "must be a whole number from 1 to 65,536, not 1.5" }).waitFor();
   assert.equal(await page.locator("#most-samples").inputValue(), "");
   // Of another pattern any number is one.
   await box(page, "render.pixel_samples.pattern").selectOption("sobol");

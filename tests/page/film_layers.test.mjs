@@ -76,7 +76,7 @@ test("what a scene does not have is off and says why, until it has it", async ()
   assert.equal(await group.getAttribute("label"), "Light");
   // The variance has the scale of its false colours beside it.
   await choose(page, "variance");
-  await page.locator("#legend", { hasText: "2^-12" }).waitFor();
+  await page.locator("#legend", { hasText: "2⁻¹²" }).waitFor();
   await page.locator("[data-part=picture] canvas").hover();
   await page.locator("#values", { hasText: /variance .*standard error/ }).waitFor();
   assert.equal(await page.locator("#layers").evaluate((select) => select.classList.contains("chosen")), true);

@@ -171,7 +171,7 @@ test("the views show what they say, the GPU agrees with the CPU", async () => {
   assert.deepEqual(captions, ["GPU", "CPU", "Difference × 256"]);
   assert.match((await shown(page, "difference"))[2], /^[0,]+$/);
   studio.redden();
-  await page.locator("#differing", { hasText: /^[\d,]+ pixels differ, by 0\.\d+ at most$/ }).waitFor();
+  await page.locator("#differing", { hasText: /^[\d,]+ pixels differ, by at most 0\.\d+$/ }).waitFor();
   await page.selectOption("#gain", "1");
   await settled(page);
   assert.equal(await text(page, "[data-part=difference] figcaption"), "Difference × 1");
@@ -229,9 +229,9 @@ test("the keyboard alone is enough", async () => {
   await page.keyboard.press("l");
   await page.locator("#values", { hasText: /pixel 61 45 .*linear RGB/ }).waitFor();
   await page.keyboard.press("+");
-  await page.locator("#zoom", { hasText: /^\d+ %$/ }).waitFor();
+  await page.locator("#zoom", { hasText: /^\d+%$/ }).waitFor();
   await page.keyboard.press("0");
-  await page.locator("#zoom", { hasText: /^fit/ }).waitFor();
+  await page.locator("#zoom", { hasText: /^Fit/ }).waitFor();
   await page.keyboard.press("r");
   await page.locator("#reset:disabled").waitFor();
   assert.equal(await text(page, "#camera-text"), start);
@@ -251,7 +251,7 @@ test("the wheel with Ctrl zooms about the pointer, and the hand shifts the pictu
   await page.waitForFunction(() => Number(document.querySelector("[data-part=picture] canvas").dataset.scale) > 2);
   const [newLeft, newTop, scale] = await view();
   assert.ok(Math.abs(newLeft + 30 * scale - (left + 30)) <= 1 && Math.abs(newTop + 20 * scale - (top + 20)) <= 1);
-  await page.getByLabel("Shift picture").check();
+  await page.getByLabel("Pan image").check();
   const camera = await text(page, "#camera-text");
   await drag(page, 50, 0);
   await page.waitForFunction((old) => Number(document.querySelector("[data-part=picture] canvas").dataset.left) > old + 40, newLeft);
@@ -329,7 +329,7 @@ test("all mistakes are shown at once, those of kernels that are not used now too
   assert.notDeepEqual(await shown(page), seen);
 });
 
-test("pixels that are no light are marked and counted", async () => {
+test("invalid pixels are marked and counted", async () => {
   const page = await open(browser, studio);
   const seen = await shown(page);
   assert.ok(await page.locator("#faults").isHidden());
@@ -341,12 +341,12 @@ test("pixels that are no light are marked and counted", async () => {
     film[index] = sum;`;
   studio.edit("shaders/kernels/render.wgsl", "film[index] = sum;", broken);
   const counts = page.locator("#fault-counts");
-  await page.locator("#fault-counts", { hasText: "light: 1 NaN, 2 infinite, 120 negative" }).waitFor();
+  await page.locator("#fault-counts", { hasText: "pixels: 1 NaN, 2 infinite, 120 negative" }).waitFor();
   await settled(page);
   const at = (picture, x, y) => picture[2].split(",").slice(3 * (y * 120 + x), 3 * (y * 120 + x) + 3).join();
   const marked = await page.evaluate(() => [...document.querySelectorAll("#faults b")].map((b) => getComputedStyle(b).backgroundColor));
   assert.deepEqual(marked, ["rgb(255, 0, 255)", "rgb(0, 255, 255)", "rgb(0, 255, 0)"]);
-  await page.click("#zoom-in"); // a ring is not drawn where a pixel is large
+  await page.click("#zoom-in");
   const zoomed = async (x, y) => {
     await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
     return page.evaluate(([x, y]) => {
@@ -359,9 +359,7 @@ test("pixels that are no light are marked and counted", async () => {
   await page.click("#zoom-fit");
   assert.deepEqual([await zoomed(0, 3), await zoomed(1, 3), await zoomed(2, 3), await zoomed(60, 80)],
     ["255,0,255", "0,255,255", "0,255,255", "0,255,0"]);
-  // At a small scale a ring leads to a single pixel.
-  const ringed = await shown(page);
-  assert.notEqual(at(ringed, 8, 3), at(seen, 8, 3));
+  same([...(await shown(page)).slice(0, 2), at(await shown(page), 8, 3)], [120, 90, at(seen, 8, 3)], "many have no rings");
   await page.uncheck("#marks");
   await settled(page);
   const plain = await shown(page);
@@ -370,7 +368,7 @@ test("pixels that are no light are marked and counted", async () => {
   assert.match(await counts.innerText(), /1 NaN/, "they are counted all the same");
   await page.check("#marks");
   await page.getByLabel("Compare", { exact: true }).check();
-  await page.locator("#fault-counts", { hasText: /light: GPU: 1 NaN, 2 infinite, 120 negative$/ }).waitFor();
+  await page.locator("#fault-counts", { hasText: /pixels: GPU: 1 NaN, 2 infinite, 120 negative$/ }).waitFor();
   assert.deepEqual(page.faults, []);
 });
 

@@ -127,8 +127,8 @@ export class Studio {
   }
 
   // Starts the program; resolves once it says where the page is.
-  async start(port = 0, more = []) {
-    const args = ["dev", "scene.toml", "--shaders", "shaders", "--listen", `127.0.0.1:${port}`, ...more];
+  async start(port = 0, more = [], scene = "scene.toml") {
+    const args = ["dev", scene, "--shaders", "shaders", "--listen", `127.0.0.1:${port}`, ...more];
     this.program = spawn(PROGRAM, args, { cwd: this.folder, stdio: ["ignore", "inherit", "pipe"] });
     this.said = "";
     const found = new Promise((resolve, reject) => {
@@ -162,7 +162,7 @@ export function launch(more = []) {
     executablePath: process.env.WGRAY_CHROMIUM,
     args: [
       "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-      "--disable-component-update", "--disable-sync", ...more,
+      "--disable-component-update", "--disable-sync", ...(process.env.WGRAY_PAGE ? ["--disable-features=LocalNetworkAccessChecks"] : []), ...more,
     ],
   });
 }
@@ -189,14 +189,14 @@ export async function visit(browser, studio, options = {}) {
       page.faults.push(`asks for ${request.url()}`);
     }
   });
-  if (process.env.WGRAY_PAGE) await page.route(/\.(js|css)$/, fromDisk);
+  if (process.env.WGRAY_PAGE) await page.route(/(\.(js|css)|\/)$/, fromDisk);
   await page.goto(studio.url);
   return page;
 }
 
-// WGRAY_PAGE names a folder whose scripts and styles stand in for those in the program, so that they are tried without a build.
+// Serves the page's files from the folder WGRAY_PAGE, so that they are tested without a build.
 function fromDisk(route) {
-  const file = path.join(process.env.WGRAY_PAGE, path.basename(new URL(route.request().url()).pathname));
+  const file = path.join(process.env.WGRAY_PAGE, path.basename(new URL(route.request().url()).pathname) || "index.html");
   return fs.existsSync(file) ? route.fulfill({ path: file }) : route.continue();
 }
 
@@ -218,6 +218,29 @@ export async function settled(page, commands = 0) {
 
 export function revision(page) {
   return page.evaluate(() => Number(document.getElementById("panels").dataset.revision));
+}
+
+// Returns the `nth` input of the control for a value of the selected object.
+export const control = (page, path, nth = 0) => page.locator(`[data-control="${path} ${nth}"]`);
+
+// Selects an object by its name.
+export async function choose(page, name) {
+  await page.fill("#object-find", name);
+  await page.keyboard.press("Enter");
+  await page.locator("#object-name", { hasText: name }).waitFor();
+}
+
+// Records the messages that a page sends from now on; the returned function takes those recorded since its last call.
+export async function listen(page, isWanted = () => true) {
+  await page.evaluate(() => {
+    const send = WebSocket.prototype.send;
+    window.sent = [];
+    WebSocket.prototype.send = function (text) {
+      window.sent.push(JSON.parse(text));
+      return send.call(this, text);
+    };
+  });
+  return async () => (await page.evaluate(() => window.sent.splice(0))).filter(isWanted);
 }
 
 // The pixels that the page shows, or those of a PNG file, as [width, height, RGB bytes joined by commas].

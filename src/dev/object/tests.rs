@@ -382,3 +382,24 @@ fn objects_are_found_by_a_part_of_their_names() {
     let listed = self::seen(&many, Path::new("s.toml"), Overrides::default()).objects("sphere");
     assert_eq!((listed.objects.len(), listed.more), (MOST_LISTED, 201 - MOST_LISTED));
 }
+
+#[test]
+fn a_camera_must_keep_the_keys_that_its_path_does_not_replace() {
+    let required = |camera: &str| {
+        let text = format!("image = {{ width = 4, height = 4 }}\n[camera]\n{camera}");
+        let object = seen(&text, Path::new("a.toml"), Overrides::default()).object("camera", None);
+        let fields = object.groups[0].fields.clone().into_iter();
+        fields
+            .filter(|field| field.required)
+            .map(|field| field.name)
+            .collect::<Vec<_>>()
+    };
+    let view = "position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 45\n";
+    assert_eq!(required(view), ["position", "look_at", "fov"]);
+    let keys = "path.keys = [{ frame = 1, position = [0, -4, 1], look_at = [0, 0, 1], fov = 45 }]";
+    assert!(
+        required(&format!("{view}{keys}"))
+            .iter()
+            .all(|name| name.starts_with("path"))
+    );
+}

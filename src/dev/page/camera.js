@@ -1,8 +1,9 @@
-// The camera: what a drag does, the way back, bookmarks, and the scene file.
+// The camera: drag tools, history, bookmarks, and saving to the scene file.
 
 import { ask, element, lastState, onState } from "/link.js";
+import { enable, make } from "/parts.js";
 
-const MOST = 32; // bookmarks of a scene
+const MAX_BOOKMARKS = 32; // per scene
 
 export function setUpCamera(picture, onKey, showNotice) {
   const tools = { o: "orbit", p: "pan", d: "dolly", v: "fly", h: "hand" };
@@ -15,94 +16,95 @@ export function setUpCamera(picture, onKey, showNotice) {
   element("tools").addEventListener("change", () => picture.stopFlying());
   onKey("Escape", () => (picture.tool() === "fly" ? take("orbit") : false));
 
+  const bookmarks = setUpBookmarks(showNotice);
   const copy = () => copyCamera(showNotice);
   const actions = {
     copy, save: () => ask("save_camera"), undo: () => ask("undo_write"), reset: () => ask("reset_camera"), back: () => ask("back"),
-    forth: () => ask("forth"), "frame-all": () => ask({ frame: null }), bookmark: add,
+    forth: () => ask("forth"), "frame-all": () => ask({ frame: null }), bookmark: bookmarks.add,
   };
   for (const [id, act] of Object.entries(actions)) element(id).addEventListener("click", act);
   onKey("c", copy);
   onKey("r", actions.reset);
-  onKey("b", add);
+  onKey("b", bookmarks.add);
   onKey("z", actions.back);
   onKey("Shift+z", actions.forth);
   onKey("Home", actions["frame-all"]);
   onKey("f", () => ask({ frame: picture.cursor }));
 
-  let scene = null;
   onState((state) => {
     element("camera-text").textContent = state.camera;
     element("moved").hidden = !state.camera_moved;
-    const enabled = { save: state.camera_moved, reset: state.camera_moved, back: state.steps[0], forth: state.steps[1] };
-    for (const [id, on] of Object.entries(enabled)) {
-      element(id).disabled = !on;
-      delete element(id).dataset.off;
-    }
-    element("undo").hidden = state.undo !== "camera";
-    if (state.scene !== scene) {
-      scene = state.scene;
-      showBookmarks();
-    }
+    showButtons(state);
+    bookmarks.show(state.scene);
   });
+}
 
-  // They lie in the browser, by the scene's name: nothing of them is in the file.
-  const place = () => `bookmarks ${scene}`;
-  const stored = () => {
-    try {
-      return JSON.parse(localStorage.getItem(place())) ?? [];
-    } catch {
-      return []; // there is no storage, or something else lies there
-    }
-  };
-  function store(bookmarks) {
-    try {
-      localStorage.setItem(place(), JSON.stringify(bookmarks));
-    } catch {
-      showNotice("the browser keeps no bookmarks here", true);
-    }
-    showBookmarks();
-  }
-
-  function add() {
-    const viewpoint = lastState()?.viewpoint;
-    const bookmarks = stored();
-    if (!viewpoint) return;
-    if (bookmarks.length >= MOST) return showNotice(`${MOST} bookmarks are there already`, true);
-    const numbers = bookmarks.map(({ name }) => Number(/^view (\d+)$/.exec(name)?.[1] ?? 0));
-    store([...bookmarks, { name: `view ${Math.max(0, ...numbers) + 1}`, viewpoint }]);
-  }
-
-  function showBookmarks() {
-    const items = stored().map(({ name, viewpoint }, i) => {
-      const item = document.createElement("li");
-      const button = (text, label, act) => {
-        const button = Object.assign(document.createElement("button"), { type: "button", textContent: text });
-        if (label) button.setAttribute("aria-label", label);
-        button.addEventListener("click", act);
-        return button;
-      };
-      const rename = () => {
-        const given = prompt("Name of the bookmark", name)?.trim();
-        if (given) store(stored().map((bookmark, j) => (j === i ? { ...bookmark, name: given.slice(0, 60) } : bookmark)));
-      };
-      item.append(
-        button(name, null, () => ask({ viewpoint })),
-        button("Rename", `Rename ${name}`, rename),
-        button("×", `Delete ${name}`, () => store(stored().filter((_, j) => j !== i))),
-      );
-      return item;
-    });
-    element("bookmarks").replaceChildren(...items);
-  }
+function showButtons({ camera_moved, steps, undo, read_only }) {
+  const enabled = { save: camera_moved && !read_only, reset: camera_moved, back: steps[0], forth: steps[1] };
+  for (const [id, on] of Object.entries(enabled)) enable(element(id), on);
+  element("undo").hidden = undo !== "camera";
+  element("save").title = read_only ?? "Write this camera to the scene file";
+  element("save").classList.toggle("main", !read_only);
+  element("copy").classList.toggle("main", Boolean(read_only));
 }
 
 async function copyCamera(showNotice) {
   try {
     await navigator.clipboard.writeText(lastState().camera);
-    showNotice("camera copied");
+    showNotice("Camera copied");
   } catch {
-    // Without a secure connection there is no clipboard: the text is selected for the user to copy.
+    // The clipboard needs a secure connection. Without one, the text is selected for the user to copy.
     getSelection().selectAllChildren(element("camera-text"));
-    showNotice("selected: press Ctrl+C to copy");
+    showNotice("Press Ctrl+C to copy the selected camera");
   }
+}
+
+// Bookmarks are stored in the browser by the scene's name, and never in the scene file.
+function setUpBookmarks(showNotice) {
+  let scene = null;
+  const key = () => `bookmarks ${scene}`;
+  const stored = () => {
+    try {
+      return JSON.parse(localStorage.getItem(key())) ?? [];
+    } catch {
+      return []; // storage is disabled or holds something else
+    }
+  };
+  const store = (bookmarks) => {
+    try {
+      localStorage.setItem(key(), JSON.stringify(bookmarks));
+    } catch {
+      showNotice("The browser refused to store the bookmark", true);
+    }
+    showAll();
+  };
+  const add = () => {
+    const viewpoint = lastState()?.viewpoint;
+    const bookmarks = stored();
+    if (!viewpoint) return;
+    if (bookmarks.length >= MAX_BOOKMARKS) return showNotice(`Bookmark limit reached (${MAX_BOOKMARKS}). Delete one first`, true);
+    const numbers = bookmarks.map(({ name }) => Number(/^view (\d+)$/.exec(name)?.[1] ?? 0));
+    store([...bookmarks, { name: `view ${Math.max(0, ...numbers) + 1}`, viewpoint }]);
+  };
+  const rename = (name, i) => {
+    const given = prompt("Bookmark name", name)?.trim();
+    if (given) store(stored().map((bookmark, j) => (j === i ? { ...bookmark, name: given.slice(0, 60) } : bookmark)));
+  };
+  const button = (text, label, act) => {
+    const made = make("button", { type: "button", textContent: text });
+    if (label) made.setAttribute("aria-label", label);
+    made.addEventListener("click", act);
+    return made;
+  };
+  const showAll = () => element("bookmarks").replaceChildren(...stored().map(({ name, viewpoint }, i) => make("li", {},
+    button(name, null, () => ask({ viewpoint })),
+    button("Rename", `Rename ${name}`, () => rename(name, i)),
+    button("×", `Delete ${name}`, () => store(stored().filter((_, j) => j !== i))),
+  )));
+  const show = (name) => {
+    if (name === scene) return;
+    scene = name;
+    showAll();
+  };
+  return { add, show };
 }

@@ -1,4 +1,4 @@
-// Two pictures beside each other: with what, in which layout, and how far they are apart.
+// Comparison of two images: counterpart, layout, and error measures.
 
 import { ask, element, onFrame, onState } from "/link.js";
 import { choose, viewName } from "/view.js";
@@ -12,19 +12,20 @@ export function setUpCompare(picture, onKey, showNotice) {
   element("pace").addEventListener("change", arrange);
   element("gain").addEventListener("change", ({ target }) => ask({ gain: Number(target.value) }));
   element("wipe").addEventListener("input", ({ target }) => picture.wipe(target.valueAsNumber));
+  picture.wiping = (share) => (element("wipe").value = share);
   const keep = () => ask("keep");
   element("keep").addEventListener("click", keep);
   onKey("t", keep);
   onKey("x", () => picture.swap());
   element("reference-file").addEventListener("change", ({ target }) => {
-    if (target.files[0]) give(target.files[0]);
+    if (target.files[0]) upload(target.files[0]);
     target.value = "";
   });
   const panels = element("panels");
   panels.addEventListener("dragover", (event) => event.preventDefault());
   panels.addEventListener("drop", (event) => {
     event.preventDefault();
-    if (event.dataTransfer.files[0]) give(event.dataTransfer.files[0]);
+    if (event.dataTransfer.files[0]) upload(event.dataTransfer.files[0]);
   });
 
   function arrange() {
@@ -35,8 +36,8 @@ export function setUpCompare(picture, onKey, showNotice) {
     if (layout === "flicker" && pace) timer = setInterval(() => picture.swap(), 1000 / pace);
   }
 
-  // A file of the viewer's machine: the program gets its bytes.
-  async function give(file) {
+  // Sends a file of the viewer's machine to the program, which cannot read it itself.
+  async function upload(file) {
     try {
       const answer = await fetch(`/reference/${encodeURIComponent(file.name)}`, { method: "POST", body: file });
       if (!answer.ok) throw new Error((await answer.text()) || `${answer.status} ${answer.statusText}`);
@@ -44,14 +45,15 @@ export function setUpCompare(picture, onKey, showNotice) {
       document.querySelector("input[name=against][value=reference]").checked = true;
       choose("compare");
     } catch (error) {
-      showNotice(`${file.name}: ${error.message}`.replace(`${file.name}: ${file.name}: `, `${file.name}: `), true);
+      const { message } = error;
+      showNotice(message.startsWith(file.name) ? message : `${file.name}: ${message}`, true);
     }
   }
 
   onState((state, heard) => {
     element("reference-name").textContent = state.comparable[1] ?? "none";
     const apart = state.apart;
-    const number = (value) => (value === null ? "no number" : value === 0 ? "0" : value.toPrecision(3));
+    const number = (value) => (value === null ? "not finite" : value === 0 ? "0" : value.toPrecision(3));
     element("rmse").textContent = apart ? number(apart.rmse) : "–";
     element("flip").textContent = apart ? number(apart.flip) : "–";
     if (!heard) return;
@@ -70,12 +72,12 @@ export function setUpCompare(picture, onKey, showNotice) {
     };
     if (differing) {
       const [pixels, largest] = differing;
-      const at = done ? "" : " so far";
-      const apart = largest === null ? "some by no finite number" : `by ${largest.toPrecision(3)} at most`;
+      const soFar = done ? "" : " so far";
+      const apart = largest === null ? "some by a non-finite amount" : `by at most ${largest.toPrecision(3)}`;
       const count = `${pixels.toLocaleString("en")} ${pixels === 1 ? "pixel differs" : "pixels differ"}`;
-      say(pixels ? "differ" : "same", pixels ? `${count}${at}, ${apart}` : `0 pixels differ${at}: all bits are the same`);
+      say(pixels ? "differ" : "same", pixels ? `${count}${soFar}, ${apart}` : `0 pixels differ${soFar}: all bits are the same`);
     } else {
-      say("", viewName(view) === "compare" ? "nothing to compare yet" : "–");
+      say("", viewName(view) === "compare" ? "Nothing to compare yet" : "–");
     }
   });
   arrange();

@@ -1,12 +1,12 @@
 // Links that open a line of a file in an editor.
 
-// The address of a place, {file, line, column}, in the form that the program was given; null where there is none.
-export function editorLink(form, { file, line, column }) {
-  if (!form || !file) return null;
+// Returns the link to a location {file, line, column} by the template that the program was given, or null if either is missing.
+export function editorLink(template, { file, line, column }) {
+  if (!template || !file) return null;
   const path = encodeURI(file.replaceAll("\\", "/")).replace(/[?#&=+;]/g, encodeURIComponent);
-  // Given by functions: in a text `$&` would mean something.
-  return form
-    .replace("/{file}", () => (path.startsWith("/") ? path : `/${path}`)) // the path has its own slash
+  // Replacements are functions because `$&` in a string would be expanded.
+  return template
+    .replace("/{file}", () => (path.startsWith("/") ? path : `/${path}`)) // the path may bring its own slash
     .replaceAll("{file}", () => path)
     .replaceAll("{line}", line ?? 1)
     .replaceAll("{column}", column ?? 1);

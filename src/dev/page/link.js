@@ -1,44 +1,44 @@
-// The connection to the program: what it tells goes to whoever listens, what is asked gets its answer.
+// The WebSocket to the program: distributes its messages to listeners and matches answers to requests.
 
-const RETRY = 500; // milliseconds
-const ANSWER = 2000; // milliseconds in which a program that is there answers
-const ANSWERS = ["asked", "refused", "pixel", "object", "objects"]; // the names of messages that answer
+const RETRY = 500; // milliseconds before a lost connection is opened again
+const ANSWER = 2000; // milliseconds that a running program needs at most to answer a request
+const ANSWERS = ["asked", "refused", "pixel", "object", "objects"]; // messages that answer a request
 const listeners = { state: [], frame: [], link: [], refused: [] };
-const named = new Map(); // who listens to other messages, by their names
+const named = new Map(); // listeners for all other messages, by message name
 let socket = null;
 let state = null;
-let answers = []; // what waits for an answer, {isCommand, resolve}: they come in the order of what was asked
-let asked = 0; // the number of the last command that has one
-let [received, drawn] = [0, 0]; // numbers of frames, so that a late one is not shown after a newer
+let answers = []; // pending requests, {isCommand, resolve}: answers arrive in the order of the requests
+let asked = 0; // the number of the last command that was accepted
+let [received, drawn] = [0, 0]; // frame counters, so that a frame decoded late does not replace a newer one
 
 export const element = (id) => document.getElementById(id);
 
 export const onState = (f) => listeners.state.push(f); // f(state, heard)
 export const onFrame = (f) => listeners.frame.push(f); // f(header, images by name)
-export const onLink = (f) => listeners.link.push(f); // f(whether it is there, whether there is no place)
+export const onLink = (f) => listeners.link.push(f); // f(isConnected, isFull)
 export const onRefused = (f) => listeners.refused.push(f); // f(text)
 export const onMessage = (name, f) => named.set(name, [...(named.get(name) ?? []), f]); // f(value)
 
-const tell = (name, ...values) => listeners[name].forEach((f) => f(...values));
+const emit = (name, ...values) => listeners[name].forEach((f) => f(...values));
 const isOpen = () => socket?.readyState === WebSocket.OPEN;
 
-// Resolves to the answer, or to null if it was refused or nobody is there.
+// Resolves to the answer, or to null if the request is refused or the connection is closed.
 function send(message, isCommand) {
   if (!isOpen()) return Promise.resolve(null);
   socket.send(JSON.stringify(message));
   return new Promise((resolve) => answers.push({ isCommand, resolve }));
 }
 
-// Asks for something; resolves to the command's number.
+// Sends a command; resolves to its number.
 export const ask = (command) => send(command, true);
 
-// Asks a question that changes nothing. What comes of it goes to those who listen for messages too.
+// Sends a question that changes nothing. Listeners for the answer's message receive it too.
 export const put = (question) => send(question, false);
 
-// What is known of a pixel: {x, y, values}.
+// Resolves to the values of a pixel: {x, y, values}.
 export const askPixel = (pixel) => put({ pixel });
 
-// Whether the program has followed all that was asked for here: what is older than a choice must not undo it.
+// Returns whether the program has executed all commands of this page: an older state must not undo a newer choice.
 export const isHeard = () => !answers.some(({ isCommand }) => isCommand) && state !== null && state.heard >= asked;
 export const lastState = () => state;
 
@@ -48,18 +48,18 @@ export function connect() {
   let isIn = false;
   socket.onopen = () => {
     [asked, isIn] = [0, true];
-    tell("link", true, false);
+    emit("link", true, false);
   };
   socket.onmessage = ({ data }) => (typeof data === "string" ? hear(JSON.parse(data)) : showFrame(data));
   socket.onclose = async () => {
     for (const { resolve } of answers) resolve(null);
     answers = [];
-    tell("link", false, !isIn && (await isServed()));
+    emit("link", false, !isIn && (await isServed()));
     setTimeout(connect, RETRY);
   };
 }
 
-// Whether the program answers: if it lets nobody in, its places are taken.
+// Returns whether the program answers HTTP requests. If it does but closes the socket, all viewer slots are taken.
 async function isServed() {
   try {
     return (await fetch("/", { signal: AbortSignal.timeout(ANSWER) })).ok;
@@ -71,23 +71,23 @@ async function isServed() {
 function hear(message) {
   if (message.state) {
     state = message.state;
-    tell("state", state, isHeard());
+    emit("state", state, isHeard());
     return;
   }
   const [[name, value]] = Object.entries(message);
   if (ANSWERS.includes(name)) {
     const { isCommand, resolve } = answers.shift();
     if (name === "asked") asked = value;
-    if (name === "refused") tell("refused", value);
+    if (name === "refused") emit("refused", value);
     resolve(name === "refused" ? null : value);
-    if (isCommand && isHeard()) tell("state", state, true);
+    if (isCommand && isHeard()) emit("state", state, true);
   }
   named.get(name)?.forEach((f) => f(value));
 }
 
-// A frame: the length of its header, the header as JSON, and the PNG files that it counts.
+// Decodes and shows a frame: the length of its header, the header as JSON, and the PNG files that the header lists.
 async function showFrame(data) {
-  const number = ++received;
+  const [order, from] = [++received, socket];
   const length = new DataView(data).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
   let at = 4 + length;
@@ -96,8 +96,20 @@ async function showFrame(data) {
     at += size;
     return [name, await createImageBitmap(blob, { colorSpaceConversion: "none" })];
   });
-  const images = new Map(await Promise.all(decoded));
-  if (number < drawn) return;
-  drawn = number;
-  tell("frame", header, images);
+  try {
+    const images = new Map(await Promise.all(decoded));
+    if (order < drawn) return;
+    drawn = order;
+    emit("frame", header, images);
+  } finally {
+    acknowledge(from, header.number); // even if decoding fails: the program must not wait for this frame for ever
+  }
+}
+
+// Reports a frame, and with it all earlier ones, as displayed once the browser has drawn it. The program keeps few frames in
+// flight, so that a slow connection delays no newer frame.
+function acknowledge(from, number) {
+  requestAnimationFrame(() => {
+    if (from.readyState === WebSocket.OPEN) from.send(JSON.stringify({ shown: number }));
+  });
 }

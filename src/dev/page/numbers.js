@@ -1,17 +1,18 @@
-// Boxes of numbers that are typed into, dragged sideways or stepped by keys.
+// Number boxes that accept typing, horizontal drags and key steps.
 
-const SLACK = 3; // pixels before a press is a drag
-const PIXELS = 10; // of a drag that are one step
-const FINE = 0.1; // of a step, with Shift
+const SLACK = 3; // pixels before a press becomes a drag
+const PIXELS = 10; // pixels of a drag per step
+const FINE = 0.1; // factor of a step while Shift is held
+const LINE = 20; // pixels per line of a wheel event that counts lines
 const KEYS = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
-const HINT = "Drag sideways, or press the arrow keys: with Shift a tenth, by Page Up and Page Down ten steps";
+const HINT = "Drag sideways or press ↑/↓. Shift: 0.1×. Page Up/Down: 10×.";
 
-let typing = null; // the box with a number that is half typed: there is never more than one
+let typing = null; // the box with a half-typed number; at most one exists
 
 export const digits = (x, count) => Number(x.toPrecision(count));
 export const say = (x) => (x === undefined || x === null ? "" : String(x));
 
-// The nearest number that a field may have. Out of a gap, and from square to square, it goes on in the direction in which it came.
+// Returns the nearest value that a field accepts. Gaps and non-squares are skipped in the direction of the change.
 export function fit({ kind, range, gap, squares }, x, from) {
   let found = kind === "whole" ? Math.round(x) : digits(x, 12);
   if (squares) found = (x < from ? Math.floor : Math.ceil)(Math.sqrt(Math.max(found, 0))) ** 2;
@@ -20,21 +21,22 @@ export function fit({ kind, range, gap, squares }, x, from) {
   return found;
 }
 
-// The square that is so many squares from a number.
+// Returns the square number that is `steps` squares away from `x`.
 const square = (x, steps) => Math.max((steps > 0 ? Math.floor : Math.ceil)(Math.sqrt(Math.max(x, 0))) + steps, 0) ** 2;
 
-// How far a step of a number goes that stands with others in a list: they are of about one size.
+// Returns the step size of a number. The numbers of a list share one magnitude.
 function stepOf({ kind, unit, range, step }, list) {
   if (step) return step;
   if (kind === "whole") return 1;
-  const most = Math.max(0, ...list.map((x) => Math.abs(x ?? 0)));
-  if (most > 0) return 10 ** (Math.floor(Math.log10(most)) - 1);
+  const largest = Math.max(0, ...list.map((x) => Math.abs(x ?? 0)));
+  if (largest > 0) return 10 ** (Math.floor(Math.log10(largest)) - 1);
   if (unit === "°") return 1;
   return range && range[1] - range[0] <= 2 ? 0.01 : 0.1;
 }
 
-// Makes a box one for a number of a field. `numbers()` are the list that it stands in, `use(x)` takes its new number: when it is
-// left or Enter is pressed, unless it is empty or none. Returns what shows a number in it, unless one is half typed.
+// Turns a box into the editor of a field's number. `numbers()` returns the list that contains the number. `use(x)` receives a new
+// value on Enter or when the box loses the focus, unless the text is empty or not a number. Returns a function that shows a
+// value unless the user is typing one.
 export function numberField(box, field, numbers, use) {
   let last;
   const take = (x) => {
@@ -59,15 +61,29 @@ export function numberField(box, field, numbers, use) {
   };
 }
 
-// What is half typed in a part of the page is not sent.
+// Discards a half-typed number in a part of the page.
 export function forget(part) {
   if (typing && part.contains(typing)) typing = null;
 }
 
-// Lets a box be dragged and stepped. `numbers()` are the list that it stands in, `use(x)` takes its new number.
+// Browsers step a focused number box by the wheel. Here the wheel always scrolls.
+export function setUpWheel() {
+  document.addEventListener("wheel", (event) => {
+    const box = event.target;
+    if (box !== document.activeElement || !box.matches("input[type=number]")) return;
+    event.preventDefault();
+    if (event.ctrlKey) return; // a zoom gesture
+    const unit = event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? 1 : LINE;
+    const panel = box.closest("aside");
+    const scrolled = panel && panel.scrollHeight > panel.clientHeight ? panel : document.scrollingElement;
+    scrolled.scrollBy(event.deltaX * unit, event.deltaY * unit);
+  }, { passive: false });
+}
+
+// Makes a box respond to drags and step keys. `numbers()` and `use(x)` are those of `numberField`.
 function steppable(box, field, numbers, use) {
-  let press = null; // what a press of the pointer began with
-  let step = 0; // of a key that is held down: it stays while the number changes its size
+  let press = null; // the state of the pointer press in progress
+  let step = 0; // step size while a key is held: constant although the number's magnitude changes
   const now = () => (Number.isFinite(box.valueAsNumber) ? box.valueAsNumber : 0);
   const show = (x, from) => {
     const next = fit(field, x, from);
@@ -82,17 +98,17 @@ function steppable(box, field, numbers, use) {
     if (!steps || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     if (!event.repeat || !step) step = stepOf(field, [...numbers(), now()]);
-    const way = event.shiftKey && field.kind !== "whole" ? FINE : 1;
-    show(field.squares ? square(now(), steps) : now() + steps * way * step, now());
+    const factor = event.shiftKey && field.kind !== "whole" ? FINE : 1;
+    show(field.squares ? square(now(), steps) : now() + steps * factor * step, now());
   });
   box.addEventListener("pointerdown", (event) => {
-    // In a box that is typed into the pointer belongs to the text.
+    // In a focused box the pointer selects text.
     if (event.button !== 0 || box.disabled || document.activeElement === box) return;
     const size = stepOf(field, [...numbers(), now()]) / PIXELS;
-    box.setPointerCapture(event.pointerId); // a quick hand leaves the box at once
+    box.setPointerCapture(event.pointerId); // a fast pointer leaves the box at once
     press = { id: event.pointerId, left: event.clientX, top: event.clientY, at: event.clientX, from: now(), moved: 0, size, dragged: false };
   });
-  // What may be a drag selects no text; a finger's press ends before this comes.
+  // A possible drag must not select text. On touch screens this event follows the release.
   box.addEventListener("mousedown", (event) => press && event.preventDefault());
   box.addEventListener("pointermove", (event) => {
     if (press?.id !== event.pointerId) return;
@@ -100,26 +116,26 @@ function steppable(box, field, numbers, use) {
       const [x, y] = [Math.abs(event.clientX - press.left), Math.abs(event.clientY - press.top)];
       if (x < SLACK || (event.pointerType !== "mouse" && x < y)) return; // a finger may be about to scroll
       press.dragged = true;
-      window.addEventListener("keydown", giveUp, true);
+      window.addEventListener("keydown", cancelByKey, true);
     }
     press.moved += (event.clientX - press.at) * press.size * (event.shiftKey ? FINE : 1);
     press.at = event.clientX;
     show(press.from + press.moved, press.from);
   });
   const end = () => {
-    window.removeEventListener("keydown", giveUp, true);
+    window.removeEventListener("keydown", cancelByKey, true);
     press = null;
   };
-  const takeBack = () => {
+  const cancel = () => {
     const { from, dragged } = press;
     end();
     if (dragged) show(from, from);
   };
-  const giveUp = (event) => {
+  const cancelByKey = (event) => {
     if (event.key !== "Escape" || !press) return;
     event.preventDefault();
     event.stopPropagation();
-    takeBack();
+    cancel();
   };
   box.addEventListener("pointerup", () => {
     const isClick = press && !press.dragged;
@@ -128,5 +144,5 @@ function steppable(box, field, numbers, use) {
     box.focus();
     box.select();
   });
-  box.addEventListener("pointercancel", () => press && takeBack()); // the finger scrolls
+  box.addEventListener("pointercancel", () => press && cancel()); // the browser scrolls
 }

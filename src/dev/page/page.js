@@ -1,32 +1,35 @@
-// The page: the picture and around it what is known and wrong; the sections have modules of their own.
+// The page: sets up all sections, and shows connection, status and notices.
 
 import { setUpCamera } from "/camera.js";
 import { setUpCompare } from "/compare.js";
-import { editorLink } from "/editor.js";
 import { setUpFocus } from "/focus.js";
+import { setUpInvalid } from "/invalid.js";
 import { connect, element, isHeard, lastState, onFrame, onLink, onRefused, onState } from "/link.js";
+import { setUpWheel } from "/numbers.js";
 import { select, setUpObject } from "/object.js";
 import { Picture } from "/picture.js";
 import { setUpProbes } from "/probes.js";
+import { errorBadge, showProblems } from "/problems.js";
 import { setUpRender } from "/render.js";
 import { setUpShader } from "/shader.js";
 import { setUpTimes } from "/times.js";
 import { setUpTouch } from "/touch.js";
 import { setUpView, viewName } from "/view.js";
 
-let isLinked = null; // not known yet
-let isFull = false; // whether nobody more may look
+let isLinked = null; // null until the first connection attempt has finished
+let isFull = false; // whether the viewer limit is reached
 let noticesSeen = null;
 let numberShown = 0; // the number of the frame on the screen
-// What a key does everywhere, and what it does while the picture has the focus.
+// Actions of keys: available everywhere, and only while the image has the focus.
 const [everywhere, atPicture] = [new Map(), new Map()];
 
-// Names a key's action: `key` as KeyboardEvent has it.
+// Registers a key's action; `key` is a `KeyboardEvent.key`.
 const onKey = (key, act) => everywhere.set(key, act);
 const onPictureKey = (key, act) => atPicture.set(key, act);
 
 const picture = new Picture([...document.querySelectorAll("#panels figure")]);
-setUpView(picture, onKey);
+setUpView(picture, onKey, showNotice);
+setUpInvalid();
 setUpCamera(picture, onPictureKey, showNotice);
 setUpCompare(picture, onKey, showNotice);
 setUpProbes(picture, onPictureKey);
@@ -35,34 +38,35 @@ setUpShader();
 setUpTimes();
 setUpObject();
 setUpTouch();
+setUpWheel();
 setUpFocus();
 picture.clicked = select;
 
-onLink((there, full) => {
-  [isLinked, isFull] = [there, full];
-  if (there) [noticesSeen, numberShown] = [null, 0];
+onLink((isConnected, full) => {
+  [isLinked, isFull] = [isConnected, full];
+  if (isConnected) [noticesSeen, numberShown] = [null, 0];
   showBadge();
 });
 
 onRefused((text) => showNotice(text, true));
 
 onFrame((header, images) => {
-  const first = !picture.header;
+  const isFirst = !picture.header;
   picture.show(header, images);
-  if (first) showProblems(lastState());
+  if (isFirst && lastState()) showProblems(lastState(), true);
   showBadge();
   element("size").textContent = `${header.width} × ${header.height}`;
   const [width, height] = header.finest;
   element("smaller").parentElement.hidden = width === header.width && height === header.height;
   element("smaller").textContent = `${width} × ${height}`;
   numberShown = header.number;
-  // For whoever wants to know by script what is on the screen.
+  // For scripts that drive the page.
   const { revision, samples, done } = header;
   Object.assign(element("panels").dataset, { revision, samples, done, view: viewName(header.view), sent: header.sent.join("x") });
 });
 
-// Whether all that was asked for here, and so many commands of anybody, is on the screen, and nothing more will come of
-// it. For whoever drives the page by script.
+// For scripts that drive the page: returns whether all commands of this page, and at least `commands` commands of all viewers, are
+// executed and shown, and no further frame will follow.
 window.isSettled = (commands) => {
   const state = lastState();
   return isHeard() && state.heard >= commands && picture.isSettled() && !state.busy && state.frame > 0 && numberShown >= state.frame;
@@ -73,39 +77,40 @@ onState((state) => {
   document.title = `${state.problems.length ? "✗ " : ""}${state.scene} – wgray`;
   element("scene").textContent = state.scene;
   element("device").textContent = state.device;
-  element("shaders").textContent = state.shaders ?? "those in the program";
+  element("shaders").textContent = state.shaders ?? "built in";
   element("compile").textContent = state.compile_seconds === null ? "–" : seconds(state.compile_seconds);
   picture.marks = state.marks;
   picture.describe(state);
   showBadge();
-  showProblems(state);
+  showProblems(state, Boolean(picture.header));
   const { number = 0, text, bad } = state.notice ?? {};
   if (noticesSeen !== null && number > noticesSeen) showNotice(text, bad);
   noticesSeen = number;
 });
 
-// What keeps the picture from being the newest, on the picture itself. Without a connection nothing can be done.
+// Shows why the image is not up to date. Without a connection the controls are disabled.
 function showBadge() {
   const state = lastState();
-  const says = isLinked === null ? ["connecting", "waits"]
-    : isFull ? ["as many look as may at once; waiting for a place", "lost"]
-    : !isLinked ? ["connection lost, trying again", "lost"]
-    : state?.compiling ? ["compiling", "waits"]
-    : !picture.header ? ["waiting for the first picture", "waits"]
+  const [text, kind] = isLinked === null ? ["Connecting…", "waits"]
+    : isFull ? ["Viewer limit reached. Waiting for a free slot…", "lost"]
+    : !isLinked ? ["Connection lost. Reconnecting…", "lost"]
+    : state?.compiling ? ["Compiling…", "waits"]
+    : !picture.header && state?.problems.length ? [errorBadge(state), "lost"]
+    : !picture.header ? ["Waiting for the first image…", "waits"]
     : state?.no_comparison ? [state.no_comparison, "lost"]
-    : state?.paused && state.samples ? ["paused", "rests"]
+    : state?.paused && state.samples ? ["Paused", "rests"]
     : ["", "live"];
   const badge = element("badge");
-  if (badge.textContent !== says[0]) badge.textContent = says[0];
-  badge.className = says[1];
+  if (badge.textContent !== text) badge.textContent = text;
+  badge.className = kind;
   const works = Boolean(isLinked && state && picture.header);
-  for (const part of [document.querySelector("aside"), element("toolbar"), element("zooming")]) {
+  for (const part of [document.querySelector("aside"), element("toolbar")]) {
     part.classList.toggle("off", !works);
-    for (const fieldset of part.querySelectorAll("fieldset, button, input, select")) setOff(fieldset, !works);
+    for (const control of part.querySelectorAll("fieldset, button, input, select")) setOff(control, !works);
   }
 }
 
-// Disables what is not disabled for a reason of its own, and gives it back.
+// Disables a control, or enables it again, unless it is disabled for another reason.
 function setOff(control, off) {
   if (off && !control.disabled) {
     control.disabled = true;
@@ -116,34 +121,8 @@ function setOff(control, off) {
   }
 }
 
-let problemsShown = "";
-function showProblems(state) {
-  if (!state) return;
-  const { problems, editor } = state;
-  // What is read or selected stays as it is.
-  const all = JSON.stringify([problems, editor, Boolean(picture.header)]);
-  if (all === problemsShown) return;
-  problemsShown = all;
-  const make = (tag, text) => Object.assign(document.createElement(tag), { textContent: text });
-  const articles = problems.map((problem) => {
-    const article = document.createElement("article");
-    const title = make("h2", problem.place ?? problem.kind);
-    const link = editorLink(editor, problem);
-    if (link) title.replaceChildren(Object.assign(make("a", problem.place ?? problem.kind), { href: link, title: "Open in the editor" }));
-    article.append(title, make("p", problem.message));
-    if (problem.excerpt) article.append(make("pre", problem.excerpt));
-    const stays = picture.header ? "; the picture is the last good one" : "";
-    article.append(make("small", `${problem.kind} error${stays}`));
-    return article;
-  });
-  const dock = element("problems");
-  dock.hidden = !problems.length;
-  dock.querySelector("summary").textContent = problems.length === 1 ? "1 problem" : `${problems.length} problems`;
-  element("problem-list").replaceChildren(...articles);
-}
-
 let noticeTimer = 0;
-// Without a text what was wrong is no longer told.
+// Shows a notice for some seconds. An empty text hides an error notice.
 function showNotice(text, bad) {
   const notice = element("notice");
   if (!text) {
@@ -161,7 +140,7 @@ function seconds(s) {
   return s < 1 ? `${Math.round(s * 1000)} ms` : `${s.toFixed(2)} s`;
 }
 
-// Whether a control has a use of its own for a key. Where values are typed a key that goes astray must not act on all viewers.
+// Returns whether a control handles a key itself. Among values, a stray key must not trigger an action for all viewers.
 function isTaken(control, key) {
   if (control.closest("#object-groups, #sliders")) return true;
   if (control.matches("select, textarea, input:not([type=radio], [type=checkbox], [type=range])")) return true;

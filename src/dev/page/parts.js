@@ -1,4 +1,4 @@
-// Parts of the page that come and go while others stay, with what the user is doing in them.
+// Parts of the page that are added and removed while the user works in others.
 
 import { forget } from "/numbers.js";
 
@@ -8,7 +8,13 @@ export const make = (tag, values = {}, ...children) => {
   return made;
 };
 
-// What there is for each item, by its key: the old where there is one.
+// Enables or disables a control for a reason of its own. `setOff` in page.js disables all controls without a connection.
+export function enable(control, isEnabled) {
+  control.disabled = !isEnabled;
+  delete control.dataset.off;
+}
+
+// Returns the parts for a list of items, by key: known parts are reused, missing ones are made.
 export function keep(known, items, keyOf, makeOne) {
   return new Map(items.map((item) => {
     const key = keyOf(item);
@@ -16,8 +22,8 @@ export function keep(known, items, keyOf, makeOne) {
   }));
 }
 
-// Gives parents the children that they are to have, each as [parent, children]. What stays is not touched; what is half typed in
-// what goes is dropped.
+// Sets the children of parents, each given as [parent, children]. Children that stay are not touched; half-typed numbers in
+// removed ones are discarded.
 export function place(...lists) {
   const focus = document.activeElement;
   const all = new Set(lists.flatMap(([, children]) => children));
@@ -29,7 +35,7 @@ export function place(...lists) {
     const own = new Set(children);
     let next = parent.firstElementChild;
     for (const child of children) {
-      while (next && !own.has(next)) next = next.nextElementSibling; // it goes to another parent
+      while (next && !own.has(next)) next = next.nextElementSibling; // moves to another parent
       if (child === next) next = next.nextElementSibling;
       else move(parent, child, next);
     }
@@ -39,7 +45,7 @@ export function place(...lists) {
 
 function move(parent, child, before) {
   if (parent.moveBefore && parent.isConnected && child.isConnected) {
-    parent.moveBefore(child, before); // the focus stays, and what is half typed
+    parent.moveBefore(child, before); // keeps the focus and half-typed text
     return;
   }
   forget(child);

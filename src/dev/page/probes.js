@@ -1,11 +1,12 @@
-// Pixels and their values: the one that is pointed at, and those that are pinned, with what they were before.
+// The values of the pixel under the pointer and of pinned pixels, with their history.
 
 import { askPixel, element, onFrame, onLink } from "/link.js";
+import { enable } from "/parts.js";
 
-const MOST = 16; // pins
-const HISTORY = 60; // values that a pin keeps
+const MAX_PINS = 16;
+const HISTORY = 60; // number of values that a pin keeps
 let asking = false;
-let pins = []; // {pixel, history: [{revision, samples, values}]}
+let pins = []; // {pixel, history: [{revision, samples, view, values}]}
 
 export function setUpProbes(picture, onKey) {
   picture.pointed = () => read(picture);
@@ -20,10 +21,10 @@ export function setUpProbes(picture, onKey) {
   showPins(picture);
 }
 
-// One question at a time: the next waits for the answer.
+// Keeps one question in flight; the next one waits for the answer.
 async function read(picture) {
   const pixel = picture.cursor;
-  element("pin").disabled = !pixel;
+  enable(element("pin"), Boolean(pixel));
   if (!pixel) {
     element("swatch").hidden = true;
     element("values").textContent = "Point at a pixel to read its value";
@@ -49,11 +50,11 @@ function show({ x, y, values }, header) {
   if (shown) element("swatch").style.background = `rgb(${shown})`;
 }
 
-// The two pictures of a comparison have names.
+// Returns the caption of a comparison's side, or the name itself.
 const nameOf = (name, header) => ({ first: header?.sides?.[0], second: header?.sides?.[1] })[name] ?? name;
 
 function add(pixel, picture) {
-  if (!pixel || pins.length >= MOST || pins.some((pin) => String(pin.pixel) === String(pixel))) return;
+  if (!pixel || pins.length >= MAX_PINS || pins.some((pin) => String(pin.pixel) === String(pixel))) return;
   const pin = { pixel, history: [] };
   pins.push(pin);
   element("probes").open = true;
@@ -64,7 +65,7 @@ function add(pixel, picture) {
 async function refresh(pin, { revision, samples, view }) {
   const answer = await askPixel(pin.pixel);
   if (!answer || !pins.includes(pin)) return;
-  // Of each picture the newest value counts.
+  // Each revision keeps only its newest value.
   const entry = { revision, samples, view: JSON.stringify(view), values: answer.values };
   const last = pin.history.at(-1);
   if (last && last.revision === revision && last.view === entry.view) pin.history.pop();
@@ -91,7 +92,7 @@ function showPins(picture) {
   }));
 }
 
-// The newest values in full, those before in short, newest first, and a curve of their first number.
+// Shows a pin's newest values in full, a curve of their first number, and a list of earlier values, newest first.
 function showPin(pin) {
   const make = (tag, text) => Object.assign(document.createElement(tag), { textContent: text });
   const newest = pin.history.at(-1);
@@ -105,7 +106,7 @@ function showPin(pin) {
     const rows = before.reverse().map(({ values, samples }) => make("li", `${values[0]?.[1] ?? "–"} (${samples} samples)`));
     const older = document.createElement("ol");
     older.append(...rows);
-    history.append(make("summary", `${before.length} before`), older);
+    history.append(make("summary", `${before.length} earlier ${before.length === 1 ? "value" : "values"}`), older);
     history.open = pin.open ?? false;
     history.addEventListener("toggle", () => (pin.open = history.open));
     parts.push(curve([...before.reverse(), newest]), history);
@@ -117,7 +118,7 @@ function curve(entries) {
   const numbers = entries.map(({ values }) => Number.parseFloat(values[0]?.[1])).map((v) => (Number.isFinite(v) ? v : 0));
   const canvas = Object.assign(document.createElement("canvas"), { width: 280, height: 36 });
   canvas.setAttribute("role", "img");
-  canvas.setAttribute("aria-label", `The first value over ${numbers.length} pictures, from ${numbers[0]} to ${numbers.at(-1)}`);
+  canvas.setAttribute("aria-label", `First value over ${numbers.length} revisions, from ${numbers[0]} to ${numbers.at(-1)}`);
   const context = canvas.getContext("2d");
   const [low, high] = [Math.min(...numbers), Math.max(...numbers)];
   context.strokeStyle = getComputedStyle(document.documentElement).getPropertyValue("--accent");

@@ -1,9 +1,10 @@
-// How far the picture is: progress, pause, limits, and the picture as a file.
+// Progress, pause, limits, and downloads of the image.
 
-import { ask, element, lastState, onFrame, onState } from "/link.js";
+import { ask, element, lastState, onFrame, onLink, onState } from "/link.js";
 import { viewName } from "/view.js";
 
-const MOST = 65536; // samples
+const MAX_SAMPLES = 65536;
+const KINDS = ["png", "exr"];
 
 export function setUpRender(onKey, showNotice) {
   const pause = () => ask({ pause: element("pause").getAttribute("aria-pressed") !== "true" });
@@ -13,11 +14,12 @@ export function setUpRender(onKey, showNotice) {
   element("most-samples").addEventListener("change", ({ target }) => {
     const { value, valueAsNumber: most, validity } = target;
     const isNone = value === "" && !validity.badInput;
-    if (isNone || (Number.isInteger(most) && most >= 1 && most <= MOST)) {
+    if (isNone || (Number.isInteger(most) && most >= 1 && most <= MAX_SAMPLES)) {
       showNotice("");
       ask({ samples: isNone ? null : most });
     } else {
-      showNotice(`Samples at most: ${value || "this"} must be a whole number from 1 to ${MOST}`, true);
+      const got = value ? `, not ${value}` : "";
+      showNotice(`Max samples must be a whole number from 1 to ${MAX_SAMPLES.toLocaleString("en")}${got}`, true);
       target.value = lastState()?.samples[0] ?? "";
     }
   });
@@ -25,7 +27,8 @@ export function setUpRender(onKey, showNotice) {
   onState((state, heard) => {
     if (!heard) return;
     element("pause").setAttribute("aria-pressed", state.paused);
-    element("pause").textContent = state.paused ? "Go on" : "Pause";
+    element("pause").textContent = state.paused ? "Resume" : "Pause";
+    element("pause").title = state.paused ? "Resume rendering (Space)" : "Pause rendering (Space)";
     const [most, all] = state.samples;
     const field = element("most-samples");
     if (document.activeElement !== field) field.value = most ?? "";
@@ -33,24 +36,30 @@ export function setUpRender(onKey, showNotice) {
     element("preview").value = state.preview;
   });
   onFrame(showProgress);
+  onLink((isConnected) => isConnected || KINDS.forEach((kind) => allowSave(kind, false)));
 }
 
 function showProgress(header) {
   const { samples, total, speed, view, latency } = header;
   const counts = !header.first_hits;
   element("bar").value = !counts ? 1 : total ? samples / total : 0;
-  element("samples").textContent = counts ? `${samples} of ${total}` : "1 ray a pixel";
+  element("samples").textContent = counts ? `${samples} of ${total}` : "1 ray per pixel";
   element("speed").textContent = counts && speed ? withPrefix(speed) : "–";
   if (latency !== null) element("latency").textContent = latency < 1 ? `${Math.round(latency * 1000)} ms` : `${latency.toFixed(2)} s`;
-  const whole = String(header.sent) === String(header.finest) && (!counts || samples > 0);
-  const name = element("scene").textContent.split(/[/\\]/).at(-1).replace(/\.[^.]*$/, "") || "picture";
-  for (const kind of ["png", "exr"]) {
-    const link = element(`save-${kind}`);
-    link.setAttribute("aria-disabled", !whole);
-    link.download = viewName(view) === "color" ? `${name}.${kind}` : `${name}-${viewName(view)}.${kind}`;
-    if (whole) link.href = `/picture.${kind}`;
-    else link.removeAttribute("href");
+  const isWhole = String(header.sent) === String(header.finest) && (!counts || samples > 0);
+  const name = element("scene").textContent.split(/[/\\]/).at(-1).replace(/\.[^.]*$/, "") || "image";
+  for (const kind of KINDS) {
+    allowSave(kind, isWhole);
+    element(`save-${kind}`).download = viewName(view) === "color" ? `${name}.${kind}` : `${name}-${viewName(view)}.${kind}`;
   }
+}
+
+// A download link without an address cannot be followed.
+function allowSave(kind, isAllowed) {
+  const link = element(`save-${kind}`);
+  link.setAttribute("aria-disabled", !isAllowed);
+  if (isAllowed) link.href = `/picture.${kind}`;
+  else link.removeAttribute("href");
 }
 
 function withPrefix(n) {

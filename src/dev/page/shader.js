@@ -1,14 +1,14 @@
-// Sliders of constants that shaders mark.
+// Sliders of the constants that shaders mark.
 
 import { colorOf, hexOf } from "/color.js";
 import { editorLink } from "/editor.js";
 import { ask, element, onState } from "/link.js";
 import { numberField } from "/numbers.js";
-import { keep, make, place } from "/parts.js";
+import { enable, keep, make, place } from "/parts.js";
 
-let rows = new Map(); // what shows each slider, by file, name and kind
-let made = 0; // rows, ever
-let [underWay, waiting] = [false, new Map()]; // the values that are not asked for yet, by file and name
+let rows = new Map(); // the rows of the sliders, by file, name and kind
+let made = 0; // number of rows made so far, for their ids
+let [underWay, waiting] = [false, new Map()]; // values that are not sent yet, by file and name
 
 const keyOf = ({ file, name }) => JSON.stringify([file, name]);
 const rowKey = (slider) => JSON.stringify([keyOf(slider), slider.kind]);
@@ -22,8 +22,8 @@ export function setUpShader() {
     for (const slider of state.sliders) rows.get(rowKey(slider)).show(slider, state, heard && !underWay);
     place([element("sliders"), [...rows.values()].map(({ item }) => item)]);
     const moved = state.sliders.some(isMoved);
-    element("write-sliders").disabled = !moved || !state.shaders;
-    element("reset-sliders").disabled = !moved;
+    enable(element("write-sliders"), moved && state.shaders);
+    enable(element("reset-sliders"), moved);
     element("undo-sliders").hidden = !state.sliders_undo;
     element("sliders-help").hidden = state.sliders.length > 0;
   });
@@ -31,7 +31,7 @@ export function setUpShader() {
 
 const isMoved = ({ value, file_value }) => String(value) !== String(file_value);
 
-// One value at a time is asked for, the newest of each slider: a drag makes more of them than are drawn.
+// Sends one value at a time, the newest of each slider: a drag produces more of them than the program can render.
 function slide({ file, name }, value) {
   waiting.set(keyOf({ file, name }), { file, name, value });
   if (!underWay) next();
@@ -47,7 +47,7 @@ async function next() {
   underWay = false;
 }
 
-// A slider's row, and what shows its values in it.
+// Returns a slider's row and the function that updates it.
 function rowOf(slider) {
   const id = `slider-${made++}`;
   const name = make("label", { textContent: slider.name, htmlFor: id });
@@ -59,7 +59,7 @@ function rowOf(slider) {
   const { inputs, update } = ({ bool: switchOf, color: colorsOf }[slider.kind] ?? numberOf)(slider);
   inputs[0].id = id;
   reset.addEventListener("click", () => {
-    if (reset.matches(":focus-visible")) inputs[0].focus(); // the button goes
+    if (reset.matches(":focus-visible")) inputs[0].focus(); // the button disappears
     ask({ reset_slider: [slider.file, slider.name] });
   });
   const item = make("li", {}, head, make("span", { className: "pair" }, ...inputs));
@@ -69,7 +69,7 @@ function rowOf(slider) {
     const href = editorLink(editor, { file: now.path, line: now.line });
     if (href) link.href = href;
     else link.removeAttribute("href");
-    note.textContent = [now.recompiles && "compiles anew", !now.used && "not used by this scene"].filter(Boolean).join(", ");
+    note.textContent = [now.recompiles && "recompiles", !now.used && "not used by this scene"].filter(Boolean).join(", ");
     reset.hidden = !isMoved(now);
     if (heard || isNew) update(now);
     isNew = false;
@@ -90,7 +90,7 @@ function numberBox(label) {
 }
 
 function numberOf(slider) {
-  const field = { kind: slider.kind === "f32" ? "number" : "whole" }; // its range and step may change
+  const field = { kind: slider.kind === "f32" ? "number" : "whole" }; // range and step follow the file
   let last = slider.value;
   const range = make("input", { type: "range" });
   const box = numberBox(`${slider.name}, as a number`);

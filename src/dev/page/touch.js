@@ -1,8 +1,8 @@
-// Sliders under a finger: one that scrolls the page, and came down on a slider, does not move it.
+// Sliders on touch screens: a finger that scrolls the page does not move the slider under it.
 
-const SLACK = 3; // pixels to the side before a touch is a drag
+const SLACK = 3; // pixels of sideways movement before a touch becomes a drag
 
-let press = null; // a finger on a slider: what it began with, and whether what the slider says is held back
+let press = null; // the touch on a slider: its initial value, and whether input events are held back
 
 export function setUpTouch() {
   const on = (type, act) => window.addEventListener(type, act, true);
@@ -17,21 +17,21 @@ export function setUpTouch() {
   }
   on("pointermove", ofPress(({ clientX, clientY }) => {
     const [x, y] = [Math.abs(clientX - press.left), Math.abs(clientY - press.top)];
-    if (press.waits && x > SLACK && x > y) tell();
+    if (press.waits && x > SLACK && x > y) release();
   }));
-  on("pointerup", ofPress(() => press.waits && tell()));
-  // The browser took the finger to scroll.
+  on("pointerup", ofPress(() => press.waits && release()));
+  // The browser scrolls.
   on("pointercancel", ofPress(() => {
     const { range, from, waits } = press;
     range.value = from;
-    if (!waits) tell();
+    if (!waits) release();
   }));
-  // What comes of the touch comes at once.
+  // The browser fires its own input events for the touch right after this one.
   for (const type of ["touchend", "touchcancel"]) on(type, () => setTimeout(() => (press = null)));
 }
 
-// Tells the page what the slider says.
-function tell() {
+// Dispatches the slider's value to the page.
+function release() {
   press.waits = false;
   press.range.dispatchEvent(new Event("input", { bubbles: true }));
 }

@@ -1,19 +1,21 @@
-// What is shown of the scene, and how: the toolbar's views, exposure, view transform, false colours, the histogram.
+// Views and layers, exposure, view transform, false colours and the histogram.
 
 import { ask, element, onFrame, onState } from "/link.js";
 import { numberField } from "/numbers.js";
+import { enable } from "/parts.js";
 
 const VIEWS = ["color", "normal", "depth", "uv", "primitive", "samples", "compare"];
 const radios = () => [...document.querySelectorAll("input[name=view]")];
-const STOPS = { kind: "number", range: [-100, 100] };
-let stops = 0; // of exposure
-let showStops = null; // in their box
+const LIMIT = 100; // stops of exposure that the program accepts
+const STOPS = { kind: "number", range: [-LIMIT, LIMIT] };
+let stops = 0; // the exposure
+let showStops = null; // shows a number in the exposure's box and slider
 let choice = { exposure: null, transform: null, false_color: false };
 
-// The name of a view as the program tells it: "normal", or {"compare": "cpu"}.
+// Returns the name of a view of the state: "normal", or "compare" of {"compare": "cpu"}.
 export const viewName = (view) => (typeof view === "string" ? view : Object.keys(view)[0]);
 
-export function setUpView(picture, onKey) {
+export function setUpView(picture, onKey, showNotice) {
   element("views").addEventListener("change", ({ target }) => choose(target.value));
   element("layers").addEventListener("change", ({ target }) => {
     if (target.value.startsWith("layer:")) ask({ view: { layer: target.value.slice(6) } });
@@ -28,26 +30,44 @@ export function setUpView(picture, onKey) {
   onKey("-", () => picture.zoom(1 / 1.25));
   onKey("0", () => picture.fit());
   picture.zoomed = (fits, scale) => {
-    const percent = `${Math.round(scale * 100)} %`;
-    element("zoom").textContent = fits ? `fit, ${percent}` : percent;
+    const percent = `${Math.round(scale * 100)}%`;
+    element("zoom").textContent = fits ? `Fit, ${percent}` : percent;
   };
 
-  const expose = (exposure) => look({ exposure: Math.max(-100, Math.min(100, exposure)) });
-  showStops = numberField(element("exposure-number"), STOPS, () => [stops], expose);
-  element("exposure").addEventListener("input", ({ target }) => {
-    showStops(target.valueAsNumber);
-    expose(target.valueAsNumber);
-  });
+  setUpExposure(showNotice);
   element("transform").addEventListener("change", ({ target }) => look({ transform: target.value }));
   element("false-color").addEventListener("change", ({ target }) => look({ false_color: target.checked }));
-  element("as-scene").addEventListener("click", () => look({ exposure: null, transform: null, false_color: false }));
-  element("marks").addEventListener("change", ({ target }) => ask({ marks: target.checked }));
+  element("reset-look").addEventListener("click", () => look({ exposure: null, transform: null, false_color: false }));
   onState(showState);
-  onFrame(showFrame);
+  onFrame((header) => {
+    drawHistogram(header);
+    showLegend(header.legend);
+  });
   new ResizeObserver(() => drawHistogram()).observe(element("histogram"));
 }
 
-// Goes over to a view; that of the comparison is with what is chosen there.
+function setUpExposure(showNotice) {
+  const slider = element("exposure");
+  const expose = (asked) => {
+    const exposure = Math.max(-LIMIT, Math.min(LIMIT, asked));
+    if (exposure === asked) showNotice("");
+    else showNotice(`Exposure must be from -${LIMIT} to ${LIMIT} stops: ${asked} became ${exposure}`, true);
+    look({ exposure });
+  };
+  const showInBox = numberField(element("exposure-number"), STOPS, () => [stops], expose);
+  showStops = (stops) => {
+    // The slider's usual range is finer than the box's. It widens for a value beyond it, and stays wide during a drag.
+    if (Math.abs(stops) > Number(slider.max)) [slider.min, slider.max] = [-LIMIT, LIMIT];
+    slider.value = stops;
+    showInBox(stops);
+  };
+  slider.addEventListener("input", () => {
+    showInBox(slider.valueAsNumber);
+    expose(slider.valueAsNumber);
+  });
+}
+
+// Switches to a view; the comparison uses the selected counterpart.
 export function choose(view) {
   const against = document.querySelector("input[name=against]:checked").value;
   for (const radio of radios()) radio.checked = radio.value === view;
@@ -71,7 +91,7 @@ function showState(state, heard) {
   if (layers.selectedIndex < 0) layers.value = "";
   const chosen = layers.value !== "";
   if (chosen && !layers.classList.contains("chosen")) {
-    const bar = element("toolbar"); // on a narrow screen the list may lie beyond its end
+    const bar = element("toolbar"); // on a narrow screen the list may be scrolled out of view
     bar.scrollLeft = Math.max(bar.scrollLeft, layers.offsetLeft + layers.offsetWidth - bar.clientWidth);
   }
   layers.classList.toggle("chosen", chosen);
@@ -79,15 +99,13 @@ function showState(state, heard) {
   choice = state.look;
   const [exposure, transform] = state.scene_look;
   stops = choice.exposure ?? exposure;
-  element("exposure").value = stops;
   showStops(stops);
   element("transform").value = choice.transform ?? transform;
   element("false-color").checked = choice.false_color;
-  element("as-scene").disabled = choice.exposure === null && choice.transform === null && !choice.false_color;
-  element("marks").checked = state.marks;
+  enable(element("reset-look"), choice.exposure !== null || choice.transform !== null || choice.false_color);
 }
 
-// The layers that shaders write.
+// Lists the layers that shaders write.
 let layersShown = "";
 function showLayers(names) {
   if (String(names) === layersShown) return;
@@ -97,7 +115,7 @@ function showLayers(names) {
   group.hidden = !names.length;
 }
 
-// Views that the scene does not have are off, and their group says why.
+// Disables views that the scene lacks; the label of their group gives the reason.
 let missingShown = "";
 function showMissing(rules) {
   if (JSON.stringify(rules) === missingShown) return;
@@ -113,11 +131,8 @@ function showMissing(rules) {
   }
 }
 
-function showFrame(header) {
-  drawHistogram(header);
-  showLegend(header.legend);
-  showFaults(header);
-}
+const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
+const power = (n) => (Number.isInteger(n) ? `2${[...String(n)].map((c) => SUPERSCRIPTS[c]).join("")}` : `2^${n}`);
 
 function showLegend(legend) {
   element("legend").hidden = !legend;
@@ -129,13 +144,12 @@ function showLegend(legend) {
     context.fillRect(i, 0, 1, 1);
   });
   const [first, last] = legend.stops;
-  const light = (stops) => `2^${Number(stops.toFixed(1))}`;
   [...element("legend").querySelectorAll("span")].forEach((span, i) => {
-    span.textContent = light(first + ((last - first) * i) / 2);
+    span.textContent = power(Number((first + ((last - first) * i) / 2).toFixed(1)));
   });
 }
 
-// How many pixels have which value, in stops; what the exposure takes above 1 is to the right of the line.
+// Draws the number of pixels per value, in stops. A line marks the value that the exposure maps to 1.
 let lastHeader = null;
 function drawHistogram(header = lastHeader) {
   lastHeader = header;
@@ -165,25 +179,10 @@ function drawHistogram(header = lastHeader) {
   context.fillStyle = style.color;
   context.fillRect(Math.round(x(white)), 0, Math.max(1, ratio), canvas.height);
   const above = Math.max(...above_white) / Math.max(1, header.sent[0] * header.sent[1]);
-  const stop = (bin) => `2^${first + Math.floor(bin / of_a_stop)}`;
+  const stop = (bin) => power(first + Math.floor(bin / of_a_stop));
   const seen = counts[0].map((_, bin) => counts.some((channel) => channel[bin] > 0));
   const [low, high] = [seen.indexOf(true), seen.lastIndexOf(true)];
-  const range = low < 0 ? "no light" : `light from ${stop(low)} to ${stop(high + of_a_stop)}`;
-  text.textContent = `${range}; ${(100 * above).toFixed(1)} % above white`;
+  const range = low < 0 ? "No light" : `Range ${stop(low)} to ${stop(high + of_a_stop)}`;
+  text.textContent = `${range}; ${(100 * above).toFixed(1)}% clipped`;
   canvas.setAttribute("aria-label", `Histogram: ${text.textContent}`);
-}
-
-// Pixels that are no light, "first: 3 NaN, 1 infinite"; rings lead to them.
-function showFaults({ faults, width, height, sent, sides }) {
-  const names = { picture: "", first: `${sides?.[0] ?? "first"}: `, second: `${sides?.[1] ?? "second"}: ` };
-  const told = faults.map(([part, found]) => {
-    const counts = ["nan", "infinite", "negative"].filter((kind) => found[kind]).map((kind) => {
-      return `${found[kind].toLocaleString("en")} ${kind === "nan" ? "NaN" : kind}`;
-    });
-    return counts.length ? `${names[part]}${counts.join(", ")}` : "";
-  }).filter(Boolean);
-  element("faults").hidden = !told.length;
-  const all = (width / sent[0]) * (height / sent[1]) > 1.5 ? "Pixels so far" : "Pixels";
-  const text = told.length ? `${all} that are no light: ${told.join("; ")}` : "";
-  if (element("fault-counts").textContent !== text) element("fault-counts").textContent = text;
 }

@@ -179,6 +179,7 @@ impl Painter {
             scene: sources.scene.display().to_string(),
             shaders: sources.shaders.as_ref().map(|folder| folder.display().to_string()),
             device: format!("{}, {}", device.info.name, device.info.driver),
+            read_only: sources.read_only(),
             gain: GAIN,
             editor,
             ..State::default()
@@ -269,7 +270,7 @@ impl Painter {
         if let (true, Some((_, Stamp::Content(content)))) = (is_new, snapshot.files.first())
             && known != Some(content)
         {
-            self.history.forget(); // nothing of what was written is there to be taken back
+            self.forget_writes();
         }
         let mut shown_otherwise = false;
         if is_new {

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::Painter;
 use crate::backend::Backend as _;
 use crate::cpu::Cpu;
-use crate::dev::camera::{Move, Viewpoint, framed, moved, placed};
+use crate::dev::camera::{Move, Viewpoint, dollied, framed, moved, placed};
 use crate::film::Region;
 use crate::pack::NOTHING;
 use crate::scene::{Bounds, CameraDescription, Geometry, Light, Scene};
@@ -58,8 +58,14 @@ impl Painter {
     }
 
     pub(super) fn move_camera(&mut self, by: Move) {
-        let Some(old) = self.seen_by().cloned() else { return };
-        self.go(&old, moved(&old, by));
+        let (Some(old), Some(loaded)) = (self.seen_by().cloned(), &self.loaded) else {
+            return;
+        };
+        let new = match by {
+            Move::Dolly(by) => dollied(&old, by, &loaded.camera),
+            other => moved(&old, other),
+        };
+        self.go(&old, new);
     }
 
     pub(super) fn place_camera(&mut self, viewpoint: Viewpoint) {

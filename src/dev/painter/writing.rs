@@ -16,7 +16,7 @@ use crate::dev::messages::{Report, Set};
 use crate::dev::object::{Seen, object_of};
 use crate::dev::save::{replace_known, wait_settled, with_camera};
 use crate::dev::source::{Loaded, Stamp};
-use crate::scene::{Draft, Field, KeyPath, Segment, cut, folder_of, is_course, is_gltf, read_text};
+use crate::scene::{Draft, Field, KeyPath, Segment, cut, folder_of, read_text};
 use crate::visible::visible;
 
 impl Painter {
@@ -82,12 +82,24 @@ impl Painter {
     /// Takes back what was written last, or makes it again.
     pub(super) fn turn(&mut self, again: bool) {
         let Some(what) = self.history.last(again).map(|step| step.what.clone()) else {
+            if let Some(reason) = self.state.undo_blocked.clone() {
+                self.notice(&Err(reason), String::new());
+            }
             return;
         };
         let result = self.try_turn(again);
         let done = if again { "written again" } else { "taken back" };
         self.notice(&result, format!("{what}: {done}"));
         (self.report)(Report::Turned(format!("{done}: {what}"), result));
+    }
+
+    /// Drops the undo history because another program has changed the scene file.
+    pub(super) fn forget_writes(&mut self) {
+        if self.history.forget() {
+            let place = self.sources.scene.display();
+            let reason = format!("Undo is not possible: {place} was changed by another program");
+            self.state.undo_blocked = Some(reason);
+        }
     }
 
     fn try_turn(&mut self, again: bool) -> Result<(), String> {
@@ -119,16 +131,8 @@ impl Painter {
     fn scene_file(&self, what: &str) -> Result<(PathBuf, String), String> {
         let scene = &self.sources.scene;
         let place = scene.display();
-        let kind = match scene {
-            scene if is_gltf(scene) => Some("glTF"),
-            scene if is_course(scene) => Some("JSON"),
-            _ => None,
-        };
-        if let Some(kind) = kind {
-            let rule = format!("must be TOML for {what} to be saved into it");
-            return Err(format!(
-                "{place}: {rule}; it is {kind}, and wgray convert makes a scene of it"
-            ));
+        if let Some(reason) = self.sources.read_only() {
+            return Err(format!("{place}: {what} cannot be saved: {reason}"));
         }
         let file = fs::canonicalize(scene).map_err(|error| format!("{place}: {error}"))?;
         let text = read_text(scene).map_err(|error| error.to_string())?;
@@ -183,8 +187,9 @@ impl Painter {
         let read = self.read_change(known, &step.at, after)?;
         self.replace(file, before, &read)?;
         if self.loaded.as_ref().is_none_or(|loaded| loaded.text != before) {
-            self.history.forget();
+            self.forget_writes();
         }
+        self.state.undo_blocked = None;
         self.history.add(step, before, &read.text);
         let shown_otherwise = self.take_written(read);
         self.show_files(Instant::now(), shown_otherwise);

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use serde::Serialize;
 use serde_json::{Value as Json, json};
-use toml::Value;
+use toml::{Table, Value};
 
 use super::{SPLIT, definition, of_files};
 use crate::scene::CameraDescription;
@@ -232,10 +232,7 @@ impl Found<'_> {
 
     fn look_into(&mut self, schema: &Json, path: &mut Vec<Segment>, place: &Place) {
         let table = place.value.and_then(Value::as_table);
-        let required: Vec<&str> = match schema.get("required").and_then(Json::as_array) {
-            Some(list) => list.iter().filter_map(Json::as_str).collect(),
-            None => Vec::new(),
-        };
+        let required = required_keys(schema, table);
         for (key, of_key) in schema.get("properties").and_then(Json::as_object).into_iter().flatten() {
             if of_key.get("const").is_some() {
                 continue; // its type
@@ -362,6 +359,30 @@ impl Found<'_> {
             fixed: (kind == Kind::Text).then(|| FREE_TEXT.to_owned()),
         });
     }
+}
+
+/// Returns the keys that a table must keep. Where a schema has alternatives, these are the keys that all the satisfied ones require.
+fn required_keys<'a>(schema: &'a Json, table: Option<&Table>) -> Vec<&'a str> {
+    let keys_of = |schema: &'a Json| -> Vec<&'a str> {
+        let list = schema.get("required").and_then(Json::as_array).into_iter().flatten();
+        list.filter_map(Json::as_str).collect()
+    };
+    let mut required = keys_of(schema);
+    let alternatives = schema
+        .get("anyOf")
+        .and_then(Json::as_array)
+        .into_iter()
+        .flatten()
+        .map(keys_of);
+    let mut satisfied = alternatives.filter(|keys| {
+        keys.iter()
+            .all(|key| table.is_some_and(|table| table.contains_key(*key)))
+    });
+    if let Some(mut common) = satisfied.next() {
+        satisfied.for_each(|keys| common.retain(|key| keys.contains(key)));
+        required.extend(common);
+    }
+    required
 }
 
 /// Why a text cannot be changed: it may name a file.

@@ -1,0 +1,35 @@
+// The list of errors below the image.
+
+import { editorLink } from "/editor.js";
+import { element } from "/link.js";
+import { make } from "/parts.js";
+
+const capitalized = (text) => text[0].toUpperCase() + text.slice(1);
+let shown = "";
+
+// `hasImage`: whether an image from before the error is on the screen.
+export function showProblems({ problems, editor }, hasImage) {
+  // An unchanged list is left alone, so that text selected in it stays selected.
+  const all = JSON.stringify([problems, editor, hasImage]);
+  if (all === shown) return;
+  shown = all;
+  const dock = element("problems");
+  dock.hidden = !problems.length;
+  dock.querySelector("summary").textContent = problems.length === 1 ? "1 problem" : `${problems.length} problems`;
+  element("problem-list").replaceChildren(...problems.map((problem) => articleOf(problem, editor, hasImage)));
+}
+
+function articleOf(problem, editor, hasImage) {
+  const { kind, place, message, excerpt } = problem;
+  const title = make("h2", { textContent: place ?? kind });
+  const link = editorLink(editor, problem);
+  if (link) title.replaceChildren(make("a", { textContent: place ?? kind, href: link, title: "Open in the editor" }));
+  const article = make("article", {}, title, make("p", { textContent: message }));
+  if (excerpt) article.append(make("pre", { textContent: excerpt }));
+  const stays = hasImage ? " Showing the last good image." : "";
+  article.append(make("small", { textContent: `${capitalized(kind)} error.${stays}` }));
+  return article;
+}
+
+// Returns the badge for an error that leaves no image to show.
+export const errorBadge = ({ problems: [first] }) => `${capitalized(first.kind)} error. No image yet`;

@@ -1,0 +1,199 @@
+// Controls of the page that must not write by accident, and that say why they are disabled.
+
+import assert from "node:assert/strict";
+import fs from "node:fs";
+import { after, afterEach, before, beforeEach, test } from "node:test";
+
+import { LONGEST, SCENE, Studio, choose, control, launch, listen, open, settled, visit } from "./studio.mjs";
+
+let browser;
+let studio;
+
+before(async () => (browser = await launch()));
+after(() => browser.close());
+beforeEach(() => (studio = new Studio()));
+afterEach(async () => {
+  await Promise.all(browser.contexts().map((context) => context.close()));
+  await studio.remove();
+});
+
+async function dragged(page, dx = 60) {
+  const area = await page.locator("#panels canvas").first().boundingBox();
+  await page.mouse.move(area.x + area.width / 2, area.y + area.height / 2);
+  await page.mouse.down();
+  await page.mouse.move(area.x + area.width / 2 + dx, area.y + area.height / 2, { steps: 3 });
+  await page.mouse.up();
+  await settled(page);
+}
+
+async function holds(text) {
+  const deadline = Date.now() + LONGEST;
+  while (!studio.read("scene.toml").includes(text)) {
+    assert.ok(Date.now() < deadline, `no ${text} in ${studio.read("scene.toml")}`);
+    await new Promise((resolve) => setTimeout(resolve, 10));
+  }
+}
+
+const isChange = (message) => ["set", "look", "slide", "samples"].some((name) => message[name] !== undefined);
+
+test("the wheel over a focused number box scrolls the panel and changes no value", async () => {
+  await studio.start();
+  for (const viewport of [{ width: 1200, height: 600 }, { width: 390, height: 844 }]) {
+    const page = await open(browser, studio, { viewport });
+    await choose(page, "shapes[0]");
+    const sent = await listen(page, isChange);
+    const top = () => page.evaluate(() => document.querySelector("aside").scrollTop + scrollY);
+    for (const box of [control(page, "shapes[0].center"), page.locator("#exposure-number"), page.locator("#most-samples")]) {
+      await box.scrollIntoViewIfNeeded();
+      await box.click();
+      assert.ok(await box.evaluate((box) => box === document.activeElement));
+      const [value, from] = [await box.inputValue(), await top()];
+      await box.hover();
+      const way = from > 300 ? -100 : 100;
+      for (let i = 0; i < 3; i++) await page.mouse.wheel(0, way);
+      await page.waitForFunction((from) => Math.abs(document.querySelector("aside").scrollTop + scrollY - from) > 100, from);
+      assert.equal(await box.inputValue(), value);
+      await page.locator("#pause").focus();
+      assert.equal(await box.inputValue(), value);
+    }
+    await settled(page);
+    assert.deepEqual(await sent(), []);
+    assert.equal(studio.read("scene.toml"), SCENE);
+    assert.deepEqual(page.faults, []);
+    await page.context().close();
+  }
+});
+
+test("a required key has no button that removes it", async () => {
+  await studio.start();
+  const page = await open(browser, studio);
+  await choose(page, "camera");
+  const buttons = page.locator('[data-name="camera"] > div .head button:visible');
+  assert.equal(await buttons.count(), 0);
+  await choose(page, "materials.red"); // which has an optional key
+  const optional = page.locator('[data-path="materials.red.shininess"] .head button');
+  assert.match(await optional.getAttribute("title"), /^Remove shininess from the file/);
+  assert.deepEqual(page.faults, []);
+});
+
+test("a scene that cannot be edited disables saving with the reason, and offers to copy the camera", async () => {
+  const triangle = Buffer.alloc(44);
+  [0, 0, 0, 1, 0, 0, 0, 1, 0].forEach((x, i) => triangle.writeFloatLE(x, 4 * i));
+  studio.write("box.gltf", JSON.stringify({
+    asset: { version: "2.0" }, scene: 0, scenes: [{ nodes: [0] }], nodes: [{ mesh: 0 }],
+    meshes: [{ primitives: [{ attributes: { POSITION: 0 } }] }],
+    accessors: [{ bufferView: 0, componentType: 5126, count: 3, type: "VEC3", min: [0, 0, 0], max: [1, 1, 0] }],
+    bufferViews: [{ buffer: 0, byteLength: 36 }],
+    buffers: [{ byteLength: 36, uri: `data:application/octet-stream;base64,${triangle.subarray(0, 36).toString("base64")}` }],
+  }));
+  await studio.start(0, ["--size", "60x45"], "box.gltf");
+  const page = await open(browser, studio);
+  await dragged(page);
+  await page.locator("#moved").waitFor();
+  assert.ok(await page.locator("#save").isDisabled());
+  assert.match(await page.locator("#save").getAttribute("title"), /glTF.*read-only.*wgray convert/);
+  const isMain = (id) => page.locator(id).evaluate((button) => button.classList.contains("main"));
+  assert.deepEqual([await isMain("#copy"), await isMain("#save")], [true, false]);
+  assert.ok(await page.locator("#copy").isEnabled());
+  // Control: a TOML scene is saved.
+  await studio.stop();
+  await studio.start();
+  const other = await open(browser, studio);
+  await dragged(other);
+  assert.ok(await other.locator("#save").isEnabled());
+  assert.deepEqual([await other.locator("#copy.main").count(), await other.locator("#save.main").count()], [0, 1]);
+});
+
+test("without a connection nothing can be downloaded, and the zoom bar stays opaque", async () => {
+  await studio.start();
+  const page = await open(browser, studio);
+  const links = ["#save-png", "#save-exr"].map((id) => page.locator(id));
+  for (const link of links) assert.ok(await link.getAttribute("href"));
+  await studio.stop();
+  await page.locator("#badge.lost", { hasText: "Connection lost" }).waitFor();
+  for (const link of links) {
+    assert.equal(await link.getAttribute("aria-disabled"), "true");
+    assert.equal(await link.getAttribute("href"), null);
+  }
+  assert.equal(await page.locator("#zooming").evaluate((bar) => getComputedStyle(bar).opacity), "1");
+  await page.click("#zoom-in");
+  await page.locator("#zoom", { hasText: /^\d+%$/ }).waitFor();
+  await studio.start(studio.port);
+  await page.locator("#save-png[href]").waitFor();
+  // A control that is disabled for another reason stays disabled.
+  for (const id of ["#reset-look", "#undo-write", "#reset-sliders", "#save"]) assert.ok(await page.locator(id).isDisabled(), id);
+});
+
+test("undo says why it is not possible after another program has changed the file", async () => {
+  await studio.start();
+  const page = await open(browser, studio);
+  await choose(page, "shapes[0]");
+  assert.equal(await page.locator("#undo-write").getAttribute("title"), "Nothing to undo");
+  await control(page, "shapes[0].radius", 1).fill("0.25");
+  await page.keyboard.press("Enter");
+  await page.locator('#undo-write[title="Undo shapes[0].radius (Ctrl+Z)"]').waitFor();
+  await settled(page);
+  studio.edit("scene.toml", "# a small scene", "# another");
+  await page.locator("#undo-write:disabled").waitFor();
+  assert.match(await page.locator("#undo-write").getAttribute("title"), /^Undo is not possible: scene\.toml was changed by another program/);
+  await page.locator("#pause").focus();
+  await page.keyboard.press("Control+z");
+  await page.locator("#notice.bad", { hasText: "Undo is not possible" }).waitFor();
+  // The next change can be undone again.
+  await control(page, "shapes[0].radius", 1).fill("0.35");
+  await page.keyboard.press("Enter");
+  await page.locator("#undo-write:enabled").click();
+  await holds("radius = 0.25");
+  assert.deepEqual(page.faults, []);
+});
+
+test("exposure out of range is reported, and its slider and box agree", async () => {
+  await studio.start();
+  const page = await open(browser, studio);
+  const [box, slider] = [page.locator("#exposure-number"), page.locator("#exposure")];
+  for (const [typed, shown] of [["500", "100"], ["-700", "-100"], ["500", "100"], ["12.5", "12.5"]]) {
+    await box.fill(typed);
+    await page.keyboard.press("Enter");
+    await settled(page);
+    const notice = page.locator("#notice.bad", { hasText: `from -100 to 100 stops: ${typed} became ${shown}` });
+    if (typed !== shown) await notice.waitFor();
+    else await page.locator("#notice").waitFor({ state: "hidden" });
+    assert.deepEqual([await box.inputValue(), await slider.inputValue()], [shown, shown]);
+  }
+  await box.fill("-0.79435");
+  await page.keyboard.press("Enter");
+  await settled(page);
+  await page.locator("#pause").focus();
+  const room = await box.evaluate((box) => {
+    const { font, paddingLeft, paddingRight } = getComputedStyle(box);
+    const context = new OffscreenCanvas(1, 1).getContext("2d");
+    context.font = font;
+    return box.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight) - context.measureText(box.value).width;
+  });
+  assert.ok(room >= 0, `${room} px for the digits`);
+});
+
+test("the camera's values say that they are the file's once the view has moved", async () => {
+  await studio.start();
+  const page = await open(browser, studio);
+  await choose(page, "camera");
+  const note = page.locator("#object-note");
+  assert.equal(await note.textContent(), "");
+  await dragged(page);
+  await note.filter({ hasText: "The view has moved" }).waitFor();
+  await page.click("#reset");
+  await page.waitForFunction(() => document.getElementById("object-note").textContent === "");
+  await dragged(page);
+  await choose(page, "shapes[0]");
+  await page.waitForFunction(() => document.getElementById("object-note").textContent === "");
+});
+
+test("a shader that is broken at the start is an error, not a wait", async () => {
+  studio.breakShader();
+  await studio.start();
+  const page = await visit(browser, studio);
+  await page.locator("#badge.lost", { hasText: /^Shader error\. No image yet$/ }).waitFor();
+  studio.mendShader();
+  await page.locator("#badge.live").waitFor({ state: "attached" });
+  assert.ok(fs.existsSync(studio.path("scene.toml")));
+});
