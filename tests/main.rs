@@ -13,6 +13,7 @@ mod cost;
 mod culling;
 #[cfg(feature = "dev")]
 mod dev;
+mod documents;
 #[cfg(target_os = "linux")]
 mod faults;
 mod gltf;
