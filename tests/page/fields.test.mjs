@@ -1,9 +1,9 @@
-// The page's fields under hands: what is half typed, fingers that scroll, keys, the focus.
+// Fields of the page in use: half-typed numbers, touch, keys, focus.
 
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { LONGEST, SCENE, Studio, decoded, launch, open, settled, visit } from "./studio.mjs";
+import { LONGEST, SCENE, Studio, canvas, decoded, launch, open, settled, visit } from "./studio.mjs";
 
 const KERNEL = "shaders/kernels/render.wgsl";
 const LEVEL = "const level: f32 = 0.5; // slider 0..1\n";
@@ -52,7 +52,7 @@ async function choose(page, name) {
   await page.locator("#object-name", { hasText: name }).waitFor();
 }
 
-// Notes each change that the page asks for from now on.
+// Records each change that the page requests from now on.
 async function listen(page) {
   await page.evaluate(() => {
     const send = WebSocket.prototype.send;
@@ -83,7 +83,7 @@ test("a half-typed number stays while other controls come and go", async () => {
   await page.keyboard.type("5");
   await page.keyboard.press("Enter");
   await written("center = [0, 0, 0.75]");
-  // What goes takes its text with it, and the keys that follow act on nobody.
+  // A removed box discards its text, and the keys that follow have no effect.
   const sent = await listen(page);
   await box(page, "materials.grey.shininess", 1).focus();
   await page.keyboard.press("Control+a");
@@ -93,7 +93,7 @@ test("a half-typed number stays while other controls come and go", async () => {
   await page.keyboard.type("5r");
   assert.deepEqual(await sent(), []);
   assert.equal(studio.read("scene.toml").match(/shininess = 16/g).length, 2);
-  // A number that goes from those that are not in the file to those that are keeps its focus, and the list stays open.
+  // A number that moves from the defaults to the values of the file keeps its focus, and the list stays open.
   await choose(page, "render");
   const absent = page.locator('[data-name="render"] .absent');
   await absent.locator("> summary").click();
@@ -104,7 +104,7 @@ test("a half-typed number stays while other controls come and go", async () => {
   await there.waitFor();
   assert.ok(await isFocused(there));
   assert.ok(await absent.evaluate((node) => node.open));
-  // Taken out by keys it goes back, with the focus.
+  // Removed from the file by keys, it moves back with the focus.
   await page.locator('[data-path="render.seed"]').getByRole("button", { name: "default" }).focus();
   await page.keyboard.press("Enter");
   await there.waitFor({ state: "detached" });
@@ -112,7 +112,7 @@ test("a half-typed number stays while other controls come and go", async () => {
   assert.deepEqual(page.faults, []);
 });
 
-test("a half-typed number of a shader stays while sliders come and go, and they take their ranges from the file", async () => {
+test("a half-typed number of a shader stays while sliders come and go, and sliders take their ranges from the file", async () => {
   const page = await open(browser, studio);
   const sent = await listen(page);
   const level = number(page, "level");
@@ -128,7 +128,7 @@ test("a half-typed number of a shader stays while sliders come and go, and they 
   await says(slider(page, "level"), "0.25");
   await settled(page);
   assert.deepEqual((await sent()).map((text) => JSON.parse(text).slide.value), [0.25]);
-  // It is stepped and dragged like any other number.
+  // Key steps work as in any other box.
   await page.keyboard.press("ArrowUp");
   await says(slider(page, "level"), "0.26");
   await page.keyboard.press("Control+a");
@@ -143,7 +143,7 @@ test("a half-typed number of a shader stays while sliders come and go, and they 
   mark(`const wide: f32 = 0.05; // slider 0..0.1 step 0.05\n${LEVEL}`);
   await page.waitForFunction(() => document.querySelector("#sliders input[max='0.1']").step === "0.05");
   assert.equal(await slider(page, "early").count(), 0);
-  // One that goes while its number is typed drops it.
+  // A slider that is removed while its number is typed discards it.
   await sent();
   await number(page, "wide").focus();
   await page.keyboard.press("Control+a");
@@ -161,7 +161,7 @@ test("a finger that scrolls changes nothing, one that drags or taps does", async
   await choose(page, "shapes[0]");
   await page.evaluate(() => document.activeElement.blur());
   const sent = await listen(page);
-  // A page that is let go scrolls on for a while: a change with every picture of the screen.
+  // After a swipe the page keeps scrolling for some animation frames.
   const atRest = () => page.evaluate(async () => {
     let last = null;
     for (let still = 0; still < 4; still = last === scrollY ? still + 1 : 0) {
@@ -169,7 +169,7 @@ test("a finger that scrolls changes nothing, one that drags or taps does", async
       await new Promise((resolve) => requestAnimationFrame(resolve));
     }
   });
-  // A finger comes down on a control, moves, and goes up.
+  // Presses a control with a finger, moves the finger, and releases it.
   const swipe = async (control, dx, dy) => {
     await control.evaluate((node) => scrollBy(0, node.getBoundingClientRect().top - 680));
     await atRest();
@@ -199,19 +199,19 @@ test("a finger that scrolls changes nothing, one that drags or taps does", async
     assert.equal((await sent()).length, 1);
     await settled(page);
   }
-  // Nothing is held by a finger that has gone: boxes follow the file, and another object is shown.
+  // After the release boxes follow the file, and another object can be shown.
   const radius = box(page, "shapes[0].radius", 1);
   await swipe(radius, 5, -96);
   studio.write("scene.toml", SCENE.replace("radius = 0.5", "radius = 0.35"));
   await says(radius, "0.35");
   await swipe(radius, 5, -96);
-  const area = await page.locator("[data-part=picture] canvas").boundingBox();
+  const area = await canvas(page).boundingBox();
   await page.touchscreen.tap(area.x + area.width * 0.9, area.y + area.height * 0.6);
   await box(page, "shapes[1].point").waitFor({ state: "attached" });
   assert.deepEqual(page.faults, []);
 });
 
-test("keys belong to what has the focus", async () => {
+test("keys act on the control that has the focus", async () => {
   const page = await open(browser, studio);
   await choose(page, "shapes[0]");
   const sent = await listen(page);
@@ -223,11 +223,11 @@ test("keys belong to what has the focus", async () => {
     assert.equal(look?.exposure ?? slide.value, least);
   }
   await box(page, "shapes[0].radius").focus();
-  await page.keyboard.press("Home"); // its range then follows it
+  await page.keyboard.press("Home"); // its range then follows the value
   await page.waitForFunction(() => Number(document.querySelector('[data-control="shapes[0].radius 1"]').value) < 0.01);
   await page.locator("#object-find").focus();
   for (const key of ["Home", "r", "5", " "]) await page.keyboard.press(key);
-  // Those of the camera are the picture's.
+  // Camera keys act only while the image has the focus.
   for (const control of ["#transform", "#help summary", "#copy", "#exposure-number"]) {
     await page.locator(control).focus();
     for (const key of ["Home", "f", "r"]) await page.keyboard.press(key);
@@ -237,14 +237,14 @@ test("keys belong to what has the focus", async () => {
   await settled(page);
   const kinds = (await sent()).map((text) => (typeof JSON.parse(text) === "string" ? text : Object.keys(JSON.parse(text))[0]));
   assert.deepEqual(kinds, ["set"]);
-  await page.locator("[data-part=picture] canvas").focus();
+  await canvas(page).focus();
   await page.keyboard.press("Home");
   await page.locator("#help summary").focus();
   await page.keyboard.press("2");
   assert.deepEqual(await sent(), ['{"frame":null}', '{"view":"normal"}']);
 });
 
-test("on a narrow screen, and on one that is zoomed in, the focus is never behind the picture", async () => {
+test("on a narrow or zoomed-in screen the focus is never behind the image", async () => {
   for (const options of [PHONE, { viewport: { width: 600, height: 400 } }]) {
     const page = await open(browser, studio, options);
     await choose(page, "shapes[0]");
@@ -273,7 +273,7 @@ test("on a narrow screen, and on one that is zoomed in, the focus is never behin
   }
 });
 
-test("an error goes with the value that it was about, and an emptied box shows its value again", async () => {
+test("an error disappears with its value, and an emptied box shows its value again", async () => {
   const page = await open(browser, studio);
   await choose(page, "shapes[0]");
   const radius = box(page, "shapes[0].radius", 1);
@@ -296,7 +296,7 @@ test("an error goes with the value that it was about, and an emptied box shows i
   assert.equal(await link("/a/$$/$'.wgsl"), "x://file/a/$$/$'.wgsl:3");
 });
 
-test("whoever finds no place is told so, and gets one that falls free", async () => {
+test("a viewer beyond the limit gets a message, and a slot that becomes free", async () => {
   const page = await open(browser, studio);
   await page.evaluate(async () => {
     window.others = Array.from({ length: 15 }, () => new WebSocket(`ws://${location.host}/socket`));
@@ -308,7 +308,7 @@ test("whoever finds no place is told so, and gets one that falls free", async ()
   await late.locator("#badge.live").waitFor({ state: "attached" });
 });
 
-test("forced colours show how far the picture is", async () => {
+test("forced colours show the progress", async () => {
   const page = await open(browser, studio, { forcedColors: "active" });
   const bar = page.locator("#bar");
   const colors = async () => {
@@ -319,7 +319,7 @@ test("forced colours show how far the picture is", async () => {
   assert.ok((await colors()) >= 3, "an edge, what is done and what is not");
 });
 
-test("a count of cells goes from square to square", async () => {
+test("a count of cells steps from square to square", async () => {
   const page = await open(browser, studio);
   await choose(page, "render");
   const count = (number) => written(`count = ${number} }\nlight`);
@@ -334,7 +334,7 @@ test("a count of cells goes from square to square", async () => {
   await page.keyboard.press("ArrowDown");
   await page.keyboard.press("ArrowDown");
   await count(4);
-  // A drag that goes nowhere does not tremble between two of them.
+  // A drag around one position does not alternate between two squares.
   const sent = await listen(page);
   await page.locator("#pause").focus();
   await field.scrollIntoViewIfNeeded();
@@ -348,8 +348,8 @@ test("a count of cells goes from square to square", async () => {
   assert.deepEqual((await sent()).map((text) => JSON.parse(text).set.value), [9]);
   await field.focus();
   await page.keyboard.press("PageUp");
-  await count(169); // ten squares further
-  // What is typed is what is asked for, and the rule is told, until a right one is.
+  await count(169); // ten squares up
+  // A typed number is sent as it is; the error stays until a valid one is typed.
   const told = page.locator('[data-path="render.pixel_samples.count"] [role=alert]', { hasText: "square" });
   await field.fill("5");
   await page.keyboard.press("Enter");
@@ -364,7 +364,7 @@ test("a count of cells goes from square to square", async () => {
   await page.keyboard.press("Enter");
   await page.locator("#notice.bad", { hasText: "must be a whole number from 1 to 65,536, not 1.5" }).waitFor();
   assert.equal(await page.locator("#most-samples").inputValue(), "");
-  // Of another pattern any number is one.
+  // Other patterns accept any count.
   await box(page, "render.pixel_samples.pattern").selectOption("sobol");
   await written('pattern = "sobol", count = 9');
   await page.locator('[data-control="render.pixel_samples.count 0"][max="1000"]').waitFor();
@@ -374,7 +374,7 @@ test("a count of cells goes from square to square", async () => {
   assert.deepEqual(page.faults, []);
 });
 
-test("the focus of what goes off stays near, and comes back with it", async () => {
+test("the focus of a control that is disabled or removed stays near, and returns with the control", async () => {
   const page = await open(browser, studio);
   const isAround = (id) => page.evaluate((id) => document.activeElement === document.getElementById(id).parentElement, id);
   await choose(page, "shapes[0]");
@@ -387,7 +387,7 @@ test("the focus of what goes off stays near, and comes back with it", async () =
   assert.ok(await isAround("undo-write"));
   await page.keyboard.press("Tab");
   assert.ok(await isFocused(page.locator("#redo-write")), "what is beside it is the next");
-  // What was hidden while it had the focus: the button beside a field, the canvas of another view.
+  // Focused elements that are hidden: the button beside a field, the canvas of another view.
   await slider(page, "level").focus();
   await page.keyboard.press("ArrowRight");
   await page.getByRole("button", { name: "Reset level" }).focus();
@@ -399,13 +399,13 @@ test("the focus of what goes off stays near, and comes back with it", async () =
   await page.locator("[data-part=second] canvas").focus();
   await page.keyboard.press("1");
   await page.locator("[data-part=second] canvas").waitFor({ state: "hidden" });
-  assert.ok(await isFocused(page.locator("[data-part=picture] canvas")));
-  // What was taken away.
+  assert.ok(await isFocused(canvas(page)));
+  // A focused element that is removed.
   await page.keyboard.press("b");
   await page.getByRole("button", { name: "Delete view 1" }).focus();
   await page.keyboard.press("Enter");
   assert.ok(await isFocused(page.locator("#bookmarks")));
-  // Without a connection all is off, and with it what had the focus has it again, unless somebody has moved it.
+  // Without a connection all controls are disabled. Afterwards the same control has the focus, unless the user has moved it.
   for (const [moves, wanted] of [[[], "#pause"], [["Tab"], "#save-png"]]) {
     await page.locator("#pause").focus();
     await studio.stop();
@@ -416,13 +416,13 @@ test("the focus of what goes off stays near, and comes back with it", async () =
     await page.locator("#badge.live").waitFor({ state: "attached" });
     assert.ok(await isFocused(page.locator(wanted)), wanted);
   }
-  // The button that opens a file is scrolled to where its section is, and no more.
+  // Focusing the button that opens a file scrolls the panel only.
   await page.evaluate(() => document.querySelectorAll("aside details").forEach((details) => (details.open = true)));
   await page.locator("#reference-file").focus();
   assert.equal(await page.evaluate(() => scrollY), 0);
   const button = await page.locator("label[for=reference-file]").boundingBox();
   assert.ok(button.y >= 0 && button.y + button.height <= 800, `${button.y}`);
-  // Who clicks beside all of it has no focus, whatever goes off then.
+  // After a click beside all controls nothing regains the focus.
   await page.locator("#restart").focus();
   await page.locator("h1").click();
   await studio.stop();

@@ -1,10 +1,10 @@
-// Layers of the film on the page: what a scene has is shown as `wgray render --aov` writes it, what it has not is off and says why.
+// Film layers on the page equal those of `wgray render --aov`; layers that a scene lacks are disabled with the reason.
 
 import assert from "node:assert/strict";
 import fs from "node:fs";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { SCENE, Studio, decoded, launch, open, same, settled, shown } from "./studio.mjs";
+import { SCENE, Studio, canvas, decoded, launch, open, same, settled, shown } from "./studio.mjs";
 
 const PATH = SCENE.replace("[render]", "[render]\nintegrator = \"path\"\nbackground = [0.1, 0.2, 0.4]");
 
@@ -25,7 +25,7 @@ async function choose(page, view) {
   await settled(page);
 }
 
-test("layers of the film are views, with the pictures and the files of a render", async () => {
+test("film layers are views with the images and files of a render", async () => {
   studio.write("scene.toml", PATH);
   await studio.start();
   const page = await open(browser, studio);
@@ -46,7 +46,7 @@ test("layers of the film are views, with the pictures and the files of a render"
   }
   assert.equal(seen.size, 5, "all differ");
   assert.equal(await page.locator("#samples").innerText(), "4 of 4");
-  await page.locator("[data-part=picture] canvas").hover();
+  await canvas(page).hover();
   await page.locator("#values", { hasText: /albedo [\d.]+ +[\d.]+ +[\d.]+.*bits.*shown/ }).waitFor();
   const one = await compiled();
   assert.notEqual(one, first, "they take a kernel");
@@ -58,7 +58,7 @@ test("layers of the film are views, with the pictures and the files of a render"
   assert.deepEqual(page.faults, []);
 });
 
-test("what a scene does not have is off and says why, until it has it", async () => {
+test("a layer that a scene lacks is disabled with the reason until the scene has it", async () => {
   await studio.start();
   const page = await open(browser, studio);
   const group = page.locator("#layers optgroup:has([value=direct])");
@@ -74,10 +74,10 @@ test("what a scene does not have is off and says why, until it has it", async ()
   await page.waitForFunction(() => !document.querySelector("#layers [value=direct]").disabled);
   assert.ok(await variance.isEnabled());
   assert.equal(await group.getAttribute("label"), "Light");
-  // The variance has the scale of its false colours beside it.
+  // The variance comes with the scale of its false colours.
   await choose(page, "variance");
   await page.locator("#legend", { hasText: "2⁻¹²" }).waitFor();
-  await page.locator("[data-part=picture] canvas").hover();
+  await canvas(page).hover();
   await page.locator("#values", { hasText: /variance .*standard error/ }).waitFor();
   assert.equal(await page.locator("#layers").evaluate((select) => select.classList.contains("chosen")), true);
   assert.deepEqual(page.faults, []);

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { Studio, finished, launch, listen, open, revision, settled, shown } from "./studio.mjs";
+import { Studio, canvas, finished, launch, listen, open, revision, settled, shown } from "./studio.mjs";
 
 let browser;
 let studio;
@@ -19,7 +19,6 @@ afterEach(async () => {
   await studio.remove();
 });
 
-const canvas = (page, part = "picture") => page.locator(`[data-part=${part}] canvas`);
 const camera = (page) => page.locator("#camera-text").innerText();
 
 test("every frame on the screen is acknowledged by its number", async () => {
@@ -138,4 +137,19 @@ test("a dolly passes the look-at point instead of sticking to it, and ends far o
   assert.ok(distance(far) < 1001 * distance(start), far);
   assert.ok(distance(far) > 100 * distance(start), far);
   assert.deepEqual(page.faults, []);
+});
+
+test("on a phone the toolbar scrolls to the selected view", async () => {
+  const page = await open(browser, studio, { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
+  const isInView = (selector) => page.waitForFunction((selector) => {
+    const { left, right } = document.querySelector(selector).getBoundingClientRect();
+    return left >= 0 && right <= innerWidth;
+  }, selector);
+  await canvas(page).focus();
+  await page.keyboard.press("7");
+  await isInView("label:has([value=compare])");
+  await page.keyboard.press("1");
+  await isInView("label:has([value=color])");
+  await page.selectOption("#layers", "shading_normal");
+  await isInView("#layers");
 });

@@ -1,9 +1,9 @@
-// Objects on the page: clicked or named, changed by their controls, taken back.
+// Objects on the page: selection, editing by controls, undo.
 
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { LONGEST, SCENE, Studio, launch, open, settled, showsRendered } from "./studio.mjs";
+import { LONGEST, SCENE, Studio, canvas, launch, open, settled, showsRendered } from "./studio.mjs";
 
 let browser;
 let studio;
@@ -21,7 +21,7 @@ afterEach(async () => {
 
 const box = (page, path, nth = 0) => page.locator(`[data-control="${path} ${nth}"]`);
 
-// Waits until the scene file has a text.
+// Waits until the scene file contains a text.
 async function holds(text) {
   const deadline = Date.now() + LONGEST;
   while (!studio.read("scene.toml").includes(text)) {
@@ -30,9 +30,9 @@ async function holds(text) {
   }
 }
 
-// Clicks a place of the picture, in shares of its canvas.
+// Clicks a point of the image, given as fractions of its canvas.
 async function click(page, x, y) {
-  const area = await page.locator("[data-part=picture] canvas").boundingBox();
+  const area = await canvas(page).boundingBox();
   await page.mouse.click(area.x + area.width * x, area.y + area.height * y);
 }
 
@@ -42,14 +42,14 @@ async function choose(page, name) {
   await page.locator("#object-name", { hasText: name }).waitFor();
 }
 
-test("a click shows the object, and its controls write into the scene file", async () => {
+test("a click shows the object, and its controls write to the scene file", async () => {
   const page = await open(browser, studio);
   await click(page, 0.5, 0.5);
   await page.locator("#object-name", { hasText: "shapes[0]" }).waitFor();
   const lines = page.locator("#object-groups > details").first().locator("pre");
   const number = SCENE.split("\n").indexOf("[[shapes]]") + 1;
   assert.match(await lines.innerText(), new RegExp(`^ *${number}  \\[\\[shapes\\]\\]\\n`));
-  // A slider by keys: the box, the file and the lines follow.
+  // A slider moved by keys: the box, the file and the shown lines follow.
   await box(page, "shapes[0].radius").focus();
   await page.keyboard.press("ArrowLeft");
   await page.locator("#undo-write", { hasText: "shapes[0].radius" }).waitFor();
@@ -59,13 +59,13 @@ test("a click shows the object, and its controls write into the scene file", asy
   await lines.filter({ hasText: `radius = ${radius}` }).waitFor();
   await settled(page);
   await showsRendered(page, studio);
-  // A colour, as linear light and as a display shows it.
+  // A colour, as linear numbers and as sRGB.
   await box(page, "materials.red.color", 1).fill("0.25");
   await page.keyboard.press("Enter");
   await holds("color = [0.25, 0.1, 0.1]");
   await box(page, "materials.red.color").fill("#ffffff");
   await holds("color = [1, 1, 1]");
-  // Keys that are absent are added, and go again.
+  // Another material replaces the shown one.
   await page.locator("#undo-write", { hasText: "materials.red.color" }).waitFor();
   await box(page, "shapes[0].material").selectOption("grey");
   await holds('center = [0, 0, 0.5]\nradius');
@@ -74,7 +74,7 @@ test("a click shows the object, and its controls write into the scene file", asy
   assert.deepEqual(page.faults, []);
 });
 
-test("what was written is taken back and made again by keys", async () => {
+test("changes of the file are undone and redone by keys", async () => {
   const page = await open(browser, studio);
   await choose(page, "shapes[0]");
   await box(page, "shapes[0].center", 2).fill("0.75");
@@ -84,8 +84,8 @@ test("what was written is taken back and made again by keys", async () => {
   await box(page, "shapes[0].radius", 1).fill("0.25");
   await page.keyboard.press("Enter");
   await page.locator("#undo-write", { hasText: "shapes[0].radius" }).waitFor();
-  // In a box of text the keys are the browser's own.
-  await page.locator("[data-part=picture] canvas").focus();
+  // In a text box these keys belong to the browser.
+  await canvas(page).focus();
   await page.keyboard.press("Control+z");
   await page.locator("#redo-write", { hasText: "shapes[0].radius" }).waitFor();
   await settled(page);
@@ -96,7 +96,7 @@ test("what was written is taken back and made again by keys", async () => {
   assert.equal(studio.read("scene.toml"), once.replace("radius = 0.5", "radius = 0.25"));
 });
 
-test("a value that breaks a rule is told at its control, and the file stays", async () => {
+test("an invalid value is reported at its control, and the file stays", async () => {
   const page = await open(browser, studio);
   await choose(page, "shapes[0]");
   await box(page, "shapes[0].radius", 1).fill("-1");
@@ -110,7 +110,7 @@ test("a value that breaks a rule is told at its control, and the file stays", as
   await holds("radius = 0.25");
 });
 
-test("the object outlives reloads, and is told when it has gone", async () => {
+test("the object survives reloads, and its removal is reported", async () => {
   const page = await open(browser, studio);
   await choose(page, "shapes[1]");
   studio.edit("scene.toml", "point = [0, 0, 0]", "point = [0, 0, -0.25]");
@@ -121,14 +121,14 @@ test("the object outlives reloads, and is told when it has gone", async () => {
   await box(page, "shapes[1].point").waitFor();
 });
 
-test("boxes of numbers are dragged and stepped, and each way is one step back", async () => {
+test("number boxes are dragged and stepped, and each gesture is one undo step", async () => {
   const page = await open(browser, studio);
   await choose(page, "camera");
   const x = box(page, "camera.position", 0);
   await x.scrollIntoViewIfNeeded();
   const area = await x.boundingBox();
   const [left, top] = [area.x + area.width / 2, area.y + area.height / 2];
-  // Ten pixels are one step, a tenth of the position's size; with Shift a hundred are.
+  // Ten pixels are one step, a tenth of the position's magnitude; with Shift, a hundred pixels are.
   await page.mouse.move(left, top);
   await page.mouse.down();
   for (const way of [5, 20, 60, 100]) await page.mouse.move(left + way, top);
@@ -144,7 +144,7 @@ test("boxes of numbers are dragged and stepped, and each way is one step back", 
   await page.locator("#redo-write", { hasText: "camera.position" }).waitFor();
   assert.equal(studio.read("scene.toml"), SCENE);
   await page.waitForFunction(() => document.querySelector('[data-control="camera.position 0"]').value === "0");
-  // Escape gives the drag up.
+  // Escape cancels the drag.
   await page.mouse.move(left, top);
   await page.mouse.down();
   await page.mouse.move(left + 40, top);
@@ -153,10 +153,10 @@ test("boxes of numbers are dragged and stepped, and each way is one step back", 
   await holds("position = [0, -4, 1]");
   await page.mouse.up();
   await page.waitForFunction(() => document.getElementById("undo-write").disabled);
-  // A click types, and the pointer then belongs to the text.
+  // A click focuses the box for typing.
   await page.mouse.click(left, top);
   assert.equal(await x.evaluate((box) => box === document.activeElement), true);
-  // A key that is held down is one step back, too.
+  // A held key is one undo step, too.
   for (let i = 0; i < 4; i++) await page.keyboard.down("ArrowUp");
   await page.keyboard.up("ArrowUp");
   await holds("position = [0.4, -4, 1]");
@@ -170,7 +170,7 @@ test("boxes of numbers are dragged and stepped, and each way is one step back", 
     await settled(page);
   }
   assert.equal(studio.read("scene.toml"), SCENE);
-  // So is one that follows a click at once.
+  // So is a held key right after a click.
   await x.evaluate(async (box) => {
     const fire = (Kind, type, more) => box.dispatchEvent(new Kind(type, { bubbles: true, ...more }));
     fire(PointerEvent, "pointerdown", { button: 1 });
@@ -186,7 +186,7 @@ test("boxes of numbers are dragged and stepped, and each way is one step back", 
   assert.deepEqual(page.faults, []);
 });
 
-test("nothing out of range is sent by a drag, a key or a slider", async () => {
+test("drags, keys and sliders send no value out of range", async () => {
   const page = await open(browser, studio);
   await page.evaluate(() => {
     const send = WebSocket.prototype.send;
@@ -214,7 +214,7 @@ test("nothing out of range is sent by a drag, a key or a slider", async () => {
   for (let i = 0; i < 7; i++) await page.keyboard.press("PageDown");
   await holds("color = [0, 0.8, 0.8]");
   await settled(page);
-  // Of a lens a number of corners, 0 or 3 and more: what is between is passed over.
+  // A lens has 0 or at least 3 blades: steps skip the numbers between.
   await choose(page, "camera");
   await page.click("details.absent > summary");
   await box(page, "camera.blades", 1).focus();
@@ -229,12 +229,12 @@ test("nothing out of range is sent by a drag, a key or a slider", async () => {
   const sent = all.filter(({ path }) => path !== "camera.blades");
   const blades = all.filter((set) => !sent.includes(set)).map(({ value }) => value);
   assert.ok(blades[0] === 3 && blades.every((x) => x === 0 || x >= 3), `${blades}`);
-  assert.ok(sent.length >= 4); // of each burst the first and the last at least
+  assert.ok(sent.length >= 4); // at least the first and the last of each burst
   for (const { path, value } of sent) {
     const [low, high] = path.endsWith("radius") ? [1e-9, 1e9] : [0, 1e6];
     for (const x of [value].flat()) assert.ok(x >= low && x <= high, `${path}: ${x}`);
   }
-  // A number that is typed goes to the scene's own reader, which says what is wrong.
+  // A typed number is checked by the scene's parser, which reports the error.
   await choose(page, "lights[0]");
   await red.fill("-1");
   await page.keyboard.press("Enter");
@@ -242,13 +242,13 @@ test("nothing out of range is sent by a drag, a key or a slider", async () => {
   assert.ok(studio.read("scene.toml").includes("color = [0, 0.8, 0.8]"));
 });
 
-test("one slider makes a light stronger and weaker, and its tint stays", async () => {
+test("one slider scales a light and keeps its tint", async () => {
   studio.edit("scene.toml", "color = [0.8, 0.8, 0.8]", "color = [2, 1, 0.5]");
   const page = await open(browser, studio);
   await choose(page, "lights[0]");
   const [slider, strength] = [4, 5].map((nth) => box(page, "lights[0].color", nth));
   assert.equal(await strength.inputValue(), "2");
-  assert.ok(Number(await slider.getAttribute("max")) >= 4, "it goes well above what is there");
+  assert.ok(Number(await slider.getAttribute("max")) >= 4, "it extends well above the value");
   assert.equal(await slider.getAttribute("min"), "0");
   await slider.fill("4");
   await holds("color = [4, 2, 1]");
@@ -261,21 +261,21 @@ test("one slider makes a light stronger and weaker, and its tint stays", async (
   await page.keyboard.press("Enter");
   await holds("color = [30, 15, 7.5]");
   await settled(page);
-  // There is always room above.
+  // The slider's range extends beyond the value.
   await page.waitForFunction((slider) => Number(slider.max) >= 60, await slider.elementHandle());
   for (const text of ["[0, 0, 0]", "[4, 2, 1]", "[2, 1, 0.5]"]) {
     await page.click("#undo-write");
     await holds(`color = ${text}`);
     await settled(page);
   }
-  // What reflects has a share of light, and no strength.
+  // A reflectance has no strength slider.
   await choose(page, "materials.red");
   assert.equal(await box(page, "materials.red.color", 3).count(), 1);
   assert.equal(await box(page, "materials.red.color", 4).count(), 0);
   assert.deepEqual(page.faults, []);
 });
 
-test("what others change of a vector while one of its numbers is dragged stays", async () => {
+test("other viewers' changes of a vector survive a drag of one of its numbers", async () => {
   const page = await open(browser, studio);
   await choose(page, "shapes[0]");
   const x = box(page, "shapes[0].center");
@@ -293,7 +293,7 @@ test("what others change of a vector while one of its numbers is dragged stays",
   await page.mouse.move(at[0] + 40, at[1]);
   await page.mouse.up();
   await holds("center = [0.04, 0.25, 0.75]");
-  // Given up, too.
+  // They survive a cancelled drag, too.
   await settled(page);
   await drag(20);
   await holds("center = [0.06, 0.25, 0.75]");
@@ -302,7 +302,7 @@ test("what others change of a vector while one of its numbers is dragged stays",
   await page.mouse.up();
   await holds("center = [0.04, 0.5, 0.75]");
   await settled(page);
-  // Of quick hands every number counts, as a step of its own.
+  // Quick successive changes are all written, each as its own undo step.
   const notes = await page.evaluate(() => {
     const boxes = [0, 1, 2].map((i) => document.querySelector(`[data-control="shapes[0].center ${i}"]`));
     boxes.forEach((box, i) => {

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import http from "node:http";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { LONGEST, SCENE, Studio, decoded, finished, launch, open, revision, same, settled, shown, showsRendered } from "./studio.mjs";
+import { LONGEST, SCENE, Studio, canvas, decoded, finished, launch, open, revision, same, settled, shown, showsRendered } from "./studio.mjs";
 
 let browser;
 let studio;
@@ -23,7 +23,7 @@ afterEach(async () => {
 const text = (page, selector) => page.locator(selector).innerText();
 
 async function drag(page, dx, dy, modifier) {
-  const box = await page.locator("[data-part=picture] canvas").boundingBox();
+  const box = await canvas(page).boundingBox();
   const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
   if (modifier) await page.keyboard.down(modifier);
   await page.mouse.move(x, y);
@@ -33,12 +33,12 @@ async function drag(page, dx, dy, modifier) {
   if (modifier) await page.keyboard.up(modifier);
 }
 
-test("the picture is the one that render makes", async () => {
+test("the image equals that of wgray render", async () => {
   const page = await open(browser, studio);
   await showsRendered(page, studio);
   assert.equal(await text(page, "#samples"), "4 of 4");
   assert.equal(await page.locator("#badge.live").count(), 1);
-  // The comparison can fail.
+  // Control: the comparison can fail.
   const before = await decoded(page, studio.render());
   studio.edit("scene.toml", "fov = 40", "fov = 42");
   assert.notDeepEqual(await decoded(page, studio.render()), before);
@@ -46,7 +46,7 @@ test("the picture is the one that render makes", async () => {
   assert.deepEqual(page.faults, []);
 });
 
-test("a saved shader changes the picture", async () => {
+test("a saved shader changes the image", async () => {
   const page = await open(browser, studio);
   const [seen, old] = [await shown(page), await revision(page)];
   studio.redden();
@@ -58,7 +58,7 @@ test("a saved shader changes the picture", async () => {
   assert.deepEqual(red(reddened), red(seen[2]));
 });
 
-test("a broken shader shows file and line and keeps the picture, a mended one recovers", async () => {
+test("a broken shader shows file and line and keeps the image, a fixed one recovers", async () => {
   const page = await open(browser, studio);
   const seen = await shown(page);
   studio.breakShader();
@@ -72,7 +72,7 @@ test("a broken shader shows file and line and keeps the picture, a mended one re
   studio.mendShader();
   await page.locator("#problems h2").waitFor({ state: "detached" });
   await showsRendered(page, studio);
-  // It was told in the terminal too.
+  // The terminal shows the error too.
   assert.match(studio.said, new RegExp(`error: ${place.replaceAll(".", "\\.")}\\d+: .*simple`));
   assert.doesNotMatch(studio.said, /\x1b/, "a pipe gets no colours");
 });
@@ -133,9 +133,9 @@ test("the camera is copied as text and reset", async () => {
 test("a pixel's linear value is read under the pointer", async () => {
   const page = await open(browser, studio);
   const [width, , bytes] = await shown(page);
-  const canvas = page.locator("[data-part=picture] canvas");
-  const { left, top } = await canvas.evaluate((canvas) => ({ ...canvas.dataset }));
-  await canvas.hover({ position: { x: Number(left) + 60.5, y: Number(top) + 45.5 } });
+  const image = canvas(page);
+  const { left, top } = await image.evaluate((canvas) => ({ ...canvas.dataset }));
+  await image.hover({ position: { x: Number(left) + 60.5, y: Number(top) + 45.5 } });
   await page.locator("#values", { hasText: "pixel 60 45" }).waitFor();
   const linear = /linear RGB ([\d.e+-]+) +([\d.e+-]+) +([\d.e+-]+)/.exec(await text(page, "#values"));
   const told = /shown (\d+) (\d+) (\d+)/.exec(await text(page, "#values"));
@@ -145,7 +145,7 @@ test("a pixel's linear value is read under the pointer", async () => {
   assert.deepEqual(told.slice(1).map(Number), encoded);
 });
 
-test("the views show what they say, the GPU agrees with the CPU", async () => {
+test("all views differ, and the GPU agrees with the CPU", async () => {
   const page = await open(browser, studio);
   const seen = new Set([String(await shown(page))]);
   for (const [i, view] of ["normal", "depth", "uv", "primitive", "samples"].entries()) {
@@ -182,7 +182,7 @@ test("the views show what they say, the GPU agrees with the CPU", async () => {
   assert.deepEqual(page.faults, []);
 });
 
-test("a second viewer sees the same, and what the first does", async () => {
+test("a second viewer sees the same image and the first viewer's moves", async () => {
   const [first, second] = [await open(browser, studio), await open(browser, studio)];
   same(await shown(second), await shown(first));
   const old = await revision(second);
@@ -194,7 +194,7 @@ test("a second viewer sees the same, and what the first does", async () => {
   same(await shown(second), await shown(first));
 });
 
-test("the page comes back when the program does", async () => {
+test("the page reconnects when the program restarts", async () => {
   const page = await open(browser, studio);
   const { port } = studio;
   await studio.stop();
@@ -207,19 +207,19 @@ test("the page comes back when the program does", async () => {
   await showsRendered(page, studio);
 });
 
-test("the keyboard alone is enough", async () => {
+test("the keyboard reaches and operates everything", async () => {
   const page = await open(browser, studio);
   const start = await text(page, "#camera-text");
-  const focused = () => page.evaluate(() => document.activeElement.tagName + (document.activeElement.id || document.activeElement.value || ""));
+  const focused = () => page.evaluate(() => `${document.activeElement.tagName} ${document.activeElement.id || document.activeElement.value || ""}`.trim());
   const reached = [];
   for (let i = 0; i < 30; i++) {
     await page.keyboard.press("Tab");
     reached.push(await focused());
   }
-  for (const wanted of ["CANVAS", "INPUTcolor", "INPUTorbit", "BUTTONzoom-in", "BUTTONcopy", "SUMMARY", "INPUTexposure", "SELECTlayers"]) {
+  for (const wanted of ["CANVAS", "INPUT color", "INPUT orbit", "BUTTON zoom-in", "BUTTON copy", "SUMMARY", "INPUT exposure", "SELECT layers"]) {
     assert.ok(reached.includes(wanted), `${wanted} in ${reached}`);
   }
-  await page.locator("[data-part=picture] canvas").focus();
+  await canvas(page).focus();
   let last = start;
   for (const key of ["ArrowLeft", "Shift+ArrowUp", "PageUp"]) {
     await page.keyboard.press(key);
@@ -237,28 +237,28 @@ test("the keyboard alone is enough", async () => {
   assert.equal(await text(page, "#camera-text"), start);
 });
 
-test("the wheel with Ctrl zooms about the pointer, and the hand shifts the picture", async () => {
+test("the wheel with Ctrl zooms about the pointer, and the hand tool pans the image", async () => {
   const page = await open(browser, studio);
-  const canvas = page.locator("[data-part=picture] canvas");
-  const view = () => canvas.evaluate((canvas) => ["left", "top", "scale"].map((key) => Number(canvas.dataset[key])));
+  const image = canvas(page);
+  const view = () => image.evaluate((canvas) => ["left", "top", "scale"].map((key) => Number(canvas.dataset[key])));
   await shown(page);
   const [left, top] = await view();
-  const box = await canvas.boundingBox();
+  const box = await image.boundingBox();
   await page.mouse.move(box.x + left + 30, box.y + top + 20);
   await page.keyboard.down("Control");
   await page.mouse.wheel(0, -400);
   await page.keyboard.up("Control");
-  await page.waitForFunction(() => Number(document.querySelector("[data-part=picture] canvas").dataset.scale) > 2);
+  await page.waitForFunction(() => Number(document.querySelector("#panels canvas").dataset.scale) > 2);
   const [newLeft, newTop, scale] = await view();
   assert.ok(Math.abs(newLeft + 30 * scale - (left + 30)) <= 1 && Math.abs(newTop + 20 * scale - (top + 20)) <= 1);
   await page.getByLabel("Pan image").check();
   const camera = await text(page, "#camera-text");
   await drag(page, 50, 0);
-  await page.waitForFunction((old) => Number(document.querySelector("[data-part=picture] canvas").dataset.left) > old + 40, newLeft);
+  await page.waitForFunction((old) => Number(document.querySelector("#panels canvas").dataset.left) > old + 40, newLeft);
   assert.equal(await text(page, "#camera-text"), camera, "the camera stays");
 });
 
-test("it fits 360 pixels, in light and dark", async () => {
+test("the page fits 360 pixels, in light and dark", async () => {
   const colors = [];
   for (const colorScheme of ["light", "dark"]) {
     const page = await open(browser, studio, { viewport: { width: 360, height: 700 }, colorScheme });
@@ -269,7 +269,7 @@ test("it fits 360 pixels, in light and dark", async () => {
       assert.ok(box.x >= 0 && box.x + box.width <= 360, `${id}: ${JSON.stringify(box)}`);
     }
     studio.breakShader();
-    // Half a file may have been read before: that is another problem.
+    // A partly written file may have caused another problem before.
     const problem = page.locator("#problems article", { hasText: "simple" });
     await problem.waitFor();
     const box = await problem.boundingBox();
@@ -281,13 +281,13 @@ test("it fits 360 pixels, in light and dark", async () => {
   assert.notEqual(colors[0], colors[1]);
 });
 
-test("pages from elsewhere are refused", async () => {
-  // By another name for the same address, as after DNS rebinding.
+test("pages of other origins are rejected", async () => {
+  // Another name for the same address, as after DNS rebinding.
   const context = await browser.newContext();
   const page = await context.newPage();
   const answer = await page.goto(`http://evil.example:${studio.port}/`);
   assert.equal(answer.status(), 403);
-  // By a WebSocket of another page; the same code on the own page connects.
+  // A WebSocket of another page. Control: the same code on the own page connects.
   const connects = (url) =>
     new Promise((resolve) => {
       const socket = new WebSocket(url);
@@ -308,7 +308,7 @@ test("pages from elsewhere are refused", async () => {
   }
 });
 
-test("all mistakes are shown at once, those of kernels that are not used now too", async () => {
+test("all errors are shown at once, including those in unused kernels", async () => {
   const page = await open(browser, studio);
   const seen = await shown(page);
   studio.breakShader();
@@ -319,9 +319,9 @@ test("all mistakes are shown at once, those of kernels that are not used now too
   for (const words of ["simple", "(4, 4)", "must be called `first_hits`", "`moments.xyz` of type `vec3<f32>`"]) await problem(words);
   assert.equal(await page.locator("#problems article").count(), 4);
   same(await shown(page), seen);
-  // The session goes on.
+  // The session continues.
   const old = await revision(page);
-  await page.locator("[data-part=picture] canvas").focus();
+  await canvas(page).focus();
   await page.keyboard.press("ArrowLeft");
   await finished(page, old);
   await page.getByLabel("Normal").check();
@@ -350,7 +350,7 @@ test("invalid pixels are marked and counted", async () => {
   const zoomed = async (x, y) => {
     await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
     return page.evaluate(([x, y]) => {
-      const canvas = document.querySelector("[data-part=picture] canvas");
+      const canvas = document.querySelector("#panels canvas");
       const { left, top, scale } = Object.fromEntries(Object.entries(canvas.dataset).map(([key, value]) => [key, Number(value)]));
       const place = [left + (x + 0.5) * scale, top + (y + 0.5) * scale].map((v) => Math.round(v * devicePixelRatio));
       return [...canvas.getContext("2d").getImageData(...place, 1, 1).data.slice(0, 3)].join();
@@ -372,7 +372,7 @@ test("invalid pixels are marked and counted", async () => {
   assert.deepEqual(page.faults, []);
 });
 
-test("a save is taken back, and leaves line ends and a byte-order mark", async () => {
+test("a save is undone, and keeps line ends and a byte-order mark", async () => {
   const text_of = (scene) => `\u{feff}${scene.replaceAll("\n", "\r\n")}`;
   studio.write("scene.toml", text_of(SCENE));
   const page = await open(browser, studio);
@@ -391,7 +391,7 @@ test("a save is taken back, and leaves line ends and a byte-order mark", async (
   assert.equal(studio.read("scene.toml"), text_of(SCENE));
   await page.locator("#save:enabled").waitFor();
   assert.equal(await text(page, "#camera-text"), camera, "the view stays");
-  // A file that was edited since is not touched.
+  // A file that was edited since cannot be undone.
   await page.click("#save");
   await page.locator("#undo").waitFor();
   studio.edit("scene.toml", "fov = 40", "fov = 41");
@@ -408,7 +408,7 @@ test("an edited field of view keeps a moved camera", async () => {
   assert.equal(await text(page, "#camera-text"), camera.replace("fov = 40", "fov = 55"));
 });
 
-test("a picture that is too large is shown smaller, and says so", async () => {
+test("an image that is too large is shown smaller with a message", async () => {
   studio.edit("scene.toml", "count = 4 }", "count = 1 }");
   for (const [size, smaller] of [["3000x3000", /^\d+ × \d+$/], ["65536x1", /^16384 × 1$/], ["1x65536", /^1 × 16384$/]]) {
     await studio.stop();
@@ -416,13 +416,13 @@ test("a picture that is too large is shown smaller, and says so", async () => {
     const page = await open(browser, studio);
     await settled(page);
     assert.equal(await text(page, "#size"), size.replace("x", " × "));
-    const whole = await page.locator("#smaller").isHidden(); // a device with room for it shows all
+    const whole = await page.locator("#smaller").isHidden(); // a device with enough memory shows all of it
     if (!whole || size !== "3000x3000") assert.match(await text(page, "#smaller"), smaller);
     if (!whole) assert.match(studio.said, /too many to be shown: every picture here is \d+ x \d+/);
     await page.click("#zoom-one");
     await settled(page);
     const colors = await page.evaluate(() => {
-      const canvas = document.querySelector("[data-part=picture] canvas");
+      const canvas = document.querySelector("#panels canvas");
       const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
       return new Set(new Uint32Array(data.buffer)).size;
     });
@@ -432,7 +432,7 @@ test("a picture that is too large is shown smaller, and says so", async () => {
   }
 });
 
-test("a save is on the screen soon", async (t) => {
+test("a save is on the screen within seconds", async (t) => {
   const page = await open(browser, studio);
   const old = await revision(page);
   const start = Date.now();

@@ -1,9 +1,9 @@
-// What shaders bring to the page: sliders of marked constants, layers, the times of kernels, links that open an editor.
+// Shader features of the page: sliders of marked constants, layers, kernel timings, editor links.
 
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { Studio, launch, open, same, settled, shown } from "./studio.mjs";
+import { Studio, canvas, launch, open, same, settled, shown } from "./studio.mjs";
 
 const KERNEL = "shaders/kernels/render.wgsl";
 const PLACE = "let place = vec2f(pixel) + at.xy;\n    var ray";
@@ -25,7 +25,7 @@ afterEach(async () => {
 
 const compiled = (page) => page.locator("#compile").innerText();
 
-test("a slider changes the picture without the compiler, and is written into the shader", async () => {
+test("a slider changes the image without the compiler, and is written to the shader", async () => {
   await studio.start();
   const page = await open(browser, studio);
   const [first, time] = [await shown(page), await compiled(page)];
@@ -42,7 +42,7 @@ test("a slider changes the picture without the compiler, and is written into the
   await settled(page);
   assert.equal(await slider.inputValue(), "0.25");
   const quarter = await shown(page);
-  // The program's own pictures have the project's shaders: an edit of the file is compared with.
+  // `wgray render` uses the built-in shaders, so the edited file is compared instead.
   const before = studio.read(KERNEL);
   await page.click("#write-sliders");
   await page.locator("#write-sliders:disabled").waitFor();
@@ -54,7 +54,7 @@ test("a slider changes the picture without the compiler, and is written into the
   await settled(page);
   same(await shown(page), first);
   assert.equal(await compiled(page), time, "nothing was compiled");
-  // A colour: what is chosen is seen, and taken back.
+  // A chosen colour is shown, and can be reset.
   await page.getByRole("spinbutton", { name: "tint, green" }).fill("0");
   await page.keyboard.press("Enter");
   await settled(page);
@@ -66,7 +66,7 @@ test("a slider changes the picture without the compiler, and is written into the
   assert.deepEqual(page.faults, []);
 });
 
-test("a layer of the shaders is a view, and its numbers are read", async () => {
+test("a shader layer is a view with readable values", async () => {
   studio.edit("shaders/pixel.wgsl", PLACE, PLACE.replace("\n", "\n    seen = vec3f(0.25, 0.5, 1.0);\n"));
   studio.write("shaders/pixel.wgsl", `${studio.read("shaders/pixel.wgsl")}var<private> seen: vec3f; // layer\n`);
   await studio.start();
@@ -79,12 +79,12 @@ test("a layer of the shaders is a view, and its numbers are read", async () => {
   await settled(page);
   const [, , bytes] = await shown(page);
   assert.deepEqual([...new Set(bytes.match(/\d+,\d+,\d+/g))], ["64,128,255"]);
-  await page.locator("[data-part=picture] canvas").hover();
+  await canvas(page).hover();
   await page.locator("#values", { hasText: "0.25 0.5 1" }).waitFor();
   assert.deepEqual(page.faults, []);
 });
 
-test("the times of kernels and of parts of a frame are told", async () => {
+test("timings of kernels and frame stages are shown", async () => {
   await studio.start();
   const page = await open(browser, studio);
   await page.locator("#times summary").click();
@@ -97,7 +97,7 @@ test("the times of kernels and of parts of a frame are told", async () => {
   assert.deepEqual(page.faults, []);
 });
 
-test("a mistake has three lines and a link that opens the editor", async () => {
+test("an error shows three lines and a link that opens the editor", async () => {
   await studio.start();
   const page = await open(browser, studio);
   studio.breakShader();
@@ -110,7 +110,7 @@ test("a mistake has three lines and a link that opens the editor", async () => {
   assert.deepEqual(numbers, [line - 1, line, line + 1]);
   const place = page.locator("#sliders a").first();
   assert.match(await place.getAttribute("href"), /^vscode:\/\/file\/.*render\.wgsl:\d+:1$/);
-  // Without an editor there are none.
+  // Without an editor no links are shown.
   await studio.stop();
   studio.mendShader();
   await studio.start(0, ["--editor", "off"]);

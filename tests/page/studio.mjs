@@ -1,4 +1,4 @@
-// What the tests of the page share: a scene in a folder of its own, the program, and the browser.
+// Helpers of the page's tests: a scene in a temporary folder, the program, and the browser.
 
 import assert from "node:assert/strict";
 import { spawn, execFileSync } from "node:child_process";
@@ -12,7 +12,7 @@ const ROOT = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../..")
 export const PROGRAM = process.env.WGRAY_PROGRAM;
 const { chromium } = createRequire(path.join(process.env.WGRAY_PAGE_MODULES, "/"))("playwright-core");
 
-// However busy the machine is, what is waited for comes within this time, or never.
+// Timeout in milliseconds for anything that the tests wait for, even on a busy machine.
 export const LONGEST = 40_000;
 
 export const SCENE = `# a small scene
@@ -65,7 +65,7 @@ tangent = [1, 0, 0]
 const KERNEL = "shaders/kernels/render.wgsl";
 const RADIANCE = "path_value(path)";
 
-// A scene and shaders in a folder, and the program that watches them.
+// A folder with a scene and shaders, and the program that watches it.
 export class Studio {
   constructor() {
     this.folder = fs.mkdtempSync(path.join(os.tmpdir(), "wgray-page-"));
@@ -91,7 +91,7 @@ export class Studio {
     this.write(name, text.replace(old, replacement));
   }
 
-  // Saves a shader so that the picture is red alone.
+  // Saves a shader that leaves only the red channel.
   redden() {
     this.edit(KERNEL, RADIANCE, `(${RADIANCE} * vec4f(1.0, 0.0, 0.0, 1.0))`);
   }
@@ -104,29 +104,29 @@ export class Studio {
     this.edit(KERNEL, "simple", "path");
   }
 
-  // The line of the broken shader, counted from 1.
+  // Returns the line of the shader's error, counted from 1.
   brokenLine() {
     return this.read(KERNEL).split("\n").findIndex((line) => line.includes("simple")) + 1;
   }
 
-  // The picture that `wgray render` makes of the scene, as the bytes of a PNG file.
+  // Returns the PNG file that `wgray render` makes of the scene, as bytes.
   render() {
     const out = this.path("rendered.png");
     this.renderTo(out);
     return [...fs.readFileSync(out)];
   }
 
-  // Renders the scene into a file.
+  // Renders the scene to a file.
   renderTo(file, more = []) {
     execFileSync(PROGRAM, ["render", this.path("scene.toml"), "--output", file, "--quiet", ...more], { stdio: "pipe" });
   }
 
-  // Whether two pictures are the same to the bit; if not, this throws.
+  // Throws unless two image files have equal bits.
   diff(a, b) {
     execFileSync(PROGRAM, ["diff", a, b], { stdio: "pipe" });
   }
 
-  // Starts the program; resolves once it says where the page is.
+  // Starts the program; resolves once it has printed the page's address.
   async start(port = 0, more = [], scene = "scene.toml") {
     const args = ["dev", scene, "--shaders", "shaders", "--listen", `127.0.0.1:${port}`, ...more];
     this.program = spawn(PROGRAM, args, { cwd: this.folder, stdio: ["ignore", "inherit", "pipe"] });
@@ -167,14 +167,14 @@ export function launch(more = []) {
   });
 }
 
-// A page in a browser that shows a finished picture, and what went wrong in it.
+// Opens the page and waits for a finished image. `page.faults` collects its errors.
 export async function open(browser, studio, options = {}) {
   const page = await visit(browser, studio, options);
   await finished(page);
   return page;
 }
 
-// A page in a browser, whatever it shows.
+// Opens the page without waiting for an image.
 export async function visit(browser, studio, options = {}) {
   const context = await browser.newContext({ viewport: { width: 1200, height: 800 }, ...options });
   const page = await context.newPage();
@@ -200,7 +200,7 @@ function fromDisk(route) {
   return fs.existsSync(file) ? route.fulfill({ path: file }) : route.continue();
 }
 
-// Waits until the page shows a finished picture that is later than a revision; returns its revision.
+// Waits until the page shows a finished image later than a revision; returns its revision.
 export async function finished(page, after = 0) {
   const handle = await page.waitForFunction((after) => {
     const { revision, done } = document.getElementById("panels").dataset;
@@ -209,8 +209,8 @@ export async function finished(page, after = 0) {
   return handle.jsonValue();
 }
 
-// Waits until all that was done on the page, and so many commands of anybody, is on its screen, finished; returns how many
-// commands that is.
+// Waits until all commands of the page, and at least `commands` commands of all viewers, are executed and shown; returns the
+// number of executed commands.
 export async function settled(page, commands = 0) {
   await page.waitForFunction((commands) => window.isSettled(commands), commands);
   return page.evaluate(() => Number(document.getElementById("panels").dataset.heard));
@@ -219,6 +219,9 @@ export async function settled(page, commands = 0) {
 export function revision(page) {
   return page.evaluate(() => Number(document.getElementById("panels").dataset.revision));
 }
+
+// Returns the canvas of a part of the image.
+export const canvas = (page, part = "picture") => page.locator(`[data-part=${part}] canvas`);
 
 // Returns the `nth` input of the control for a value of the selected object.
 export const control = (page, path, nth = 0) => page.locator(`[data-control="${path} ${nth}"]`);
@@ -243,7 +246,7 @@ export async function listen(page, isWanted = () => true) {
   return async () => (await page.evaluate(() => window.sent.splice(0))).filter(isWanted);
 }
 
-// The pixels that the page shows, or those of a PNG file, as [width, height, RGB bytes joined by commas].
+// Returns the pixels on the page as [width, height, RGB bytes joined by commas].
 export async function shown(page, part = "picture") {
   await page.click("#zoom-one");
   await page.waitForFunction((part) => document.querySelector(`[data-part=${part}] canvas`).dataset.scale === "1", part);
@@ -257,6 +260,7 @@ export async function shown(page, part = "picture") {
   }, part);
 }
 
+// Returns the pixels of a PNG file in the same form.
 export function decoded(page, png) {
   return page.evaluate(async (png) => {
     const blob = new Blob([new Uint8Array(png)], { type: "image/png" });
@@ -268,8 +272,8 @@ export function decoded(page, png) {
   }, png);
 }
 
-// Fails if two pictures are not the same, in few words.
-export function same(seen, wanted, what = "the pictures differ") {
+// Fails with a short message unless two images are equal.
+export function same(seen, wanted, what = "the images differ") {
   if (String(seen) === String(wanted)) return;
   const [a, b] = [seen, wanted].map(([, , bytes]) => bytes.split(","));
   const places = [...a.keys()].filter((i) => a[i] !== b[i]);
@@ -277,7 +281,7 @@ export function same(seen, wanted, what = "the pictures differ") {
   assert.fail(`${what}: ${seen.slice(0, 2)} and ${wanted.slice(0, 2)} pixels, ${places.length} bytes differ, the first at ${first}: ${a[first]} and ${b[first]}`);
 }
 
-// Waits until the page shows the picture that `wgray render` makes.
+// Waits until the page shows the image that `wgray render` makes.
 export async function showsRendered(page, studio) {
   const wanted = await decoded(page, studio.render());
   const deadline = Date.now() + LONGEST;
@@ -288,5 +292,5 @@ export async function showsRendered(page, studio) {
     if (String(seen) === String(wanted)) return;
     await page.waitForTimeout(50);
   } while (Date.now() < deadline);
-  same(seen, wanted, "the page shows another picture than is rendered");
+  same(seen, wanted, "the page does not show the rendered image");
 }

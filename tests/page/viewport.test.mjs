@@ -1,10 +1,10 @@
-// The page as a viewport: moving, seeing, comparing, working, for everybody.
+// The page as a viewport: navigation, display, comparison, downloads, accessibility, frame rate.
 
 import assert from "node:assert/strict";
 import fs from "node:fs";
 import { after, afterEach, before, beforeEach, test } from "node:test";
 
-import { Studio, decoded, finished, launch, open, revision, same, settled, shown } from "./studio.mjs";
+import { Studio, canvas, decoded, finished, launch, open, revision, same, settled, shown } from "./studio.mjs";
 
 let browser;
 let studio;
@@ -21,17 +21,16 @@ afterEach(async () => {
 });
 
 const text = (page, selector) => page.locator(selector).innerText();
-const canvas = (page, part = "picture") => page.locator(`[data-part=${part}] canvas`);
 const camera = (page) => text(page, "#camera-text");
 
-// A point of the picture, 0 to 1 along each side, in the window.
+// Returns the window position of an image point, given from 0 to 1 along each side.
 async function at(page, x, y, part = "picture") {
   const box = await canvas(page, part).boundingBox();
   const { left, top, scale } = await canvas(page, part).evaluate((canvas) => ({ ...canvas.dataset }));
   return [box.x + Number(left) + 120 * x * Number(scale), box.y + Number(top) + 90 * y * Number(scale)];
 }
 
-// Waits until the camera's text is another.
+// Waits until the camera's text differs from `last`, and returns it.
 const moved = (page, last) =>
   page.waitForFunction((last) => document.getElementById("camera-text").innerText !== last, last).then(() => settled(page)).then(() => camera(page));
 
@@ -43,7 +42,7 @@ async function dragged(page, button = "left", dx = 60) {
   await page.mouse.up({ button });
 }
 
-test("the wheel dollies, the middle button pans, the right one is the browser's", async () => {
+test("the wheel dollies, the middle button pans, the right button opens the browser's menu", async () => {
   const page = await open(browser, studio);
   const start = await camera(page);
   const [x, y] = await at(page, 0.5, 0.5);
@@ -62,7 +61,7 @@ test("the wheel dollies, the middle button pans, the right one is the browser's"
   assert.equal(await camera(page), panned, "the right button moves nothing");
 });
 
-test("steps of the camera are taken back and made again", async () => {
+test("camera steps are undone and redone", async () => {
   const page = await open(browser, studio);
   const start = await camera(page);
   assert.ok(await page.locator("#back").isDisabled());
@@ -87,7 +86,7 @@ test("steps of the camera are taken back and made again", async () => {
   assert.equal(await moved(page, start), second, "a reset is a step too");
 });
 
-test("one flies by keys, and looks around by dragging", async () => {
+test("keys fly, and drags look around", async () => {
   const page = await open(browser, studio);
   const start = await camera(page);
   const point = (text, key) => new RegExp(`${key} = \\[(.*)\\]`).exec(text)[1].split(",").map(Number);
@@ -107,7 +106,7 @@ test("one flies by keys, and looks around by dragging", async () => {
   assert.ok(await page.locator("input[value=orbit]").isChecked());
 });
 
-test("the object under the pointer is framed, then all", async () => {
+test("the object under the pointer is framed, then all objects", async () => {
   const page = await open(browser, studio);
   const start = await camera(page);
   await canvas(page).focus();
@@ -119,11 +118,11 @@ test("the object under the pointer is framed, then all", async () => {
   assert.match(framed, /look_at = \[0, 0, 0\.5\]/);
   await page.keyboard.press("PageDown");
   const away = await moved(page, framed);
-  await page.click("#frame-all"); // a plane has no end: the sphere is all
+  await page.click("#frame-all"); // a plane is unbounded, so only the sphere counts
   assert.equal(await moved(page, away), framed);
 });
 
-test("bookmarks are kept in the browser, and gone to", async () => {
+test("bookmarks are stored in the browser and restore the view", async () => {
   const page = await open(browser, studio);
   await dragged(page);
   await page.locator("#reset:enabled").waitFor();
@@ -158,17 +157,17 @@ test("two fingers pan and dolly, a tap reads a pixel", async () => {
   const near = await moved(page, start);
   const height = (text) => Number(/position = \[[^,]*, ([^,]*)/.exec(text)[1]);
   assert.ok(Math.abs(height(near)) < 0.7 * Math.abs(height(start)), near);
-  // Whatever is touched has room for a finger, and the picture stays where it is.
+  // Touch targets are large enough, and the image stays in view.
   const small = await page.evaluate(() => [...document.querySelectorAll("aside button, aside select, aside summary, aside input[type=number], #toolbar span, #zooming button")]
     .filter((control) => control.checkVisibility()).map((control) => [control.id || control.textContent, control.getBoundingClientRect()])
     .filter(([, box]) => box.height < 44 || box.width < 44).map(([name, box]) => `${name}: ${box.width} x ${box.height}`));
   assert.deepEqual(small, []);
   await page.evaluate(() => scrollTo(0, document.scrollingElement.scrollHeight));
   const box = await canvas(page).boundingBox();
-  assert.ok(box.y >= 0 && box.y + box.height < 844, "the picture stays while the controls scroll");
+  assert.ok(box.y >= 0 && box.y + box.height < 844, "the image stays while the controls scroll");
 });
 
-test("exposure, transform and false colours change what is shown, not what it is", async () => {
+test("exposure, transform and false colours change the display, not the values", async () => {
   const page = await open(browser, studio);
   const [x, y] = await at(page, 0.5, 0.4);
   await page.mouse.move(x, y);
@@ -187,7 +186,7 @@ test("exposure, transform and false colours change what is shown, not what it is
   assert.ok(await page.locator("#reset-look").isDisabled());
   await page.fill("#exposure-number", "1.5");
   await look(() => page.keyboard.press("Enter"));
-  // It is what a render by this exposure is.
+  // A render with this exposure is equal.
   studio.edit("scene.toml", "height = 90", "height = 90\nexposure = 1.5");
   same(seen[1], await decoded(page, studio.render()));
   await settled(page);
@@ -205,7 +204,7 @@ test("exposure, transform and false colours change what is shown, not what it is
   assert.deepEqual(page.faults, []);
 });
 
-test("a pinned pixel keeps what it was", async () => {
+test("a pinned pixel keeps its earlier values", async () => {
   const page = await open(browser, studio);
   const [x, y] = await at(page, 0.5, 0.5);
   await canvas(page).focus();
@@ -224,20 +223,20 @@ test("a pinned pixel keeps what it was", async () => {
   assert.equal(await page.locator("#pins li").count(), 0);
 });
 
-test("the picture is compared with what it was, with a kept one and with files", async () => {
+test("the image is compared with its earlier state, with a kept image and with files", async () => {
   const page = await open(browser, studio);
   const seen = await shown(page);
   await page.keyboard.press("7");
   await page.getByLabel("Before the edit").check();
   await page.locator("#badge", { hasText: "no change has been saved" }).waitFor();
-  await settled(page); // the first comparison is another one, and renders anew
+  await settled(page); // switching the comparison renders again
   studio.edit("scene.toml", "0.8, 0.1, 0.1", "0.1, 0.1, 0.8");
   await page.locator("#differing", { hasText: /^[\d,]+ pixels differ, by/ }).waitFor();
   await settled(page);
-  same(await shown(page, "second"), seen, "the second is the picture before");
+  same(await shown(page, "second"), seen, "the second is the image before the edit");
   await page.locator("#rmse", { hasText: /^0\.\d+$/ }).waitFor();
   await page.locator("#flip", { hasText: /^0\.\d+$/ }).waitFor();
-  // In one place: by halves, or one after the other.
+  // In one panel: with a divider, or alternating.
   await page.getByLabel("Wipe").check();
   assert.ok(await canvas(page, "second").isHidden());
   const wiped = await shown(page, "first");
@@ -252,7 +251,7 @@ test("the picture is compared with what it was, with a kept one and with files",
   await page.keyboard.press("x");
   same(await shown(page, "first"), seen);
   await page.keyboard.press("x");
-  // A file: as a render makes it of the scene as it is, all values are the same in an EXR.
+  // An EXR file of the same scene has equal values.
   await page.getByLabel("Side by side").check();
   const exr = studio.path("reference.exr");
   studio.renderTo(exr);
@@ -266,7 +265,7 @@ test("the picture is compared with what it was, with a kept one and with files",
   await page.locator("#reference-name", { hasText: "reference.png" }).waitFor();
   await settled(page);
   same(await shown(page, "second"), await shown(page, "first"), "of a PNG the same bytes are shown");
-  // What is no picture, or of another size, is told.
+  // Files of other formats or sizes are reported.
   await page.setInputFiles("#reference-file", studio.path("scene.toml"));
   await page.locator("#notice.bad", { hasText: "scene.toml" }).waitFor();
   studio.renderTo(png, ["--size", "60x45"]);
@@ -279,7 +278,7 @@ test("the picture is compared with what it was, with a kept one and with files",
   assert.deepEqual(page.faults.filter((fault) => !fault.includes("422")), []);
 });
 
-test("rendering pauses, is limited, made smaller, and saved as files", async () => {
+test("rendering can be paused, limited, reduced in resolution and saved as files", async () => {
   studio.edit("scene.toml", "count = 4 }\nlight", "count = 64 }\nlight");
   const page = await open(browser, studio);
   await page.fill("#most-samples", "5");
@@ -299,7 +298,7 @@ test("rendering pauses, is limited, made smaller, and saved as files", async () 
   const old = await revision(page);
   await page.click("#restart");
   await finished(page, old);
-  // What is saved is what is rendered.
+  // A saved file equals the rendered one.
   for (const kind of ["png", "exr"]) {
     const [download] = await Promise.all([page.waitForEvent("download"), page.click(`#save-${kind}`)]);
     assert.equal(download.suggestedFilename(), `scene.${kind}`);
@@ -318,13 +317,13 @@ test("rendering pauses, is limited, made smaller, and saved as files", async () 
   await canvas(page).focus();
   await page.keyboard.press("ArrowLeft");
   await page.waitForFunction((before) => Number(document.getElementById("panels").dataset.revision) > before, before);
-  await settled(page); // nothing more comes of it
+  await settled(page); // no further frame follows
   assert.ok(fs.existsSync(studio.path("saved.png")));
   await page.keyboard.press("Space");
   await page.locator("#samples", { hasText: /^64 of 64$/ }).waitFor();
 });
 
-// The contrast of a colour against another, as WCAG 2.1 defines it.
+// Returns the texts of the page with less contrast than WCAG 2.1 requires.
 const CONTRASTS = () => {
   const context = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
   const over = (colors) => {
@@ -350,7 +349,7 @@ const CONTRASTS = () => {
   return faults;
 };
 
-test("texts have contrast in both themes, controls have names, forced colours show what is chosen", async () => {
+test("texts have contrast in both themes, controls have names, forced colours show the selection", async () => {
   for (const colorScheme of ["light", "dark"]) {
     const page = await open(browser, studio, { colorScheme });
     await page.evaluate(() => document.querySelectorAll("details").forEach((details) => (details.open = true)));
@@ -371,7 +370,7 @@ test("texts have contrast in both themes, controls have names, forced colours sh
   assert.notEqual(...grounds);
 });
 
-test("a drag is shown at 20 pictures a second, to eleven viewers too", async (t) => {
+test("a drag is shown at 20 frames per second, to eleven viewers too", async (t) => {
   studio.edit("scene.toml", "width = 120\nheight = 90", "width = 640\nheight = 480");
   const page = await open(browser, studio);
   const [x, y] = await at(page, 0.5, 0.5);
@@ -383,7 +382,7 @@ test("a drag is shown at 20 pictures a second, to eleven viewers too", async (t)
       if (revision !== window.seen.at(-1)?.[0]) window.seen.push([revision, performance.now()]);
     }).observe(document.getElementById("panels"), { attributes: true, attributeFilter: ["data-revision"] });
   });
-  // The times between two pictures while the pointer moves, the shortest first.
+  // Measures the intervals between frames during a drag.
   const drag = async () => {
     await page.evaluate(() => (window.seen = []));
     const start = Date.now();
@@ -391,21 +390,21 @@ test("a drag is shown at 20 pictures a second, to eleven viewers too", async (t)
     const times = await page.evaluate(() => window.seen.map(([, time]) => time));
     const gaps = times.slice(1).map((time, i) => time - times[i]).sort((a, b) => a - b);
     const median = gaps[gaps.length >> 1];
-    t.diagnostic(`${(1000 / median).toFixed(1)} pictures a second, the slowest in twenty after ${Math.round(gaps[Math.floor(gaps.length * 0.95)])} ms`);
-    // A machine that has other work is slower; much slower is a fault.
-    assert.ok(gaps.length > 10 && median < 150, `${median} ms between two pictures`);
+    t.diagnostic(`${(1000 / median).toFixed(1)} frames per second, the slowest in twenty after ${Math.round(gaps[Math.floor(gaps.length * 0.95)])} ms`);
+    // A busy machine is slower; much slower is a defect.
+    assert.ok(gaps.length > 10 && median < 150, `${median} ms between two frames`);
   };
   await drag();
-  // Ten more look, whose browser draws nothing.
+  // Ten more viewers, which draw nothing.
   await page.evaluate(() => {
-    const got = Array.from({ length: 10 }, () => ({ pictures: 0 }));
+    const got = Array.from({ length: 10 }, () => ({ frames: 0 }));
     const opened = got.map((viewer) => new Promise((resolve) => {
       const socket = new WebSocket(`ws://${location.host}/socket`);
       socket.binaryType = "arraybuffer";
       socket.onmessage = ({ data }) => {
         resolve();
         if (typeof data === "string") return;
-        viewer.pictures++;
+        viewer.frames++;
         const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, new DataView(data).getUint32(0, true))));
         socket.send(JSON.stringify({ shown: header.number }));
       };
@@ -413,12 +412,12 @@ test("a drag is shown at 20 pictures a second, to eleven viewers too", async (t)
     window.got = got;
     return Promise.all(opened);
   });
-  const counts = () => page.evaluate(() => window.got.map(({ pictures }) => pictures));
+  const counts = () => page.evaluate(() => window.got.map(({ frames }) => frames));
   const before = await counts();
   const start = Date.now();
   await drag();
   const rates = (await counts()).map((count, i) => (1000 * (count - before[i])) / (Date.now() - start));
-  t.diagnostic(`with eleven viewers: each of ten got ${Math.min(...rates).toFixed(1)} to ${Math.max(...rates).toFixed(1)} pictures a second`);
+  t.diagnostic(`with eleven viewers: each of ten got ${Math.min(...rates).toFixed(1)} to ${Math.max(...rates).toFixed(1)} frames per second`);
   assert.ok(Math.min(...rates) > 5, String(rates));
   await page.mouse.up();
 });

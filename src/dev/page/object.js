@@ -96,7 +96,7 @@ function showUndo({ undo, redo, undo_blocked }) {
     const button = element(id);
     enable(button, Boolean(what));
     button.textContent = what ? `${word} ${what}` : word;
-    button.title = what ? `${word} ${what} (${keys})` : undo_blocked ?? `Nothing to ${word.toLowerCase()}`;
+    button.title = what ? `${word} ${what} (${keys})` : undo_blocked?.replace("Undo", word) ?? `Nothing to ${word.toLowerCase()}`;
   }
 }
 

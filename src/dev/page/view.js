@@ -89,12 +89,9 @@ function showState(state, heard) {
   const layers = element("layers");
   layers.value = name === "layer" ? `layer:${state.view.layer}` : name;
   if (layers.selectedIndex < 0) layers.value = "";
-  const chosen = layers.value !== "";
-  if (chosen && !layers.classList.contains("chosen")) {
-    const bar = element("toolbar"); // on a narrow screen the list may be scrolled out of view
-    bar.scrollLeft = Math.max(bar.scrollLeft, layers.offsetLeft + layers.offsetWidth - bar.clientWidth);
-  }
-  layers.classList.toggle("chosen", chosen);
+  const isLayer = layers.value !== "";
+  layers.classList.toggle("chosen", isLayer);
+  reveal(isLayer ? layers : document.querySelector("input[name=view]:checked")?.parentElement);
 
   choice = state.look;
   const [exposure, transform] = state.scene_look;
@@ -103,6 +100,15 @@ function showState(state, heard) {
   element("transform").value = choice.transform ?? transform;
   element("false-color").checked = choice.false_color;
   enable(element("reset-look"), choice.exposure !== null || choice.transform !== null || choice.false_color);
+}
+
+// Scrolls the toolbar of a narrow screen to another view's button.
+let revealed = null;
+function reveal(button) {
+  if (!button || button === revealed) return;
+  revealed = button;
+  const [bar, { offsetLeft, offsetWidth }] = [element("toolbar"), button];
+  bar.scrollLeft = Math.min(offsetLeft, Math.max(bar.scrollLeft, offsetLeft + offsetWidth - bar.clientWidth));
 }
 
 // Lists the layers that shaders write.
