@@ -12,13 +12,13 @@ thread_local! {
 }
 
 /// Whether a panic of this thread, now, would be contained. A program's panic hook that asks this can be silent, as the
-/// error is told by whoever contains it; [`silence`] makes such a hook.
+/// error is told by whoever contains it; [`install_quiet_hook`] installs such a hook.
 pub fn is_contained() -> bool {
     DEPTH.try_with(Cell::get).is_ok_and(|depth| depth > 0)
 }
 
 /// Sets a panic hook that says nothing of panics that are contained, and leaves all others to the hook of before.
-pub fn silence() {
+pub fn install_quiet_hook() {
     let before = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
         if !is_contained() {

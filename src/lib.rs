@@ -85,6 +85,8 @@ pub mod gpu;
 pub mod image;
 #[doc(hidden)]
 pub mod job;
+#[doc(hidden)]
+pub mod memory;
 pub mod mesh;
 #[doc(hidden)]
 pub mod pack;

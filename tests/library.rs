@@ -381,7 +381,7 @@ fn the_program_without_the_feature_gpu_renders_on_the_cpu() {
         (output.status.code(), text(output.stdout), text(output.stderr))
     };
     let silent = (Some(0), String::new(), String::new());
-    assert_eq!(run(&["render", "s.toml", "-o", "s.exr"]), silent);
+    assert_eq!(run(&["render", "s.toml", "-o", "s.exr", "-q"]), silent);
     let picture = wgray::render(&scene(), &on_cpu()).unwrap();
     assert_eq!(read_exr(&folder.path().join("s.exr")).unwrap(), picture.pixels());
     let (code, _, told) = run(&["render", "s.toml", "-o", "gpu.exr", "--device", "gpu"]);

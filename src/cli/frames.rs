@@ -1,4 +1,4 @@
-//! `--frames`: which frames are rendered, and the names of what each of them writes.
+//! `--frames`: the frames to render, and the names of their files.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -6,21 +6,21 @@ use std::str::FromStr;
 
 use crate::cli::Usage;
 
-/// The largest number of a frame, and the most frames of a run: their names are all looked at before the first is rendered.
-pub const LARGEST: u32 = 999_999_999;
-const MOST: usize = 100_000;
+/// Maximum number of a frame, and maximum number of frames: their names are checked before the first is rendered.
+pub const MAX_NUMBER: u32 = 999_999_999;
+const MAX_COUNT: usize = 100_000;
 
-/// Frames in the order in which they are named, each once: `5`, `1-10`, `1-10:2`, `1-3,7`.
+/// Frames in the order of the option, each once: `5`, `1-10`, `1-10:2`, `1-3,7`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frames(Vec<u32>);
 
 impl Frames {
-    /// As many, from 1 on.
+    /// Returns the frames from 1 to `count`.
     pub fn first(count: u32) -> Frames {
         Frames((1..=count).collect())
     }
 
-    /// The same frames in rising order, as few ranges: the first and the last of each, and the step.
+    /// Returns the frames in ascending order as few ranges: first, last and step.
     pub fn ranges(&self) -> Vec<(u32, u32, u32)> {
         let mut sorted = self.0.clone();
         sorted.sort_unstable();
@@ -32,7 +32,7 @@ impl Frames {
                 count += 1;
             }
             if count == 2 && step > 1 {
-                count = 1; // the second may begin a range of another step
+                count = 1; // the second may start a range with another step
             }
             let range = &rest[..count];
             ranges.push((*first, range[count - 1], if count > 1 { step } else { 1 }));
@@ -41,12 +41,12 @@ impl Frames {
         ranges
     }
 
-    /// How many there are.
+    /// Returns the number of frames.
     pub fn count(&self) -> usize {
         self.0.len()
     }
 
-    /// The one in the middle.
+    /// Returns the middle frame.
     pub fn middle(&self) -> Option<u32> {
         self.0.get(self.0.len() / 2).copied()
     }
@@ -63,8 +63,8 @@ impl FromStr for Frames {
                 if known.insert(frame) {
                     frames.push(frame);
                 }
-                if frames.len() > MOST {
-                    return Err(format!("must be {MOST} frames at most"));
+                if frames.len() > MAX_COUNT {
+                    return Err(format!("must be at most {MAX_COUNT} frames"));
                 }
             }
         }
@@ -72,7 +72,7 @@ impl FromStr for Frames {
     }
 }
 
-/// `A`, `A-B` or `A-B:STEP`.
+/// Parses `A`, `A-B` or `A-B:STEP`.
 fn range(text: &str) -> Result<impl Iterator<Item = u32>, String> {
     let (ends, step) = match text.split_once(':') {
         Some((ends, step)) => (ends, Some(number(step)?)),
@@ -80,39 +80,39 @@ fn range(text: &str) -> Result<impl Iterator<Item = u32>, String> {
     };
     let (first, last) = match ends.split_once('-') {
         Some((first, last)) => (number(first)?, number(last)?),
-        None if step.is_some() => return Err(format!("{text} must have two ends, such as {ends}-100:2")),
+        None if step.is_some() => return Err(format!("{text} needs a range before the step, such as {ends}-100:2")),
         None => (number(ends)?, number(ends)?),
     };
     if first > last {
-        return Err(format!("{text} must go upwards, from {last} to {first}"));
+        return Err(format!("{text} must ascend, from {last} to {first}"));
     }
     match step {
-        Some(0) => Err(format!("{text} must have a step of 1 or more")),
+        Some(0) => Err(format!("{text} needs a step of at least 1")),
         step => Ok((first..=last).step_by(step.unwrap_or(1) as usize)),
     }
 }
 
 fn number(text: &str) -> Result<u32, String> {
     let is_number = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
-    let number = text.parse().ok().filter(|number| is_number && *number <= LARGEST);
-    let rule = format!("must be whole numbers from 0 to {LARGEST}, such as 5, 1-10, 1-10:2 or 1-3,7");
+    let number = text.parse().ok().filter(|number| is_number && *number <= MAX_NUMBER);
+    let rule = format!("must be whole numbers from 0 to {MAX_NUMBER}, such as 5, 1-10, 1-10:2 or 1-3,7");
     number.ok_or_else(|| match text {
         "" => rule,
         text => format!("{text}: {rule}"),
     })
 }
 
-/// One of the pictures of a run.
+/// One of the images of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// Its number; none without `--frames`.
+    /// The number of the frame; none without `--frames`.
     pub number: Option<u32>,
-    /// Which of all it is, from 1, and how many there are.
+    /// Position in the run, from 1, and the number of frames.
     pub place: (usize, usize),
 }
 
 impl Frame {
-    /// All pictures of a run: one, if no frames are asked for.
+    /// Returns the images of a run: a single one without `--frames`.
     pub fn all(frames: Option<&Frames>) -> Vec<Frame> {
         let numbers = match frames {
             Some(frames) => frames.0.iter().copied().map(Some).collect(),
@@ -125,18 +125,18 @@ impl Frame {
         numbers.iter().enumerate().map(frame).collect()
     }
 
-    /// One by itself.
+    /// Returns a single image.
     pub fn one(number: Option<u32>) -> Frame {
         Frame { number, place: (1, 1) }
     }
 
-    /// A file's name with the frame's number in place of its `#`, with zeros in front up to their count. Folders keep theirs.
-    /// Where there are several frames, a name must tell them apart; `option` is what the name is of, in messages.
+    /// Returns a file name with `#` replaced by the number of the frame, zero-padded to the number of `#`; folders stay as they
+    /// are. The names of several frames must differ. `option` is named in messages.
     pub fn name(&self, option: &str, pattern: &Path) -> Result<PathBuf, Usage> {
         let Some(number) = self.number else {
             return Ok(pattern.to_owned());
         };
-        let refused = |rule: &str| Err(Usage(format!("{option}: {}: {rule}", pattern.display())));
+        let error = |rule: &str| Err(Usage(format!("{option}: {}: {rule}", pattern.display())));
         let name = pattern.file_name().unwrap_or_default();
         let has_mark = name.as_encoded_bytes().contains(&b'#');
         let count = self.place.1;
@@ -144,23 +144,23 @@ impl Frame {
             return Ok(pattern.to_owned());
         }
         if !has_mark {
-            return refused(&format!(
-                "must have # for the frame's number in its name, as in out.####.png, as there are {count} frames"
+            return error(&format!(
+                "needs # for the frame number, such as out.####.png, with {count} frames"
             ));
         }
         let Some(name) = name.to_str() else {
-            return refused("must be UTF-8 for # to be the frame's number");
+            return error("must be UTF-8 to contain a frame number");
         };
         let marks = name.trim_start_matches(|c| c != '#').trim_end_matches(|c| c != '#');
         if marks.bytes().any(|byte| byte != b'#') {
-            return refused("must have all its # in one place");
+            return error("must have a single group of #");
         }
         let width = marks.len();
         let name = name.replacen(marks, &format!("{number:0width$}"), 1);
         Ok(pattern.with_file_name(name))
     }
 
-    /// What messages call it, if it is one of several.
+    /// Returns a label for messages if this is one of several frames.
     pub fn label(&self) -> Option<String> {
         let (place, count) = self.place;
         let number = self.number.filter(|_| count > 1)?;
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_told_in_few_ranges() {
+    fn ranges_are_few() {
         for (text, wanted) in [
             ("5", vec![(5, 5, 1)]),
             ("1-4", vec![(1, 4, 1)]),
@@ -222,8 +222,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_range_of_frames_is_told() {
-        for (text, told) in [
+    fn invalid_ranges_are_rejected() {
+        for (text, message) in [
             ("", "must be whole numbers from 0 to 999999999"),
             ("1,,2", "must be whole numbers"),
             ("-5", "must be whole numbers"),
@@ -238,14 +238,14 @@ mod tests {
             ("1-10:", "must be whole numbers"),
             ("1-10:2:3", "2:3: must be whole numbers"),
             ("1-10:-1", "-1: must be whole numbers"),
-            ("1-10:0", "1-10:0 must have a step of 1 or more"),
-            ("5:2", "5:2 must have two ends"),
-            ("10-1", "10-1 must go upwards, from 1 to 10"),
-            ("0-999999999", "must be 100000 frames at most"),
-            ("1-100000,0", "must be 100000 frames at most"),
+            ("1-10:0", "1-10:0 needs a step of at least 1"),
+            ("5:2", "5:2 needs a range before the step"),
+            ("10-1", "10-1 must ascend, from 1 to 10"),
+            ("0-999999999", "must be at most 100000 frames"),
+            ("1-100000,0", "must be at most 100000 frames"),
         ] {
-            let message = frames(text).unwrap_err();
-            assert!(message.starts_with(told), "{text}: {message}");
+            let error = frames(text).unwrap_err();
+            assert!(error.starts_with(message), "{text}: {error}");
         }
     }
 
@@ -271,14 +271,14 @@ mod tests {
             assert_eq!(name(one(number, 2), pattern).unwrap(), wanted);
             assert_eq!(name(one(number, 1), pattern).unwrap(), wanted);
         }
-        let bad = "--output: a#/out.png: must have # for the frame's number in its name, as in out.####.png, as there are 2 frames";
+        let bad = "--output: a#/out.png: needs # for the frame number, such as out.####.png, with 2 frames";
         assert_eq!(name(one(1, 2), "a#/out.png").unwrap_err(), bad);
         assert_eq!(name(one(1, 1), "a#/out.png").unwrap(), "a#/out.png");
         assert!(name(one(1, 2), "-").is_err());
         assert!(
             name(one(1, 2), "a#b#")
                 .unwrap_err()
-                .ends_with("must have all its # in one place")
+                .ends_with("must have a single group of #")
         );
         let none = Frame {
             number: None,

@@ -1,4 +1,4 @@
-//! Messages on standard error: lines of text, or of JSON, each of which is an object.
+//! Messages on standard error: lines of text, or JSON objects, one per line.
 
 use std::fmt;
 use std::io::{self, IsTerminal as _, Write as _};
@@ -15,32 +15,32 @@ use tracing_subscriber::layer::{Context, Layer};
 use tracing_subscriber::registry::LookupSpan;
 use wgray::visible::{visible, visible_lines};
 
-/// How messages are written.
+/// The format of messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Format {
-    /// Lines for people
+    // Lines of text.
     #[default]
     Text,
-    /// One JSON object a line, with level, message and what else is known
+    // JSON objects, one per line.
     Json,
 }
 
-/// What kind of message it is.
+/// The kind of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
     Error,
     Warning,
     Note,
-    /// How far a render is.
+    /// The progress of a render.
     Progress,
-    /// What `--verbose` tells, and the end of a render.
+    /// Messages of `--verbose`, and the end of a render.
     Info,
     Debug,
 }
 
 impl Level {
-    /// What a line of text begins with.
+    /// Returns the prefix of a line of text.
     fn prefix(self) -> &'static str {
         match self {
             Level::Error => "error: ",
@@ -51,22 +51,22 @@ impl Level {
     }
 }
 
-/// What is told beside the message, in JSON alone.
+/// Further facts, printed in JSON only.
 pub type Facts = Map<String, Value>;
 
 static JSON: AtomicBool = AtomicBool::new(false);
 
-/// Sets how messages are written from now on.
+/// Sets the format of messages.
 pub fn choose(format: Format) {
     JSON.store(format == Format::Json, Ordering::Relaxed);
 }
 
-/// Whether messages are JSON.
+/// Returns true if messages are JSON.
 pub fn is_json() -> bool {
     JSON.load(Ordering::Relaxed)
 }
 
-/// The format that a command line asks for that cannot be read as a whole.
+/// Returns the format that an invalid command line requests.
 pub fn asked(arguments: impl Iterator<Item = std::ffi::OsString>) -> Format {
     let mut format = Format::default();
     let mut arguments = arguments.take_while(|argument| argument != "--");
@@ -83,12 +83,12 @@ pub fn asked(arguments: impl Iterator<Item = std::ffi::OsString>) -> Format {
     format
 }
 
-/// Says something.
+/// Prints a message.
 pub fn say(level: Level, message: &str) {
     tell(level, message, Facts::new());
 }
 
-/// Says something of which more is known.
+/// Prints a message with facts.
 pub fn tell(level: Level, message: &str, facts: Facts) {
     if !is_json() {
         write(&visible(&format!("{}{message}", level.prefix())));
@@ -112,23 +112,23 @@ pub fn tell(level: Level, message: &str, facts: Facts) {
         time: time.as_millis() as f64 / 1000.0,
         facts,
     };
-    // Names and numbers have no reason to fail.
+    // Strings and numbers serialize without errors.
     write(&serde_json::to_string(&line).unwrap_or_default());
 }
 
-/// Text that belongs to the message before it; in JSON that has it among its facts.
+/// Prints text that belongs to the previous message, whose facts contain it in JSON.
 pub fn explain(text: &str) {
     if !is_json() {
         write(&visible_lines(text));
     }
 }
 
-/// A line on standard error. Where it cannot be written there is nobody to tell, and whatever is under way goes on.
+/// Prints a line to standard error. A failure cannot be reported, and must not end a render.
 fn write(line: &str) {
     let _ = io::stderr().lock().write_all(format!("{line}\n").as_bytes());
 }
 
-/// Makes lines of panics that are no errors of anything else, where messages are JSON.
+/// Prints panics as JSON if messages are JSON.
 pub fn catch_panics() {
     if is_json() {
         std::panic::set_hook(Box::new(|panic| {
@@ -138,8 +138,8 @@ pub fn catch_panics() {
     }
 }
 
-/// Events of this program on standard error, and warnings of others.
-pub fn speak() {
+/// Prints the events of this program, and the warnings of libraries.
+pub fn print_events() {
     use tracing_subscriber::filter::{LevelFilter, Targets};
     use tracing_subscriber::prelude::*;
     let ours = Targets::new()
@@ -194,7 +194,7 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for Objects {
     }
 }
 
-/// The fields of an event, or of what it happened in.
+/// The fields of an event or a span.
 #[derive(Default)]
 struct Fields(Facts);
 
@@ -235,7 +235,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_format_is_found_on_a_bad_command_line() {
+    fn the_format_is_found_in_an_invalid_command_line() {
         let asked = |line: &str| asked(line.split(' ').map(Into::into));
         assert_eq!(asked("render --log-format json --bad"), Format::Json);
         assert_eq!(asked("--log-format=json --log-format text"), Format::Text);

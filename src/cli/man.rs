@@ -65,7 +65,7 @@ fn write(path: &Path, text: &[u8]) -> io::Result<()> {
 
 /// The program, and each of its subcommands.
 fn commands() -> Vec<clap::Command> {
-    let mut program = Cli::command().disable_help_subcommand(true);
+    let mut program = super::with_all_options(Cli::command()).disable_help_subcommand(true);
     program.build(); // which gives the subcommands their whole names
     let mut all = Vec::new();
     add(program, &mut all);

@@ -11,7 +11,7 @@ use wgray::job::Parts;
 
 use super::frames::{self, Frame};
 use super::log::{self, Level};
-use super::outputs::{Layered, Outputs, Places};
+use super::outputs::{Files, Layered, Outputs};
 use super::picture_options::PictureOptions;
 use super::{Interrupted, Usage, signal};
 
@@ -24,7 +24,7 @@ pub struct Args {
     parts: Vec<PathBuf>,
 
     /// The number that # in names of outputs stand for: out.####.png is out.0007.png
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=i64::from(frames::LARGEST)))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=i64::from(frames::MAX_NUMBER)))]
     frame: Option<u32>,
 
     #[command(flatten)]
@@ -53,12 +53,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     )?;
     let mut layout = parts.layout();
     layout.view = args.pictures.view(layout.view);
-    let outputs = Outputs::find(&pictures, first, (&layout.aovs, Layered::There), None)?;
+    let outputs = Outputs::find(&pictures, first, (&layout.aovs, Layered::Available), None)?;
     outputs.check(&files, None)?;
     outputs.check_size(layout.region)?;
     let begun = outputs.begin().map_err(RenderError::Output)?;
     let stop = signal::stop().context("signal handler")?;
-    let Places::Pictures(targets) = begun.places else {
+    let Files::Pictures(targets) = begun.files else {
         return Ok(ExitCode::SUCCESS); // a part is found by `find_part` alone
     };
     let options = args.pictures.save_options(parts.told());

@@ -1,4 +1,4 @@
-//! What is told in pictures about how they came to be.
+//! Metadata of images: the program, the scene and the settings that made them.
 
 use std::time::Duration;
 
@@ -8,48 +8,48 @@ use wgray::job::{hash_of_scene, hash_of_shaders};
 use wgray::pack::Packed;
 use wgray::scene::Scene;
 
-/// What is known of a render before it begins.
+/// The metadata that is known before a render.
 pub struct RenderMetadata {
     metadata: Metadata,
 }
 
 impl RenderMetadata {
-    /// What a scene says, and what the program is.
+    /// Returns the metadata of a scene, and the version of the program.
     pub fn of(scene: &Scene, packed: &Packed, time_limit: Option<Duration>) -> RenderMetadata {
         let mut pairs = vec![(
             Metadata::SOFTWARE.to_owned(),
             concat!("wgray ", env!("CARGO_PKG_VERSION")).to_owned(),
         )];
-        let mut tell = |name: &str, text: String| pairs.push((name.to_owned(), text));
-        tell("scene_hash", hash_of_scene(packed));
+        let mut add = |name: &str, text: String| pairs.push((name.to_owned(), text));
+        add("scene_hash", hash_of_scene(packed));
         if cfg!(feature = "gpu") {
-            tell("shader_hash", hash_of_shaders());
+            add("shader_hash", hash_of_shaders());
         }
         let render = &scene.render;
-        tell("integrator", render.integrator.name().to_owned());
+        add("integrator", render.integrator.name().to_owned());
         let samples = render.pixel_samples;
-        tell("pixel_samples", format!("{} {}", samples.count, samples.pattern.name()));
+        add("pixel_samples", format!("{} {}", samples.count, samples.pattern.name()));
         if let Some(adaptive) = render.adaptive {
-            tell(
+            add(
                 "adaptive",
                 format!("{}, up to {} samples", adaptive.error, adaptive.max_samples),
             );
         }
-        tell("seed", render.seed.to_string());
+        add("seed", render.seed.to_string());
         if let Some(limit) = time_limit {
-            tell("time_limit", format!("{} s", limit.as_secs_f64()));
+            add("time_limit", format!("{} s", limit.as_secs_f64()));
         }
         RenderMetadata {
             metadata: Metadata { pairs },
         }
     }
 
-    /// What stays the same whatever renders it.
+    /// Returns the metadata that does not depend on the device.
     pub fn lasting(&self) -> Metadata {
         self.metadata.clone()
     }
 
-    /// With what renders it. A reproducible picture does not tell.
+    /// Returns the metadata with the device, unless the image is to be reproducible.
     pub fn on(&self, device: &DeviceInfo, reproducible: bool) -> Metadata {
         let mut metadata = self.metadata.clone();
         if !reproducible {

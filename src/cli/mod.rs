@@ -1,5 +1,6 @@
-//! The command line: arguments, messages and exit codes. One file a subcommand.
+//! The command line: arguments, messages and exit codes. Each subcommand has a file of its own.
 
+mod allocator;
 mod check;
 mod completions;
 mod convert;
@@ -10,6 +11,7 @@ mod diff;
 mod exit_codes;
 mod farm;
 mod frames;
+mod hints;
 mod info;
 mod log;
 mod man;
@@ -29,12 +31,11 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use serde_json::Value;
 use wgray::compare::Unreadable;
 use wgray::error::{Error, RenderError, ShaderError, ShaderErrors};
 use wgray::scene::{Overrides, Problem, Scene, SceneError};
-use wgray::visible::visible;
 
 use self::log::{Facts, Level};
 
@@ -44,72 +45,82 @@ struct Cli {
     #[command(subcommand)]
     command: Command,
 
-    /// How messages are written on standard error
-    #[arg(long, global = true, value_enum, value_name = "FORMAT", default_value_t)]
+    /// Write messages as text or json
+    #[arg(
+        long,
+        global = true,
+        display_order = 95,
+        value_enum,
+        value_name = "FORMAT",
+        default_value_t,
+        hide_possible_values = true
+    )]
     log_format: log::Format,
 }
 
 const EXIT_CODES: &str = "\
-Exit codes: 0 done, 1 failed, 2 wrong command line, 3 bad scene, 4 no such device, 5 pictures differ, 6 device lost, \
-7 out of memory, 8 output not written, 130, 143 and 129 ended by SIGINT, SIGTERM and SIGHUP.";
+Exit codes: 0 success, 1 failure, 2 usage error, 3 invalid scene, 4 no such device, 5 images differ, 6 device lost, \
+7 out of memory, 8 output not written, 128 + n ended by signal n.";
 
-/// The exit code of what could not be written.
+/// Exit code after an output could not be written.
 const NOT_WRITTEN: u8 = 8;
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Renders a scene file to a picture
+    /// Render a scene or model to an image
     Render(Box<render::Args>),
-    #[cfg_attr(
-        feature = "gpu",
-        doc = "Validates scene files, and the shaders for them, without a device"
-    )]
-    #[cfg_attr(not(feature = "gpu"), doc = "Validates scene files")]
+    #[cfg_attr(feature = "gpu", doc = "Check scene files and their shaders without rendering")]
+    #[cfg_attr(not(feature = "gpu"), doc = "Check scene files without rendering")]
     Check(Box<check::Args>),
-    /// Tells what is in a scene, what it takes, and what would render it
+    /// Show the contents, memory use and device of a scene
     Info(Box<info::Args>),
-    /// Joins parts of a picture, which render --tile has written, to the picture
+    /// Join the parts of `render --tile` into an image
     Merge(Box<merge::Args>),
-    /// Writes what a render farm takes to render a scene in parts on many machines
+    /// Write the jobs that render a scene on a render farm
     #[command(subcommand)]
     Farm(farm::Engine),
-    /// Writes a scene, a glTF file for one, as a TOML file that renders the same picture
+    /// Write a scene or model as a TOML scene that renders the same image
     Convert(Box<convert::Args>),
-    /// Compares two pictures, and fails if they differ
+    /// Compare two images; fail if they differ
     Diff(Box<diff::Args>),
-    /// Lists the adapters that pictures can be rendered on, and which one "auto" chooses
+    /// List the adapters to render on and the one that auto selects
     #[command(after_help = EXIT_CODES)]
     Devices,
-    /// Prints the JSON Schema of scene files, by which editors complete and check them
+    /// Print the JSON Schema of scene files, for editors
     #[command(after_help = EXIT_CODES)]
     Schema,
-    /// Prints what a shell needs to complete the command line
+    /// Print a completion script for a shell
     #[command(after_help = EXIT_CODES)]
     Completions(completions::Args),
-    /// Prints or writes the manual pages
+    /// Print or write the manual pages
     #[command(after_help = EXIT_CODES)]
     Man(man::Args),
-    /// Shows a scene on a web page, and shows it anew whenever the scene file or a shader is saved
+    /// Show a scene on a web page and re-render it whenever a file is saved
     #[cfg(feature = "dev")]
     Dev(Box<dev::Args>),
 }
 
-/// The work was ended by a signal.
+/// A signal ended the work.
 #[derive(Debug, thiserror::Error)]
-#[error("cancelled")]
+#[error("interrupted by {}", signal::name(*.0))]
 struct Interrupted(i32);
 
-/// A command line that can be read but makes no sense.
+/// A contradiction in a command line that parses.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 struct Usage(String);
 
-/// Reads the command line, does what it says, and returns the exit code.
+/// The operating system does not start threads, usually for want of memory.
+#[derive(Debug, thiserror::Error)]
+#[error("out of memory: cannot start threads: {0} (--threads)")]
+struct NoThreads(rayon::ThreadPoolBuildError);
+
+/// Runs the command line and returns the exit code.
 pub fn main() -> ExitCode {
     let start = Instant::now();
-    let cli = match Cli::try_parse() {
+    let cli = match parse() {
         Ok(cli) => cli,
-        Err(told) => return explain(&shown(told)),
+        Err(error) => return explain(&hints::improve(error)),
     };
     log::choose(cli.log_format);
     log::catch_panics();
@@ -124,7 +135,7 @@ pub fn main() -> ExitCode {
     };
     prepare_environment(threads);
     signal::file_size_limit_is_an_error();
-    wgray::contain::silence(); // an error tells what a lost device has panicked for
+    wgray::contain::install_quiet_hook(); // the panics of a lost device become errors
     let result = match cli.command {
         Command::Render(args) => render::run(*args, start),
         Command::Check(args) => check::run(&args),
@@ -143,55 +154,47 @@ pub fn main() -> ExitCode {
     match result {
         Ok(code) => code,
         Err(error) => {
-            let again = requeue.filter(|_| helps_again(&error));
-            let code = again.map_or_else(|| exit_code(&error), |(code, _)| code);
+            let retry = requeue.filter(|_| may_succeed_later(&error));
+            let code = retry.map_or_else(|| exit_code(&error), |(code, _)| code);
             report(&error, code);
-            if again.is_some_and(|(_, quiet)| !quiet) {
-                log::say(Level::Note, &format!("exit code {code} asks for another try"));
+            if retry.is_some_and(|(_, quiet)| !quiet) {
+                log::say(Level::Note, &format!("exit code {code} requests another attempt"));
             }
             ExitCode::from(code)
         }
     }
 }
 
-/// What is wrong with the command line, with the words of it that cannot be shown, or are long, as messages show them.
-fn shown(mut told: clap::Error) -> clap::Error {
-    use clap::error::{ContextKind, ContextValue};
-    for kind in [
-        ContextKind::InvalidArg,
-        ContextKind::InvalidSubcommand,
-        ContextKind::InvalidValue,
-    ] {
-        let Some(ContextValue::String(word)) = told.get(kind) else {
-            continue;
-        };
-        let shown = visible(word);
-        let shown = match shown.chars().count() {
-            0..=LONGEST_WORD => shown.into_owned(),
-            _ => shown.chars().take(LONGEST_WORD).chain("...".chars()).collect(),
-        };
-        if shown != *word {
-            told.insert(kind, ContextValue::String(shown));
-            told.remove(ContextKind::Suggested); // which has the word as it is
-        }
-    }
-    told
+/// Parses the command line. Its `--help` lists all options, `-h` those without `hide_short_help`.
+fn parse() -> Result<Cli, clap::Error> {
+    let shows_all = std::env::args_os().any(|word| word == "--help")
+        || std::env::args_os().nth(1).is_some_and(|word| word == "help");
+    let mut command = match shows_all {
+        true => with_all_options(Cli::command()),
+        false => Cli::command(),
+    };
+    let matches = command.try_get_matches_from_mut(std::env::args_os())?;
+    Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
 }
 
-/// The longest word of a command line in a message, in characters.
-const LONGEST_WORD: usize = 200;
+/// Makes the help of a command list the options that `-h` leaves out.
+fn with_all_options(command: clap::Command) -> clap::Command {
+    command
+        .mut_args(|option| option.hide_short_help(false))
+        .mut_subcommands(with_all_options)
+}
 
-/// Prints the help or the version, or what is wrong with the command line.
-fn explain(told: &clap::Error) -> ExitCode {
+/// Prints the help, the version, or an error in the command line.
+fn explain(error: &clap::Error) -> ExitCode {
     log::choose(log::asked(std::env::args_os()));
-    if !told.use_stderr() {
-        return ended(told.print(), ExitCode::SUCCESS);
+    if !error.use_stderr() {
+        return ended(error.print(), ExitCode::SUCCESS);
     }
     if !log::is_json() {
-        let _ = told.print(); // where this cannot be written there is nobody to tell
+        let _ = error.print(); // a failure to print cannot be reported either
         return ExitCode::from(2);
     }
-    let text = told.render().to_string();
+    let text = error.render().to_string();
     let (message, help) = text.split_once("\n\n").unwrap_or((&text, ""));
     let message = message.strip_prefix("error: ").unwrap_or(message);
     let facts = [("exit_code", Value::from(2)), ("help", Value::from(help.trim()))];
@@ -200,7 +203,7 @@ fn explain(told: &clap::Error) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// What drivers learn from the environment. Nothing else runs yet.
+/// Sets the environment of drivers, before any other thread exists.
 fn prepare_environment(threads: Option<u16>) {
     let set = |name: &str, value: &std::ffi::OsStr| {
         // SAFETY: the process has only this thread so far.
@@ -210,17 +213,17 @@ fn prepare_environment(threads: Option<u16>) {
         set("LP_NUM_THREADS", threads.to_string().as_ref());
     }
     if cfg!(target_os = "linux") && std::env::var_os("XDG_RUNTIME_DIR").is_none() {
-        // Mesa complains on standard error where it is not set, and makes no other use of it without a window.
+        // Mesa prints a warning if it is unset, and does not use it without a window.
         set("XDG_RUNTIME_DIR", std::env::temp_dir().as_os_str());
     }
 }
 
-/// Reads a scene file, with options in place of some of its values.
+/// Reads a scene file, with overridden values.
 fn load(path: &Path, overrides: &Overrides) -> anyhow::Result<Scene> {
     Scene::load_with(path, overrides).map_err(|error| plain(error.into()))
 }
 
-/// An error of the library in the words of the command line.
+/// Converts an error of the library, naming options as the command line does.
 fn plain(error: Error) -> anyhow::Error {
     match error {
         Error::Option(problem) | Error::Scene(SceneError::Override(problem)) => option(&problem).into(),
@@ -230,7 +233,7 @@ fn plain(error: Error) -> anyhow::Error {
     }
 }
 
-/// A problem of an option, called as the command line calls it.
+/// Converts a problem of an option.
 fn option(problem: &Problem) -> Usage {
     let key = problem.key.to_string();
     let (name, rest) = key.split_once('.').unwrap_or((&key, ""));
@@ -239,20 +242,20 @@ fn option(problem: &Problem) -> Usage {
     } else {
         format!(" {rest}")
     };
-    let hint = match name {
-        "adaptive" if problem.message.contains("pixel_samples") => ", as with --pixel-pattern sobol",
-        "aov" if problem.message.contains("integrator") => ", as with --integrator path",
-        "aov" => "; --adaptive 0 gives all pixels the most samples",
+    let name = match name {
+        "pixel_samples" => "spp".to_owned(),
+        name => name.replace('_', "-"),
+    };
+    let hint = match (name.as_str(), rest) {
+        ("aov", "sample_count" | "variance") => " (--adaptive ERROR)",
+        ("aov", _) => " (--integrator path)",
+        ("adaptive", "") => " (--pixel-pattern sobol)", // the option's own value was checked
         _ => "",
     };
-    Usage(format!(
-        "--{}{place}: {}{hint}",
-        name.replace('_', "-"),
-        problem.message
-    ))
+    Usage(format!("--{name}{place}: {}{hint}", problem.message))
 }
 
-/// Says on standard error what went wrong.
+/// Prints an error.
 fn report(error: &anyhow::Error, code: u8) {
     let code = Value::from(code);
     let shader = shader_errors(error);
@@ -296,7 +299,7 @@ fn report(error: &anyhow::Error, code: u8) {
     }
 }
 
-/// Facts by their names.
+/// Returns facts by name.
 fn facts_of<const N: usize>(facts: [(&str, Value); N]) -> Facts {
     facts
         .map(|(name, value)| (name.to_owned(), value))
@@ -304,8 +307,7 @@ fn facts_of<const N: usize>(facts: [(&str, Value); N]) -> Facts {
         .collect()
 }
 
-/// The exit code of a command that has printed something: a reader who has gone wanted no more, but a full disk is a
-/// failure.
+/// Returns the exit code of a command after it has printed: a closed pipe is not a failure, a full disk is.
 fn ended(printed: io::Result<()>, code: ExitCode) -> ExitCode {
     match printed.and_then(|()| io::stdout().flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -329,9 +331,8 @@ fn shader_errors(error: &anyhow::Error) -> &[ShaderError] {
     }
 }
 
-/// Whether the same command may succeed after this, on another machine or later: not if the scene, the command line or the want of memory
-/// would end it again.
-fn helps_again(error: &anyhow::Error) -> bool {
+/// Returns true if the same command may succeed later or on another machine.
+fn may_succeed_later(error: &anyhow::Error) -> bool {
     match error.downcast_ref() {
         Some(Interrupted(signal)) => *signal == signal_hook::consts::SIGTERM,
         None => matches!(error.downcast_ref(), Some(RenderError::Lost { .. })),
@@ -344,6 +345,8 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     } else if let Some(Interrupted(signal)) = error.downcast_ref() {
         signal::exit_code(*signal)
     } else if let Some(Unreadable::Memory { .. }) = error.downcast_ref() {
+        7
+    } else if error.is::<NoThreads>() {
         7
     } else if error.is::<SceneError>() {
         3

@@ -1,4 +1,5 @@
-//! Where a render writes to, settled before it begins: nothing that it reads, and nothing twice.
+//! The destinations of a render, checked before it begins: no inputs, no duplicates, and no files of other programs by a
+//! default name.
 
 use std::io::{self, IsTerminal as _};
 use std::path::{Path, PathBuf};
@@ -10,62 +11,63 @@ use wgray::image::{self, Aov, Format, Layers, Output, Pending, Target};
 use super::Usage;
 use super::picture_options::PictureOptions;
 
-/// All that a render writes.
+/// The destinations of a render.
 pub struct Outputs {
     pictures: Vec<Picture>,
-    /// In place of pictures, a part of one.
+    /// A part of an image, instead of images.
     part: Option<Output>,
     stats: Option<Output>,
 }
 
-/// A picture's places.
+/// The files of an image.
 struct Picture {
     format: Format,
-    /// The picture, then those of its AOVs that are files of their own; each with the option that asks for it.
+    /// The image, then its AOVs that are separate files, each with the option that requests it.
     files: Vec<(String, Output)>,
 }
 
-/// What [`Outputs`] are once they are begun.
-pub struct Begun {
-    pub places: Places,
+/// Destinations that are open.
+pub struct OpenOutputs {
+    pub files: Files,
     pub stats: Option<Pending>,
 }
 
-/// Where a render goes to.
-pub enum Places {
+/// The files to write.
+pub enum Files {
     Pictures(Vec<Target>),
-    /// A part of a picture.
+    /// A part of an image.
     Part(Pending),
 }
 
-impl Places {
-    /// What messages call the first of them.
+impl Files {
+    /// Returns the name of the first file, for messages.
     pub fn name(&self) -> Option<&str> {
         match self {
-            Places::Pictures(targets) => targets
+            Files::Pictures(targets) => targets
                 .iter()
                 .flat_map(|target| &target.files)
                 .next()
                 .map(Pending::name),
-            Places::Part(file) => Some(file.name()),
+            Files::Part(file) => Some(file.name()),
         }
     }
 }
 
-/// How layers come to be among the outputs.
+/// The reason for layers among the outputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layered {
-    /// Somebody asked for them, so some picture must take them.
-    Asked,
-    /// They are there, for the pictures that take them.
-    There,
+    /// They are requested, so an output must accept them.
+    Requested,
+    /// They exist, for the outputs that accept them.
+    Available,
 }
 
-/// The end of a part's name.
+/// Extension of parts.
 const PART: &str = "part";
 
 impl Outputs {
-    /// Looks at all places. `-` is standard output. Where no picture is named it is `default`.
+    /// Checks all destinations. `-` is standard output. Without --output the image is `default`, which must not replace a file
+    /// of another program.
     pub fn find(
         options: &PictureOptions,
         default: &Path,
@@ -80,16 +82,16 @@ impl Outputs {
         for path in paths {
             let picture = output(path)?;
             if path.as_os_str() == "-" && io::stdout().is_terminal() {
-                let message = "--output: -: must not be a terminal; > FILE or | COMMAND takes the picture";
+                let message = "--output: -: standard output is a terminal; redirect it with > FILE or | COMMAND";
                 return Err(Usage(message.to_owned()).into());
             }
-            forbid_ending("--output", path, &picture, "toml", "is a scene's name")?;
+            forbid_ending("--output", path, &picture, "toml", "names a scene")?;
             found.push((path, picture));
         }
         let formats = formats(&found, options.format)?;
         options.check(&formats)?;
-        if let Layered::Asked = layered {
-            has_place_for(aovs, &found, &formats)?;
+        if let Layered::Requested = layered {
+            check_layers(aovs, &found, &formats)?;
         }
         let mut pictures = Vec::new();
         for ((path, picture), format) in found.into_iter().zip(formats) {
@@ -106,25 +108,45 @@ impl Outputs {
             }
             pictures.push(Picture { format, files });
         }
-        Ok(Outputs {
+        let outputs = Outputs {
             pictures,
             part: None,
             stats: stats.map(find_stats).transpose()?,
-        })
+        };
+        if options.output.is_empty() {
+            outputs.keep_files_of_others()?;
+        }
+        Ok(outputs)
     }
 
-    /// Looks at the place of a part of a picture.
+    /// Rejects images by default names that exist, unless this program wrote them.
+    fn keep_files_of_others(&self) -> Result<(), Usage> {
+        let mut files = self.pictures.iter().flat_map(|picture| &picture.files);
+        let of_others = |(_, output): &&(String, Output)| {
+            let path = output.path().filter(|path| path.exists());
+            path.is_some_and(|path| !image::is_written_by_wgray(path))
+        };
+        match files.find(of_others) {
+            Some((_, output)) => Err(Usage(format!(
+                "{} exists and was not written by wgray; name the output with -o",
+                output.name()
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// Checks the destination of a part of an image.
     pub fn find_part(options: &PictureOptions, stats: Option<&Path>) -> anyhow::Result<Outputs> {
         let ends = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case(PART));
         let path = match options.output.as_slice() {
             [path] if ends(path) => path,
             _ => {
-                let rule = "--tile: needs one -o NAME.part, which wgray merge joins with the others to a picture";
+                let rule = "--tile: needs exactly one -o NAME.part, to be joined by wgray merge";
                 return Err(Usage(rule.to_owned()).into());
             }
         };
         if options.format.is_some() {
-            return Err(Usage("--format: is for pictures, and --tile writes a part".to_owned()).into());
+            return Err(Usage("--format: cannot be used with --tile, which writes a part".to_owned()).into());
         }
         options.check(&[])?;
         Ok(Outputs {
@@ -134,7 +156,7 @@ impl Outputs {
         })
     }
 
-    /// Refuses pictures that are larger than their format has them.
+    /// Rejects images that exceed the maximum size of their format.
     pub fn check_size(&self, region: Region) -> Result<(), Usage> {
         let mut named = self
             .pictures
@@ -146,9 +168,9 @@ impl Outputs {
         })
     }
 
-    /// Refuses what would replace an input or another output.
+    /// Rejects destinations that would replace an input or another output.
     pub fn check(&self, inputs: &[PathBuf], checkpoint: Option<&Path>) -> anyhow::Result<()> {
-        // In a folder it has a name that nothing else has.
+        // In a folder its name is unique.
         let checkpoint = checkpoint.filter(|path| !path.is_dir());
         let checkpoint = checkpoint.map(find_checkpoint).transpose()?;
         let checkpoint = checkpoint
@@ -156,39 +178,43 @@ impl Outputs {
             .map(|output| ("--checkpoint", output, "choose another name"));
         let stats = self.stats.iter().map(|stats| ("--stats", stats, "choose another name"));
         let pictures = (self.pictures.iter().flat_map(|picture| &picture.files))
-            .map(|(option, output)| (option.as_str(), output, "choose another name by --output"));
+            .map(|(option, output)| (option.as_str(), output, "choose another name with --output"));
         let part = self
             .part
             .iter()
-            .map(|part| ("--output", part, "choose another name by --output"));
+            .map(|part| ("--output", part, "choose another name with --output"));
         let mut before: Vec<(&str, &Output)> = Vec::new();
-        for (option, output, way) in part.chain(pictures).chain(stats).chain(checkpoint) {
-            keep_inputs(option, output, inputs, way)?;
+        for (option, output, remedy) in part.chain(pictures).chain(stats).chain(checkpoint) {
+            keep_inputs(option, output, inputs, remedy)?;
             if let Some((other, _)) = before.iter().find(|(_, other)| other.is_same(output)) {
                 let name = output.name();
-                return Err(Usage(format!("{option}: {name}: is where {other} writes to; {way}")).into());
+                return Err(Usage(match option == *other {
+                    true => format!("{option}: {name} is given twice"),
+                    false => format!("{option}: {name} is also written by {other}; {remedy}"),
+                })
+                .into());
             }
             before.push((option, output));
         }
         Ok(())
     }
 
-    /// Whether all of its files are there already, which are whole then. A stream for figures does not count; a picture on one
-    /// is never there.
-    pub fn are_there(&self) -> bool {
-        let is_there = |output: &Output| output.path().is_some_and(Path::is_file);
+    /// Returns true if all files exist, and are complete therefore. Streams never exist, except that one for statistics is
+    /// ignored.
+    pub fn exist(&self) -> bool {
+        let exists = |output: &Output| output.path().is_some_and(Path::is_file);
         let pictures = self.pictures.iter().flat_map(|picture| &picture.files);
         let figures = self.stats.iter().filter(|stats| stats.is_file());
         let mut all = pictures.map(|(_, output)| output).chain(&self.part).chain(figures);
-        all.all(is_there)
+        all.all(exists)
     }
 
-    /// Where the part of a picture is, if it is one and a file.
+    /// Returns the path of the part, if this is one and a file.
     pub fn part(&self) -> Option<&Path> {
         self.part.as_ref()?.path()
     }
 
-    /// The files that it writes, each with its option and its name in messages.
+    /// Returns the files, each with its option and its name for messages.
     pub fn files(&self) -> impl Iterator<Item = (&str, &str, &Path)> {
         let pictures = self.pictures.iter().flat_map(|picture| &picture.files);
         let pictures = pictures.map(|(option, output)| (option.as_str(), output));
@@ -198,8 +224,15 @@ impl Outputs {
         all.filter_map(|(option, output)| Some((option, output.name(), output.path()?)))
     }
 
-    /// Opens all. A pipe waits for its reader, so that is done while signals still end the program at once.
-    pub fn begin(mut self) -> io::Result<Begun> {
+    /// Returns the names of the images or the part, for messages.
+    pub fn images(&self) -> Vec<String> {
+        let pictures = self.pictures.iter().flat_map(|picture| &picture.files);
+        let outputs = pictures.map(|(_, output)| output).chain(&self.part);
+        outputs.map(|output| output.name().to_owned()).collect()
+    }
+
+    /// Opens all. A pipe waits for its reader, so this happens while signals still end the program at once.
+    pub fn begin(mut self) -> io::Result<OpenOutputs> {
         let pictures = self.pictures.iter_mut().flat_map(|picture| &mut picture.files);
         for output in pictures
             .map(|(_, output)| output)
@@ -213,10 +246,10 @@ impl Outputs {
             let files = files.collect::<io::Result<_>>()?;
             Ok(Target { format, files })
         };
-        Ok(Begun {
-            places: match self.part {
-                Some(part) => Places::Part(Pending::start(part)?),
-                None => Places::Pictures(self.pictures.into_iter().map(target).collect::<io::Result<_>>()?),
+        Ok(OpenOutputs {
+            files: match self.part {
+                Some(part) => Files::Part(Pending::start(part)?),
+                None => Files::Pictures(self.pictures.into_iter().map(target).collect::<io::Result<_>>()?),
             },
             stats: self.stats.map(Pending::start).transpose()?,
         })
@@ -233,36 +266,33 @@ fn find_checkpoint(path: &Path) -> anyhow::Result<Output> {
     let checkpoint = output(path)?;
     if !checkpoint.is_file() {
         let name = checkpoint.name();
-        return Err(Usage(format!(
-            "--checkpoint: {name}: must be a file, which can be gone on from"
-        ))
-        .into());
+        return Err(Usage(format!("--checkpoint: {name}: must be a regular file")).into());
     }
     forbid_pictures("--checkpoint", path, &checkpoint)?;
     Ok(checkpoint)
 }
 
-/// Refuses names that would be a slip.
+/// Rejects names that are probably mistakes.
 fn forbid_pictures(option: &str, path: &Path, output: &Output) -> Result<(), Usage> {
-    forbid_ending(option, path, output, "toml", "is a scene's name")?;
-    forbid_ending(option, path, output, PART, "is a part's name")?;
+    forbid_ending(option, path, output, "toml", "names a scene")?;
+    forbid_ending(option, path, output, PART, "names a part")?;
     let mut models = ["gltf", "glb"].into_iter();
-    models.try_for_each(|ending| forbid_ending(option, path, output, ending, "is a model's name"))?;
+    models.try_for_each(|ending| forbid_ending(option, path, output, ending, "names a model"))?;
     let mut pictures = ["png", "exr", "jpg", "jpeg", "webp"].into_iter();
-    pictures.try_for_each(|ending| forbid_ending(option, path, output, ending, "is a picture's name"))
+    pictures.try_for_each(|ending| forbid_ending(option, path, output, ending, "names an image"))
 }
 
-/// Refuses an output that is a file which the work reads.
-pub fn keep_inputs(option: &str, output: &Output, inputs: &[PathBuf], way: &str) -> Result<(), Usage> {
+/// Rejects an output that is one of the inputs.
+pub fn keep_inputs(option: &str, output: &Output, inputs: &[PathBuf], remedy: &str) -> Result<(), Usage> {
     let Some(input) = inputs.iter().find(|input| output.is_input(input)) else {
         return Ok(());
     };
     let plain = |path: &str| path.strip_prefix("./").unwrap_or(path).to_owned();
     let (name, input) = (output.name(), input.display().to_string());
     Err(Usage(if plain(name) == plain(&input) {
-        format!("{option}: {name}: is a file that the scene is made of, and must stay; {way}")
+        format!("{option}: {name} is an input of the scene; {remedy}")
     } else {
-        format!("{option}: {name}: is the file {input}, which the scene is made of and must stay; {way}")
+        format!("{option}: {name} is the same file as {input}, an input of the scene; {remedy}")
     }))
 }
 
@@ -273,36 +303,36 @@ fn output(path: &Path) -> Result<Output, RenderError> {
     }
 }
 
-/// The formats that the names' ends say, or the option; what is no file and has no such end gets a PNG.
-fn formats(pictures: &[(&Path, Output)], told: Option<Format>) -> Result<Vec<Format>, Usage> {
+/// Returns the formats by extension, else by --format; other streams get a PNG.
+fn formats(pictures: &[(&Path, Output)], option: Option<Format>) -> Result<Vec<Format>, Usage> {
     let named: Vec<Option<Format>> = pictures.iter().map(|(path, _)| Format::of(path)).collect();
-    if let (Some(told), false) = (told, named.contains(&None)) {
-        // It is for no picture, and must at least be true.
-        let other = pictures.iter().zip(&named).find(|(_, named)| **named != Some(told));
+    if let (Some(option), false) = (option, named.contains(&None)) {
+        // No output needs it, so it must agree with all.
+        let other = pictures.iter().zip(&named).find(|(_, named)| **named != Some(option));
         if let Some(((path, _), _)) = other {
             let (name, ending) = (path.display(), path.extension().unwrap_or_default().display());
             return Err(Usage(format!(
-                "--format: must be what the name of --output says, {name} ends in .{ending}"
+                "--format: contradicts --output {name}, which ends in .{ending}"
             )));
         }
     }
-    let format = |((path, picture), named): (&(&Path, Output), Option<Format>)| match named.or(told) {
+    let format = |((path, picture), named): (&(&Path, Output), Option<Format>)| match named.or(option) {
         Some(format) => Ok(format),
         None if !picture.is_file() => Ok(Format::Png),
         None if path.extension().is_some_and(|end| end.eq_ignore_ascii_case(PART)) => Err(Usage(format!(
-            "--output: {}: is a part's name; --tile 1/4 renders the first of four parts",
+            "--output: {}: names a part; use --tile i/n to render part i of n",
             path.display()
         ))),
         None => Err(Usage(format!(
-            "--output: {}: must end in .png, .exr, .jpg, .jpeg or .webp, or --format must say which it is",
+            "--output: {}: must end in .png, .exr, .jpg, .jpeg or .webp; or set --format",
             path.display()
         ))),
     };
     pictures.iter().zip(named).map(format).collect()
 }
 
-/// Refuses layers that none of the pictures takes.
-fn has_place_for(aovs: &[Aov], pictures: &[(&Path, Output)], formats: &[Format]) -> Result<(), Usage> {
+/// Rejects layers that none of the outputs accepts.
+fn check_layers(aovs: &[Aov], pictures: &[(&Path, Output)], formats: &[Format]) -> Result<(), Usage> {
     let mut layers = pictures
         .iter()
         .zip(formats)
@@ -316,13 +346,10 @@ fn has_place_for(aovs: &[Aov], pictures: &[(&Path, Output)], formats: &[Format])
     let aov = aov.name();
     let message = match pictures.iter().zip(formats).find(|(_, format)| **format == Format::Png) {
         Some(((_, output), _)) => format!(
-            "--aov {aov}: is a file beside a PNG, and there is none beside {}; --format exr puts it into the picture, \
-             -o NAME.png makes files",
+            "--aov {aov}: needs a file beside {}, which is a stream; use -o NAME.png, or --format exr for a layer",
             output.name()
         ),
-        None => format!(
-            "--aov {aov}: is in an EXR or beside a PNG, and no output is one; a further -o NAME.exr or -o NAME.png takes it"
-        ),
+        None => format!("--aov {aov}: only applies to EXR and PNG outputs; add -o NAME.exr or -o NAME.png"),
     };
     Err(Usage(message))
 }
@@ -334,7 +361,7 @@ fn forbid_ending(option: &str, path: &Path, output: &Output, ending: &str, why: 
         true => {
             let name = output.name();
             Err(Usage(format!(
-                "{option}: {name}: must not end in .{ending}, nor lead to such a file: that {why}"
+                "{option}: {name}: must not end in .{ending} or link to such a file, which {why}"
             )))
         }
     }

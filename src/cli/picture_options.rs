@@ -1,4 +1,4 @@
-//! The options that say which pictures are written, and how: the same wherever pictures are made.
+//! The options for the images that are written, shared by `render` and `merge`.
 
 use std::path::PathBuf;
 
@@ -10,50 +10,47 @@ use super::Usage;
 
 /// The options as they are written.
 #[derive(Clone, Debug, clap::Args)]
-#[command(next_help_heading = "Pictures")]
+#[command(next_help_heading = "Output images")]
 pub struct PictureOptions {
-    /// Picture to write, once or several times: a .png, .jpg, .jpeg or .webp, as a display shows it, or an .exr, linear. - is
-    /// standard output. If absent: the scene's name with .png, of frames with .####.png, in the current folder
-    #[arg(short, long, value_name = "OUT.png|OUT.exr|...|-")]
+    /// Write FILE.png, .exr, .jpg, .webp, or - (stdout) [default: SCENE.png]
+    #[arg(short, long, help_heading = None::<&'static str>, display_order = 0, value_name = "FILE")]
     pub output: Vec<PathBuf>,
 
-    /// Format of pictures whose names do not tell; if absent, png for standard output, pipes and devices
-    #[arg(long, value_name = "FORMAT", value_parser = named(Format::ALL, Format::name))]
-    pub format: Option<Format>,
-
-    /// How light is shown, but in an EXR, in place of the scene's view_transform: gamma22, clamped and to the power 1/2.2; srgb,
-    /// clamped, with sRGB's curve; agx and khronos-pbr-neutral, which keep what is too bright from being cut off
-    #[arg(long, value_name = "TRANSFORM", value_parser = named(ViewTransform::ALL, ViewTransform::name))]
-    pub view_transform: Option<ViewTransform>,
-
-    /// Stops that what is shown is brighter by, but in an EXR, in place of the scene's exposure; -100 to 100
+    /// Set the exposure in stops, -100 to 100; not for EXR
     #[arg(long, value_name = "STOPS", value_parser = parse_exposure, allow_negative_numbers = true)]
     pub exposure: Option<f64>,
 
-    /// Bits of a channel of a PNG; if absent, 8
-    #[arg(long, value_name = "BITS", value_parser = depth_parser())]
+    /// Use gamma22, srgb, agx or khronos-pbr-neutral; not for EXR
+    #[arg(long, value_name = "NAME", value_parser = named(ViewTransform::ALL, ViewTransform::name), hide_possible_values = true)]
+    pub view_transform: Option<ViewTransform>,
+
+    /// Set the format of outputs without a known extension
+    #[arg(long, value_name = "FORMAT", value_parser = named(Format::ALL, Format::name), hide_short_help = true)]
+    pub format: Option<Format>,
+
+    /// Set the bits per channel of a PNG [default: 8]
+    #[arg(long, value_name = "BITS", value_parser = depth_parser(), hide_short_help = true)]
     pub bit_depth: Option<BitDepth>,
 
-    /// Numbers of an EXR, layers too: float, 32 bits, if absent; half, 16 bits, up to 65504. Whole numbers have 32 bits
-    #[arg(long, value_name = "TYPE", value_parser = named(ExrType::ALL, ExrType::name))]
+    /// Set the number type of an EXR [default: float]
+    #[arg(long, value_name = "TYPE", value_parser = named(ExrType::ALL, ExrType::name), hide_short_help = true)]
     pub exr_type: Option<ExrType>,
 
-    /// How an EXR is compressed, always without loss; if absent, zip
-    #[arg(long, value_name = "METHOD", value_parser = named(ExrCompression::ALL, ExrCompression::name))]
+    /// Set the lossless compression of an EXR [default: zip]
+    #[arg(long, value_name = "METHOD", value_parser = named(ExrCompression::ALL, ExrCompression::name), hide_short_help = true)]
     pub exr_compression: Option<ExrCompression>,
 
-    /// Quality of a JPEG, 1 to 100; if absent, 90
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=100))]
+    /// Set the quality of a JPEG, 1 to 100 [default: 90]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=100), hide_short_help = true)]
     pub quality: Option<u8>,
 
-    /// Writes nothing into pictures that depends on where they were rendered, such as the device's name: the same scene gives the
-    /// same bytes
-    #[arg(long)]
+    /// Omit device and driver names, so that equal scenes give equal files
+    #[arg(long, hide_short_help = true)]
     pub reproducible: bool,
 }
 
 impl PictureOptions {
-    /// How the pictures are shown, for a scene that says something of it.
+    /// Returns the view settings: the options override the scene.
     pub fn view(&self, scene: ViewSettings) -> ViewSettings {
         ViewSettings {
             transform: self.view_transform.unwrap_or(scene.transform),
@@ -61,7 +58,7 @@ impl PictureOptions {
         }
     }
 
-    /// How the files are written, and what is told in them.
+    /// Returns the encoding options and metadata of the files.
     pub fn save_options(&self, metadata: Metadata) -> SaveOptions {
         SaveOptions {
             bit_depth: self.bit_depth.unwrap_or_default(),
@@ -72,16 +69,16 @@ impl PictureOptions {
         }
     }
 
-    /// Tells what was noticed when the pictures were written.
+    /// Reports values that a format could not hold.
     pub fn warn(&self, saved: &Saved, say: &mut dyn FnMut(&str)) {
         for (name, count) in &saved.too_large {
             say(&format!(
-                "{name}: {count} values are too large for 16 bits, which hold 65504 at most, and are infinite there"
+                "{name}: {count} values exceed 65504, the maximum of 16 bits, and are written as infinity; use --exr-type float"
             ));
         }
     }
 
-    /// Refuses options that none of the pictures heeds.
+    /// Rejects options that apply to none of the outputs.
     pub fn check(&self, formats: &[Format]) -> Result<(), Usage> {
         use Format::{Exr, Jpeg, Png, WebP};
         let shown = &[Png, Jpeg, WebP][..];
@@ -93,28 +90,28 @@ impl PictureOptions {
             ("--exr-compression", self.exr_compression.is_some(), &[Exr]),
             ("--quality", self.quality.is_some(), &[Jpeg]),
         ];
-        let idle = |(_, given, heeding): &(&str, bool, &[Format])| {
-            *given && !heeding.iter().any(|format| formats.contains(format))
+        let unused = |(_, given, users): &(&str, bool, &[Format])| {
+            *given && !users.iter().any(|format| formats.contains(format))
         };
-        match options.into_iter().find(idle) {
+        match options.into_iter().find(unused) {
             None => Ok(()),
-            Some((option, _, heeding)) => {
-                let heeding: Vec<&str> = heeding.iter().map(|format| format.title()).collect();
-                let heeding = heeding.join(", ");
-                Err(Usage(format!("{option}: is for {heeding}, and no output is one")))
+            Some((option, _, users)) => {
+                let users: Vec<String> = users.iter().map(|format| format.name().to_uppercase()).collect();
+                let users = users.join(", ");
+                Err(Usage(format!("{option}: only applies to {users} outputs")))
             }
         }
     }
 }
 
-/// Takes one of some names.
+/// Returns a parser that accepts one of these names.
 fn named<T: Clone + Send + Sync + 'static, const N: usize>(
     all: [T; N],
     name: fn(T) -> &'static str,
 ) -> impl clap::builder::TypedValueParser<Value = T> {
     PossibleValuesParser::new(all.clone().map(name)).try_map(move |given| {
         let found = all.iter().find(|value| name((*value).clone()) == given);
-        found.cloned().ok_or(format!("no such name: {given}"))
+        found.cloned().ok_or(format!("unknown name: {given}"))
     })
 }
 
@@ -126,7 +123,7 @@ fn depth_parser() -> impl clap::builder::TypedValueParser<Value = BitDepth> {
 }
 
 fn parse_exposure(text: &str) -> Result<f64, String> {
-    let rule = "must be stops from -100 to 100, such as 1.5".to_owned();
+    let rule = "must be a number from -100 to 100, such as 1.5".to_owned();
     let stops: f64 = text.parse().map_err(|_| rule)?;
     ViewSettings::check_exposure(stops)
 }

@@ -1,4 +1,4 @@
-//! How far a render is, on standard error.
+//! Progress of a render on standard error.
 
 use std::io::IsTerminal;
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -11,114 +11,156 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::facts_of;
 use super::log::{self, Level};
 
-/// How progress is shown.
+/// The form of progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Mode {
-    /// A bar, if standard error is a terminal and the render takes more than a second; lines where messages are JSON
+    // A bar on a terminal; else a line every ten seconds, or as for Plain if messages are JSON.
     Auto,
-    /// Lines, at every tenth of the work and every ten seconds
+    // A line at every tenth of the work and every ten seconds.
     Plain,
-    /// Lines that Open Job Description takes progress from, openjd_progress: PERCENT
+    // Lines that Open Job Description reads: openjd_progress: PERCENT.
     Openjd,
-    /// Nothing
     None,
 }
 
-/// What takes no longer than this needs no bar.
+/// Work that is shorter than this has no bar.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// The longest time between two lines.
-const SILENCE: Duration = Duration::from_secs(10);
-/// Steps of the bar.
+/// Interval between lines.
+const INTERVAL: Duration = Duration::from_secs(10);
+/// Time before the first estimate: the first pixels are seldom typical.
+const SETTLING: Duration = Duration::from_secs(3);
+/// Number of steps of the bar.
 const STEPS: f64 = 1000.0;
 
-/// The progress of one render. The bar goes away when this is dropped.
+/// The progress of one render. Dropping it removes the bar.
 pub struct Progress {
-    mode: Mode,
-    /// What it is of, in front of each line, and a colon; nothing where there is one picture.
+    form: Form,
+    /// Label printed before each line, with a colon; empty when rendering a single image.
     label: String,
-    /// The number of the frame that it is of.
+    /// The number of the frame.
     frame: Option<u32>,
     start: Instant,
-    bar: Option<ProgressBar>,
-    /// The tenths, or hundredths, that lines have told of, and when the last one did.
-    told: (u32, Instant),
+    /// The fraction that was done at the start: read from a checkpoint.
+    first: Option<f64>,
+    /// The tenths, or hundredths, at the last line, and its time.
+    printed: (u32, Instant),
+}
+
+enum Form {
+    Bar(Option<ProgressBar>),
+    Lines { at_tenths: bool },
+    Openjd,
+    None,
 }
 
 impl Progress {
-    /// The progress of what `label` says, if there are several.
+    /// Returns the progress of an image, or of one of several frames by their label.
     pub fn new(mode: Mode, label: Option<String>, frame: Option<u32>) -> Progress {
-        let mode = match mode {
-            Mode::Auto if log::is_json() => Mode::Plain,
-            Mode::Auto if !std::io::stderr().is_terminal() => Mode::None,
-            mode => mode,
+        let form = match mode {
+            Mode::Auto if log::is_json() => Form::Lines { at_tenths: true },
+            Mode::Auto if !std::io::stderr().is_terminal() => Form::Lines { at_tenths: false },
+            Mode::Auto => Form::Bar(None),
+            Mode::Plain => Form::Lines { at_tenths: true },
+            Mode::Openjd => Form::Openjd,
+            Mode::None => Form::None,
         };
         let start = Instant::now();
         Progress {
-            mode,
+            form,
             label: label.map(|label| format!("{label}: ")).unwrap_or_default(),
             frame,
             start,
-            bar: None,
-            told: (0, start),
+            first: None,
+            printed: (0, start),
         }
     }
 
-    /// Tells the share of the work that is done, from 0 to 1.
-    pub fn update(&mut self, share: f64) {
-        match self.mode {
-            // Of several pictures each may be quick.
-            Mode::Auto if self.start.elapsed() > PATIENCE || !self.label.is_empty() => {
-                let bar = self
-                    .bar
-                    .get_or_insert_with(|| new_bar(self.start.elapsed(), &self.label));
-                bar.set_position((share * STEPS) as u64);
-            }
-            Mode::Plain => {
-                let tenths = (share * 10.0) as u32;
-                if tenths > self.told.0 || self.told.1.elapsed() > SILENCE {
-                    self.tell(share);
-                    self.told = (tenths, Instant::now());
+    /// Reports the fraction of the work that is done, from 0 to 1.
+    pub fn update(&mut self, fraction: f64) {
+        let elapsed = self.start.elapsed();
+        let first = *self.first.get_or_insert(fraction);
+        let remaining = remaining(elapsed, first, fraction);
+        match &mut self.form {
+            // Each of several frames may be short.
+            Form::Bar(bar) if elapsed > PATIENCE || !self.label.is_empty() => {
+                let bar = bar.get_or_insert_with(|| new_bar(elapsed, &self.label));
+                bar.set_position((fraction * STEPS) as u64);
+                if let Some(remaining) = remaining {
+                    bar.set_message(format!(", about {} left", text_of(remaining)));
                 }
             }
-            Mode::Openjd => {
-                let hundredths = (share * 100.0) as u32;
-                if hundredths > self.told.0 {
+            Form::Lines { at_tenths } => {
+                let tenths = (fraction * 10.0) as u32;
+                if (*at_tenths && tenths > self.printed.0) || self.printed.1.elapsed() > INTERVAL {
+                    self.print(fraction, remaining);
+                    self.printed = (tenths, Instant::now());
+                }
+            }
+            Form::Openjd => {
+                let hundredths = (fraction * 100.0) as u32;
+                if hundredths > self.printed.0 {
                     log::say(Level::Progress, &format!("openjd_progress: {hundredths}"));
-                    self.told.0 = hundredths;
+                    self.printed.0 = hundredths;
                 }
             }
-            Mode::Auto | Mode::None => {}
+            Form::Bar(_) | Form::None => {}
         }
     }
-}
 
-impl Progress {
-    /// A line.
-    fn tell(&self, share: f64) {
+    fn print(&self, fraction: f64, remaining: Option<Duration>) {
         let seconds = self.start.elapsed().as_secs_f64();
-        let width = if log::is_json() { 0 } else { 3 }; // so that lines below each other are easy to read
-        let line = format!("{}{:width$.0} % done after {seconds:.1} s", self.label, share * 100.0);
-        let mut facts = facts_of([("share", share.into()), ("seconds", seconds.into())]);
+        let width = if log::is_json() { 0 } else { 3 }; // aligns the lines
+        let left = remaining.map(|remaining| format!(", about {} left", text_of(remaining)));
+        let line = format!(
+            "{}{:width$.0} % done after {seconds:.1} s{}",
+            self.label,
+            fraction * 100.0,
+            left.unwrap_or_default()
+        );
+        let mut facts = facts_of([
+            ("fraction", fraction.into()),
+            ("share", fraction.into()), // the former name, until 0.3
+            ("seconds", seconds.into()),
+        ]);
         facts.extend(self.frame.map(|frame| ("frame".to_owned(), frame.into())));
         log::tell(Level::Progress, &line, facts);
     }
 }
 
+/// Estimates the remaining time from the mean speed so far, once that is meaningful.
+fn remaining(elapsed: Duration, first: f64, fraction: f64) -> Option<Duration> {
+    let done = fraction - first;
+    if elapsed < SETTLING || done < 0.01 || fraction >= 1.0 {
+        return None;
+    }
+    Duration::try_from_secs_f64(elapsed.as_secs_f64() * (1.0 - fraction) / done).ok()
+}
+
+/// Returns a duration in at most two units: `45 s`, `3 m 20 s`, `2 h 5 m`.
+fn text_of(duration: Duration) -> String {
+    let seconds = duration.as_secs_f64().ceil() as u64;
+    match seconds {
+        0..60 => format!("{seconds} s"),
+        60..3600 => format!("{} m {} s", seconds / 60, seconds % 60),
+        _ => format!("{} h {} m", seconds / 3600, seconds / 60 % 60),
+    }
+}
+
 impl Drop for Progress {
     fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
+        if let Form::Bar(Some(bar)) = &self.form {
             bar.finish_and_clear();
         }
     }
 }
 
-/// Does work that has no shares to tell of. On a terminal it is named, with its time, while it takes longer than a second.
+/// Runs work without measurable progress. On a terminal its name and time are shown once it takes longer than a second.
 pub fn named<T>(mode: Mode, name: &'static str, work: impl FnOnce() -> T) -> T {
     if mode != Mode::Auto || log::is_json() || !std::io::stderr().is_terminal() {
         return work();
     }
     let (done, ended) = mpsc::channel::<()>();
-    let watch = thread::spawn(move || {
+    let watch = thread::Builder::new().spawn(move || {
         if ended.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
             let bar = ProgressBar::new_spinner().with_elapsed(PATIENCE);
             bar.set_style(spinner_style());
@@ -130,7 +172,9 @@ pub fn named<T>(mode: Mode, name: &'static str, work: impl FnOnce() -> T) -> T {
     });
     let result = work();
     drop(done);
-    let _ = watch.join();
+    if let Ok(watch) = watch {
+        let _ = watch.join();
+    }
     result
 }
 
@@ -142,9 +186,34 @@ fn new_bar(elapsed: Duration, label: &str) -> ProgressBar {
     let bar = ProgressBar::new(STEPS as u64)
         .with_elapsed(elapsed)
         .with_prefix(label.to_owned());
-    let style = ProgressStyle::with_template("{prefix}{wide_bar} {percent:>3} %  {elapsed} of {duration}");
+    let style = ProgressStyle::with_template("{prefix}rendering {wide_bar} {percent:>3} %  {elapsed}{msg}");
     match style {
         Ok(style) => bar.with_style(style),
-        Err(_) => bar, // the library's own style
+        Err(_) => bar, // the default style
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn estimates_begin_when_they_are_meaningful() {
+        let estimate = |seconds, first, fraction| {
+            remaining(Duration::from_secs(seconds), first, fraction).map(|left| left.as_secs_f64().round())
+        };
+        assert_eq!(estimate(2, 0.0, 0.5), None);
+        assert_eq!(estimate(5, 0.0, 0.005), None);
+        assert_eq!(estimate(5, 0.0, 0.25), Some(15.0));
+        assert_eq!(estimate(5, 0.5, 0.75), Some(5.0)); // after a resume
+        assert_eq!(estimate(5, 0.0, 1.0), None);
+        assert_eq!(estimate(5, 0.0, f64::NAN), None);
+    }
+
+    #[test]
+    fn durations_have_two_units() {
+        for (seconds, text) in [(0.2, "1 s"), (59.0, "59 s"), (60.0, "1 m 0 s"), (7325.0, "2 h 2 m")] {
+            assert_eq!(text_of(Duration::from_secs_f64(seconds)), text);
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! The signals that end a render, which then cleans up behind itself.
+//! The signals that end the program, after it has removed its temporary files.
 
 use std::io;
 use std::sync::Arc;
@@ -7,16 +7,16 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// Whether a signal has asked the program to end.
+/// The signals received so far.
 #[derive(Clone, Debug, Default)]
 pub struct Stop {
-    /// The last one, or 0.
+    /// The last signal, or 0.
     signal: Arc<AtomicUsize>,
     asked: Arc<AtomicBool>,
 }
 
 impl Stop {
-    /// The signal that has come, if one has.
+    /// Returns the signal that was received, if any.
     pub fn signal(&self) -> Option<i32> {
         match self.signal.load(Ordering::Relaxed) {
             0 => None,
@@ -24,25 +24,35 @@ impl Stop {
         }
     }
 
-    /// Whether to end.
+    /// Returns a flag that is true once a signal was received.
     #[cfg(feature = "dev")]
     pub fn flag(&self) -> &AtomicBool {
         &self.asked
     }
 }
 
-/// The exit code after a signal, as shells have it: 130 after SIGINT, 143 after SIGTERM.
+/// Returns the name of a signal.
+pub fn name(signal: i32) -> &'static str {
+    match signal {
+        SIGINT => "Ctrl+C (SIGINT)",
+        SIGTERM => "SIGTERM",
+        HANG_UP => "SIGHUP",
+        _ => "a signal",
+    }
+}
+
+/// Returns the exit code after a signal by the convention of shells: 130 after SIGINT, 143 after SIGTERM.
 pub fn exit_code(signal: i32) -> u8 {
     128_u8.saturating_add(u8::try_from(signal).unwrap_or(0))
 }
 
-/// Notes the first signal that asks the program to end; the second one ends it at once. A signal that was ignored when the
-/// program started stays so: that is how `nohup` and shells keep theirs from background jobs.
+/// Records the first signal; the second one ends the program at once. A signal that was ignored when the program started stays
+/// ignored: `nohup` and shells rely on it for background jobs.
 pub fn stop() -> io::Result<Stop> {
     stop_with(None)
 }
 
-/// The same, where SIGTERM has another exit code.
+/// Like [`stop`], with another exit code for SIGTERM.
 fn stop_with(terminated: Option<u8>) -> io::Result<Stop> {
     let stop = Stop::default();
     for signal in [SIGINT, SIGTERM, HANG_UP] {
@@ -56,18 +66,18 @@ fn stop_with(terminated: Option<u8>) -> io::Result<Stop> {
     Ok(stop)
 }
 
-/// The signals of a program that heeds them from some moment on, and is ended by them before.
+/// Signals that end the program at once until [`Signals::defer`], and are recorded from then on.
 pub struct Signals {
-    /// The exit code after SIGTERM, if it is not its own.
+    /// The exit code after SIGTERM, if it differs from 143.
     terminated: Option<u8>,
-    /// Whether SIGTERM still ends the program with that code.
+    /// True while SIGTERM ends the program with that code.
     ends: Arc<AtomicBool>,
     stop: Option<Stop>,
 }
 
 impl Signals {
-    /// Signals that are not heeded yet.
-    pub fn unheeded(terminated: Option<u8>) -> io::Result<Signals> {
+    /// Returns signals that end the program at once.
+    pub fn immediate(terminated: Option<u8>) -> io::Result<Signals> {
         let ends = Arc::new(AtomicBool::new(true));
         if let Some(code) = terminated.filter(|_| !is_ignored(SIGTERM)) {
             flag::register_conditional_shutdown(SIGTERM, code.into(), Arc::clone(&ends))?;
@@ -79,13 +89,13 @@ impl Signals {
         })
     }
 
-    /// What they ask for, if they are heeded.
-    pub fn heeded(&self) -> Option<&Stop> {
+    /// Returns the recorded signals, if they are deferred.
+    pub fn deferred(&self) -> Option<&Stop> {
         self.stop.as_ref()
     }
 
-    /// Heeds them from now on.
-    pub fn heed(&mut self) -> io::Result<&Stop> {
+    /// Records signals from now on.
+    pub fn defer(&mut self) -> io::Result<&Stop> {
         let stop = match self.stop.take() {
             Some(stop) => stop,
             None => stop_with(self.terminated)?,
@@ -98,13 +108,12 @@ impl Signals {
 #[cfg(unix)]
 const HANG_UP: i32 = signal_hook::consts::SIGHUP;
 #[cfg(not(unix))]
-const HANG_UP: i32 = SIGTERM; // there is none
+const HANG_UP: i32 = SIGTERM; // SIGHUP does not exist
 
-/// Makes a file that grows beyond the limit of the process (`ulimit -f`) an error like a full disk, which is told and cleaned
-/// up, rather than the program's end.
+/// Makes writing beyond the file size limit (`ulimit -f`) an error, like a full disk, instead of a signal that ends the program.
 pub fn file_size_limit_is_an_error() {
     #[cfg(unix)]
-    // SAFETY: nothing runs when the signal comes, and no other thread does yet.
+    // SAFETY: no handler runs for the signal, and no other thread exists yet.
     unsafe {
         libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
     }
@@ -113,7 +122,7 @@ pub fn file_size_limit_is_an_error() {
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let mut action = std::mem::MaybeUninit::<libc::sigaction>::zeroed();
-    // SAFETY: nothing is set, and what is there is written to a place of the right type; all zeros are a value of it too.
+    // SAFETY: nothing is changed; the current action is written to a value of the right type, for which zeros are valid.
     unsafe {
         libc::sigaction(signal, std::ptr::null(), action.as_mut_ptr());
         action.assume_init().sa_sigaction == libc::SIG_IGN

@@ -10,6 +10,7 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use percent_encoding::percent_decode_str;
 
 use super::error::shown;
+use crate::memory::fallible;
 
 /// Base64 as writers have it, with padding or without.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
@@ -137,7 +138,7 @@ pub(super) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
         return Err(too_large());
     }
     let mut bytes = Vec::new();
-    bytes.try_reserve_exact(data.len() as usize)?;
+    fallible(|| bytes.try_reserve_exact(data.len() as usize))?;
     file.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
     match bytes.len() as u64 > most {
         true => Err(too_large()),

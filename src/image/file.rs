@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
 
 use super::output::{Output, Place, named, open};
+use super::temporary;
 
 /// A file in the making. It is removed when dropped; its errors name the file.
 #[derive(Debug)]
@@ -218,6 +219,7 @@ pub fn beside(path: &Path) -> io::Result<NamedTempFile> {
         let _ = file.as_file().lock();
         // Another process may have taken it for stale before the lock.
         if file.path().exists() {
+            temporary::register(file.path());
             return Ok(file);
         }
     }

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use super::{Band, Format, Layout, Metadata, Pending, SaveOptions, Sink};
 use crate::error::RenderError;
 use crate::film::mean;
+use crate::memory::fallible;
 
 /// Bytes of a pixel that the encoder of WebP takes beside the picture: another copy, of four channels, and the file, whose room is
 /// doubled as it grows.
@@ -74,7 +75,7 @@ pub fn write(
 fn room(bytes: u64) -> Option<Vec<u8>> {
     let mut room = Vec::new();
     let bytes = usize::try_from(bytes).ok()?;
-    room.try_reserve_exact(bytes).ok()?;
+    fallible(|| room.try_reserve_exact(bytes)).ok()?;
     Some(room)
 }
 

@@ -12,6 +12,7 @@ mod output;
 mod png;
 mod save_options;
 mod target;
+mod temporary;
 mod view;
 
 use crate::error::RenderError;
@@ -27,9 +28,10 @@ pub use exr::read_exr;
 pub use file::Pending;
 pub(crate) use file::{beside, remove_stale_beside};
 pub use output::Output;
-pub use png::in_memory;
+pub use png::{in_memory, is_written_by_wgray};
 pub use save_options::{BitDepth, ExrCompression, ExrType, Metadata, SaveOptions};
 pub use target::{Format, Layers, Saved, Target, files, save};
+pub use temporary::remove_temporary_files;
 pub use view::{encode, to_8_bits, to_16_bits};
 
 /// What a picture file holds.

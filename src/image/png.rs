@@ -1,8 +1,12 @@
 //! PNG files.
 
-use std::io::{self, Write};
+use std::fs::File;
+use std::io::{self, BufReader, Write};
+use std::path::Path;
 
-use ::png::{BitDepth as Bits, ColorType, Compression, Encoder, EncodingError, ScaledFloat, SrgbRenderingIntent};
+use ::png::{
+    BitDepth as Bits, ColorType, Compression, Decoder, Encoder, EncodingError, ScaledFloat, SrgbRenderingIntent,
+};
 use rayon::prelude::*;
 
 use super::view::GAMMA;
@@ -23,6 +27,17 @@ pub fn in_memory(width: u32, height: u32, rgb: &[u8]) -> io::Result<Vec<u8>> {
         .and_then(|mut writer| writer.write_image_data(rgb))
         .map_err(plain)?;
     Ok(file)
+}
+
+/// Returns true if a file is a PNG that names this program as its writer.
+pub fn is_written_by_wgray(path: &Path) -> bool {
+    let Ok(file) = File::open(path) else { return false };
+    let Ok(reader) = Decoder::new(BufReader::new(file)).read_info() else {
+        return false;
+    };
+    let texts = &reader.info().uncompressed_latin1_text;
+    let mut software = texts.iter().filter(|text| text.keyword == Metadata::SOFTWARE);
+    software.any(|text| text.text.starts_with("wgray "))
 }
 
 fn encoder<W: Write>(file: W, (width, height): (u32, u32), color: ColorType, depth: BitDepth) -> Encoder<'static, W> {

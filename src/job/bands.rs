@@ -9,6 +9,7 @@ use super::{CALL, Cut, bands};
 use crate::backend::Backend;
 use crate::error::RenderError;
 use crate::film::{Film, Form, Region};
+use crate::memory::fallible;
 
 /// What follows a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,8 +55,10 @@ pub struct Bands<'a> {
 pub struct Finished {
     /// Its pixels.
     pub film: Film,
-    /// The samples that each of them has at least; under adaptive sampling those that it was asked for.
+    /// The fewest samples of a pixel.
     pub min_samples: u32,
+    /// The samples that each pixel was to have by now: under adaptive sampling the maximum of one.
+    pub requested_samples: u32,
     /// Rays from the camera that they have got.
     pub camera_rays: u64,
 }
@@ -70,13 +73,20 @@ impl Finished {
             u64::from(x.saturating_sub(region.x0)),
         );
         let ahead = (rows * u64::from(region.width()) + columns).min(region.pixels());
-        let camera_rays = match film.form().adaptive {
-            true => film.sample_counts().map(u64::from).sum(),
-            false => region.pixels() * u64::from(pass.start) + ahead * pass.len() as u64,
+        let (camera_rays, min_samples) = match film.form().adaptive {
+            true => (
+                film.sample_counts().map(u64::from).sum(),
+                film.sample_counts().min().unwrap_or(0),
+            ),
+            false => (
+                region.pixels() * u64::from(pass.start) + ahead * pass.len() as u64,
+                pass.start,
+            ),
         };
         Finished {
             film,
-            min_samples: pass.start,
+            min_samples,
+            requested_samples: pass.start,
             camera_rays,
         }
     }
@@ -405,14 +415,14 @@ impl Band {
     }
 }
 
-/// Whether there is memory for so many bytes. Taken and given back: what is not there is an error here, and would end the
-/// program later.
+/// Checks that so many bytes can be allocated, by an allocation that is freed at once: a failure is an error here, and would
+/// end the program later.
 ///
 /// # Errors
 ///
 /// [`RenderError::Memory`] if not.
 pub fn there_is_memory(bytes: u64) -> Result<(), RenderError> {
-    match usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok()) {
+    match usize::try_from(bytes).is_ok_and(|bytes| fallible(|| Vec::<u8>::new().try_reserve_exact(bytes)).is_ok()) {
         true => Ok(()),
         false => Err(RenderError::Memory(bytes)),
     }

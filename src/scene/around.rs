@@ -1,5 +1,6 @@
 //! What surrounds a scene and what its camera sees there, in place of what its file says.
 
+use std::path::Path;
 use std::str::FromStr;
 
 use glam::DVec3;
@@ -79,7 +80,7 @@ impl FromStr for Background {
         match (text, color_of(text)) {
             ("none", _) => Ok(Background::Transparent),
             (_, Some(color)) => Ok(Background::Color(color)),
-            _ => Err(format!("must be none or a colour, {COLOR}")),
+            _ => Err(format!("must be none or a color, {COLOR}")),
         }
     }
 }
@@ -96,8 +97,9 @@ impl FromStr for EnvironmentDescription {
         if let Some(color) = color_of(text) {
             return Ok(EnvironmentDescription::new(color));
         }
-        let rule = || format!("must be studio, sky, an image file or a colour, {COLOR}");
-        if text.starts_with('#') {
+        let rule = || format!("must be an image file (.hdr, .exr, .png, .jpg), studio, sky, a color, {COLOR}");
+        let is_path = text.contains(['/', '\\', '.']) || Path::new(text).exists();
+        if text.starts_with('#') || !is_path {
             return Err(rule());
         }
         let path = std::path::absolute(text).map_err(|_| rule())?;
@@ -106,11 +108,21 @@ impl FromStr for EnvironmentDescription {
     }
 }
 
-/// What colours are like, in messages.
-const COLOR: &str = "such as #ff8000 as displays have it, or 1,0.2,0 as linear light";
+/// Examples of colors in messages.
+const COLOR: &str = "such as white, #ff8000 or 1,0.2,0 (linear)";
 
-/// `#rrggbb` by sRGB's curve, or three linear numbers.
+/// Names of colors, and their hexadecimal forms.
+const COLOR_NAMES: [(&str, &str); 4] = [
+    ("black", "#000000"),
+    ("gray", "#808080"),
+    ("grey", "#808080"),
+    ("white", "#ffffff"),
+];
+
+/// Parses a name or `#rrggbb`, decoded by the sRGB curve, or three linear numbers.
 fn color_of(text: &str) -> Option<DVec3> {
+    let named = COLOR_NAMES.into_iter().find(|(name, _)| *name == text);
+    let text = named.map_or(text, |(_, hex)| hex);
     if let Some(digits) = text.strip_prefix('#') {
         let is_hex = digits.len() == 6 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
         let whole = u32::from_str_radix(digits, 16).ok().filter(|_| is_hex)?;
@@ -158,7 +170,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
         ] {
             let told = bad.parse::<Background>().unwrap_err();
             assert!(
-                told.starts_with("must be none or a colour, such as #ff8000"),
+                told.starts_with("must be none or a color, such as white"),
                 "{bad}: {told}"
             );
         }
@@ -171,16 +183,13 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
         assert_eq!(around("sky"), EnvironmentDescription::named(EnvironmentName::Sky));
         assert_eq!(around("1,2,3"), EnvironmentDescription::new([1.0, 2.0, 3.0]));
         let here = std::env::current_dir().unwrap();
-        for (text, path) in [("./studio", "studio"), ("a/b.hdr", "a/b.hdr"), ("1,2", "1,2")] {
+        for (text, path) in [("./studio", "studio"), ("a/b.hdr", "a/b.hdr"), ("1,2.5", "1,2.5")] {
             let file = around(text).file.unwrap();
             assert_eq!(std::path::Path::new(&file), here.join(path));
         }
-        for bad in ["", "#ff"] {
+        for bad in ["", "#ff", "forest", "1,2"] {
             let told = bad.parse::<EnvironmentDescription>().unwrap_err();
-            assert!(
-                told.starts_with("must be studio, sky, an image file or a colour"),
-                "{told}"
-            );
+            assert!(told.starts_with("must be an image file (.hdr"), "{told}");
         }
     }
 

@@ -21,8 +21,8 @@ fn wrong_command_lines_exit_with_2() {
         (&["--size", "0x64"], "--size: 0 must be from 1 to 65536"),
         (&["--size", "64x65537"], "--size: 65537 must be from 1 to 65536"),
         (&["--size", "-1x4"], "-1"),
-        (&["--spp", "0"], "--pixel-samples: 0 must be from 1"),
-        (&["--spp", "many"], "--pixel-samples"),
+        (&["--spp", "0"], "--spp: 0 must be from 1"),
+        (&["--spp", "many"], "must be a whole number"),
         (&["--spp", "4", "--pixel-samples", "4"], "cannot be used multiple times"),
         (
             &["--light-samples", "10"],
@@ -48,7 +48,7 @@ fn wrong_command_lines_exit_with_2() {
         (&["--pixel-pattern", "hexagonal"], "hexagonal"),
         (
             &["--pixel-pattern", "sobol", "--adaptive", "2"],
-            "--adaptive: 2 must be from 0 to 1",
+            "must be a number from 0 to 1",
         ),
         (
             &["--pixel-pattern", "grid", "--adaptive", "0.1"],
@@ -65,7 +65,7 @@ fn wrong_command_lines_exit_with_2() {
         (&["--max-depth", "deep"], "--max-depth"),
         (
             &["--integrator", "path", "--pixel-pattern", "grid", "--spp", "5"],
-            "--pixel-samples: 5 must be a square number",
+            "--spp: 5 must be a square number",
         ),
         (&["--progress", "loud"], "--progress"),
         (&["-q", "-v"], "cannot be used with"),

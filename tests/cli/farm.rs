@@ -53,11 +53,12 @@ fn task(shell: &str, words: &[&str], variables: &[(&str, &str)]) -> Ran {
         .timeout(std::time::Duration::from_secs(60))
         .output()
         .expect("a shell");
-    Ran {
-        code: output.status.code().unwrap_or(-1),
-        stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
-        stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
-    }
+    Ran::new(
+        output.status.code(),
+        String::from_utf8_lossy(&output.stdout).into_owned(),
+        &String::from_utf8_lossy(&output.stderr),
+        &[],
+    )
 }
 
 #[cfg(unix)]
@@ -90,7 +91,7 @@ fn scripts_of_slurm_render_the_picture() {
     }
     let again = run(&tile, "2", "0");
     assert_eq!(again.code, 0);
-    assert!(again.stderr.contains("1 of 1 left out"), "{}", again.stderr);
+    assert!(again.stderr.contains("skipped 1 of 1"), "{}", again.stderr);
     let ran = run(&merge, "0", "0");
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     assert!(place.read("- {{}} '.exr") == whole);
@@ -514,7 +515,7 @@ fn what_is_not_for_farms_is_refused() {
         (
             &["small.toml", "-o", "x.png", "--frames", "1-2", "--tiles", "1"],
             2,
-            "error: --output: x.png: must have #",
+            "error: --output: x.png: needs #",
         ),
         (
             &[
@@ -622,19 +623,19 @@ fn a_part_of_another_job_is_not_skipped() {
         assert_eq!(ran.code, 0, "{}", ran.stderr);
         ran.stderr
     };
-    let skipped = "note: 1 of 1 left out, as their files are there\n";
+    let skipped = "note: skipped 1 of 1: the output files exist\n";
     assert_eq!(part("1", "0"), "");
     assert_eq!(part("1", "0"), skipped);
     let first = place.read("1.part");
-    assert!(part("2", "0").contains("is of another scene or other options, and is rendered anew"));
+    assert!(part("2", "0").contains("belongs to another scene or other options; rendering it again"));
     assert!(place.read("1.part") != first);
-    assert!(part("1", "0").contains("rendered anew"));
+    assert!(part("1", "0").contains("rendering it again"));
     assert!(place.read("1.part") == first);
     // How it is shown is told in it too.
-    assert!(part("1", "1").contains("rendered anew"));
+    assert!(part("1", "1").contains("rendering it again"));
     assert_eq!(part("1", "1"), skipped);
     fs::write(place.path("1.part"), "no part").expect("a file");
-    assert!(part("1", "0").contains("rendered anew"));
+    assert!(part("1", "0").contains("rendering it again"));
     assert!(place.read("1.part") == first);
 }
 

@@ -147,7 +147,7 @@ fn names_that_do_not_tell_frames_apart_are_refused() {
     let place = Place::new();
     moving(&place, "linear");
     fs::create_dir(place.path("a#")).unwrap();
-    let rule = "must have # for the frame's number in its name, as in out.####.png, as there are 2 frames";
+    let rule = "needs # for the frame number, such as out.####.png, with 2 frames";
     for name in ["out.png", "a#/out.png", "-", "/dev/null"] {
         let format = ["moving.toml", "--frames", "1-2", "--format", "png", "-o", name];
         refused(&place, &format, 2, &format!("--output: {name}: {rule}"));
@@ -155,10 +155,15 @@ fn names_that_do_not_tell_frames_apart_are_refused() {
     let figures = ["moving.toml", "--frames", "1-2", "-o", "#.png", "--stats", "s.json"];
     refused(&place, &figures, 2, &format!("--stats: s.json: {rule}"));
     let twice = ["moving.toml", "--frames", "1-2", "-o", "#.#.png"];
-    refused(&place, &twice, 2, "--output: #.#.png: must have all its # in one place");
+    refused(&place, &twice, 2, "--output: #.#.png: must have a single group of #");
     // Names that the numbers make the same.
     let same = ["moving.toml", "--frames", "1-12", "-o", "b#.png", "-o", "b1#.png"];
-    refused(&place, &same, 2, "--output: b11.png: frames 1 and 11 have this name");
+    refused(
+        &place,
+        &same,
+        2,
+        "--output: b11.png: frames 1 and 11 would be written to this file",
+    );
     // What is wrong with the last one alone is told before the first is rendered.
     place.write("2.exr", "");
     let mut mode = fs::metadata(place.path("2.exr")).unwrap().permissions();
@@ -169,12 +174,7 @@ fn names_that_do_not_tell_frames_apart_are_refused() {
     let texture = format!("{SCENE}[textures.t]\ntype = 'image'\nfile = 't.2.png'\n");
     place.write("textured.toml", &texture);
     let input = ["textured.toml", "--frames", "1-2", "-o", "t.#.png"];
-    refused(
-        &place,
-        &input,
-        2,
-        "--output: t.2.png: is a file that the scene is made of, and must stay",
-    );
+    refused(&place, &input, 2, "--output: t.2.png is an input of the scene");
     for (frames, told) in [
         (
             "",
@@ -182,10 +182,10 @@ fn names_that_do_not_tell_frames_apart_are_refused() {
         ),
         ("-3", "must be whole numbers"),
         ("-3--1", "must be whole numbers"),
-        ("2-1", "2-1 must go upwards, from 1 to 2"),
-        ("1-2:0", "1-2:0 must have a step of 1 or more"),
+        ("2-1", "2-1 must ascend, from 1 to 2"),
+        ("1-2:0", "1-2:0 needs a step of at least 1"),
         ("1-4000000000", "4000000000: must be whole numbers from 0 to 999999999"),
-        ("0-999999999", "must be 100000 frames at most"),
+        ("0-999999999", "must be at most 100000 frames"),
     ] {
         refused(&place, &["moving.toml", "--frames", frames, "-o", "#.png"], 2, told);
     }
@@ -215,7 +215,7 @@ fn ten_thousand_frames_are_no_cliff() {
     let arguments = [&["render"], &small[..], &["-o", "o.####.png", "--skip-existing"], &CPU].concat();
     let ran = place.run(&arguments);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert_eq!(ran.stderr, "note: 9500 of 10000 left out, as their files are there\n");
+    assert_eq!(ran.stderr, "note: skipped 9500 of 10000: the output files exist\n");
     assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
     for frame in 1..=10_000 {
         let is_rendered = !place.read(&format!("o.{frame:04}.png")).is_empty();
@@ -258,21 +258,21 @@ fn frames_that_are_there_stay_if_that_is_asked_for() {
         let ran = place.run(&[&["render"], &arguments[..], &CPU].concat());
         assert_eq!((ran.code, ran.stderr.as_str()), (0, told));
     };
-    again("note: 3 of 3 left out, as their files are there\n");
+    again("note: skipped 3 of 3: the output files exist\n");
     assert!(all.into_iter().all(is_old));
     // A frame is there if all of its files are.
     fs::remove_file(place.path("2.normal.png")).unwrap();
-    again("note: 2 of 3 left out, as their files are there\n");
+    again("note: skipped 2 of 3: the output files exist\n");
     let renewed: Vec<_> = all.into_iter().filter(|name| !is_old(name)).collect();
     assert_eq!(renewed, ["2.png", "2.normal.png"]);
     // Figures are files too, and may be streams.
     let more = [&["render"], &arguments[..], &CPU, &["--stats", "#.json"]].concat();
     assert_eq!(place.run(&more).stderr, "");
-    assert!(place.run(&more).stderr.starts_with("note: 3 of 3"));
+    assert!(place.run(&more).stderr.starts_with("note: skipped 3 of 3"));
     let more = [&["render"], &arguments[..], &CPU, &["--stats", "-"]].concat();
     let ran = place.run(&more);
     assert!(
-        ran.stdout.is_empty() && ran.stderr.starts_with("note: 3 of 3"),
+        ran.stdout.is_empty() && ran.stderr.starts_with("note: skipped 3 of 3"),
         "{}",
         ran.stderr
     );
@@ -354,10 +354,7 @@ fn progress_and_notes_say_which_frame_and_come_once() {
     let lines: Vec<&str> = ran.stderr.lines().collect();
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert_eq!(lines.len(), 2, "{}", ran.stderr);
-    assert_eq!(
-        lines[0],
-        "warning: small.toml: it has no camera.path: all frames are the same"
-    );
+    assert_eq!(lines[0], "warning: small.toml: no camera.path: all frames are equal");
     assert!(
         lines[1].starts_with("warning: rendering on the CPU: "),
         "{}",
@@ -534,9 +531,6 @@ fn scenes_in_json_take_frames_and_defines_of_their_own_keys() {
     );
     let ran = place.run(&[&["render", "a.json", "--frames", "1-2", "-o", "f#.exr"], &CPU[..]].concat());
     assert_eq!(ran.code, 0);
-    assert_eq!(
-        ran.stderr,
-        "warning: a.json: it has no camera.path: all frames are the same\n"
-    );
+    assert_eq!(ran.stderr, "warning: a.json: no camera.path: all frames are equal\n");
     assert_eq!(bits(&place, "f1.exr"), bits(&place, "f2.exr"));
 }

@@ -213,7 +213,7 @@ fn what_is_not_there_is_told_with_what_is() {
         &place,
         &["render", "still.glb", "--frames", "1-2", "--fps", "10"],
         2,
-        "--fps: is for glTF files that have animations",
+        "--fps: only applies to glTF files with animations",
     );
     refused(
         &place,
@@ -267,7 +267,7 @@ fn frames_are_moments_of_the_animation() {
         .concat(),
     );
     assert_eq!(ran.code, 0);
-    assert!(ran.stderr.contains("all frames are the same"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("all frames are equal"), "{}", ran.stderr);
     assert_eq!(pixels(&place, "named.exr"), moment(&place, "0.25"));
     // A camera that frames it stands still: what rises does not make the rest smaller.
     Model::default().write_glb(place.folder(), "box.glb");
@@ -335,7 +335,7 @@ fn a_converted_scene_has_the_same_bits() {
 fn a_conversion_keeps_what_it_reads_and_names_files_from_where_it_is() {
     let place = place(&Model::default());
     let same = ["convert", "small.toml", "-o", "./small.toml"];
-    refused(&place, &same, 2, "is a file that the scene is made of, and must stay");
+    refused(&place, &same, 2, "is an input of the scene");
     refused(
         &place,
         &["convert", "box.glb", "-o", "box.json"],

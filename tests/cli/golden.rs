@@ -34,11 +34,12 @@ impl Example {
             .env_remove("OUT")
             .output()
             .unwrap();
-        Ran {
-            code: output.status.code().unwrap_or(-1),
-            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
-            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
-        }
+        Ran::new(
+            output.status.code(),
+            String::from_utf8_lossy(&output.stdout).into_owned(),
+            &String::from_utf8_lossy(&output.stderr),
+            &[],
+        )
     }
 
     /// Makes the change that the page makes.

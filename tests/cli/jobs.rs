@@ -65,11 +65,12 @@ fn work_of(child: &Child) {
 
 fn ended(child: Child) -> Ran {
     let output = child.wait_with_output().expect("an end");
-    Ran {
-        code: output.status.code().unwrap_or(-1),
-        stdout: String::new(),
-        stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
-    }
+    Ran::new(
+        output.status.code(),
+        String::new(),
+        &String::from_utf8_lossy(&output.stderr),
+        &[],
+    )
 }
 
 /// Runs the program on the given checkpoint, from what is there to the end.
@@ -121,15 +122,16 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
     crate::cli::heed_interrupts();
     let place = Place::new();
     let expected = expected(&place);
-    let kept = "note: c has what was rendered; --resume goes on from it\nerror: cancelled\n";
-    let again = format!("{kept}note: exit code 75 asks for another try\n");
+    let kept =
+        |signal: &str| format!("note: progress is saved in c; --resume continues\nerror: interrupted by {signal}\n");
+    let retry = format!("{}note: exit code 75 requests another attempt\n", kept("SIGTERM"));
     let requeue = &["--requeue-exit", "75"][..];
-    for (signal, code, more, told) in [
-        ("-INT", 130, &[][..], kept),
-        ("-TERM", 143, &[], kept),
-        ("-HUP", 129, &[], kept),
-        ("-TERM", 75, requeue, &again),
-        ("-INT", 130, requeue, kept), // somebody wants it to end
+    for (signal, code, more, message) in [
+        ("-INT", 130, &[][..], kept("Ctrl+C (SIGINT)")),
+        ("-TERM", 143, &[], kept("SIGTERM")),
+        ("-HUP", 129, &[], kept("SIGHUP")),
+        ("-TERM", 75, requeue, retry),
+        ("-INT", 130, requeue, kept("Ctrl+C (SIGINT)")), // the user ended it
     ] {
         if !more.is_empty() && place.path("c").exists() {
             fs::remove_file(place.path("c")).expect("a checkpoint"); // so that there is work left
@@ -163,7 +165,7 @@ fn signals_end_a_render_with_a_checkpoint_and_a_code() {
         let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
         assert!(sent.expect("kill").success());
         let ran = ended(child);
-        assert_eq!((ran.code, ran.stderr.as_str()), (code, told), "{signal} {more:?}");
+        assert_eq!((ran.code, ran.stderr), (code, message), "{signal} {more:?}");
         assert!(
             fs::metadata(place.path("c")).expect("the checkpoint").len() > before,
             "{signal}"
@@ -208,10 +210,13 @@ fn a_second_writer_waits_and_goes_on() {
     assert_eq!(ended(third).code, 0);
     assert!(place.read("third.exr") == expected);
     let stats: serde_json::Value = serde_json::from_slice(&place.read("stats.json")).expect("JSON");
-    assert_eq!(stats["share_rendered"], 0.0);
+    assert_eq!(
+        (&stats["fraction_rendered"], &stats["share_rendered"]),
+        (&0.0.into(), &0.0.into())
+    );
 }
 
-/// SIGTERM asks for another try of a render that has not begun, too.
+/// SIGTERM requests another attempt before the render has begun, too.
 #[cfg(target_os = "linux")]
 fn a_farm_ends_one_that_waits(place: &Place, options: &[&str]) {
     let waiting = start(place, &[options, &["-o", "third.exr", "--requeue-exit", "75"]].concat());
@@ -279,12 +284,12 @@ fn checkpoints_of_other_jobs_are_refused() {
     assert_eq!(run(&resume).code, 0, "where there is none yet, one is begun");
     assert_eq!(place.read("c"), good, "the same job makes the same file");
     for (name, option) in [
-        ("small.toml", "that is a scene's name"),
-        ("out.png", "that is a picture's name"),
-        ("-", "must be a file"),
-        ("/dev/null", "must be a file"),
-        ("x.toml", "that is a scene's name"),
-        ("x.part", "that is a part's name"),
+        ("small.toml", "which names a scene"),
+        ("out.png", "which names an image"),
+        ("-", "must be a regular file"),
+        ("/dev/null", "must be a regular file"),
+        ("x.toml", "which names a scene"),
+        ("x.part", "which names a part"),
     ] {
         refused(&["--checkpoint", name, "--resume"], option);
     }
@@ -356,7 +361,7 @@ fn a_folder_has_a_checkpoint_for_each_job() {
     }
     let ran = run(&["--frames", "1-2"]);
     assert_eq!(ran.code, 2, "{}", ran.stderr);
-    assert!(ran.stderr.contains("--checkpoint: kept: must have #"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("--checkpoint: kept: needs #"), "{}", ran.stderr);
 }
 
 /// Pieces of another job, moved behind the header of this one.
@@ -623,26 +628,26 @@ fn parts_make_the_same_picture() {
     fs::copy(place.path("c"), place.path("c.part")).expect("a copy");
     refused(&["c.part"], "c.part: is a checkpoint");
     for (arguments, rule) in [
-        (&["merge", "all.part", "-o", "all.part"][..], "is a part's name"),
+        (&["merge", "all.part", "-o", "all.part"][..], "names a part"),
         (
             &["merge", "all.part", "-o", "all.part", "--format", "png"],
-            "--output: all.part: is a file",
+            "--output: all.part is an input",
         ),
         (
             &["render", "small.toml", "--tile", "1/7", "-o", "x.png"],
-            "--tile: needs one -o NAME.part",
+            "--tile: needs exactly one -o NAME.part",
         ),
         (
             &["render", "small.toml", "--tile", "1/7"],
-            "--tile: needs one -o NAME.part",
+            "--tile: needs exactly one -o NAME.part",
         ),
         (&["render", "small.toml", "--tile", "0/7", "-o", "x.part"], "--tile"),
         (&["render", "small.toml", "--tile", "8/7", "-o", "x.part"], "--tile"),
         (
             &["render", "small.toml", "--tile", "1/7", "-o", "x.part"],
-            "parts are whole rows, and the picture has 6 of them",
+            "parts consist of whole rows, and the image has 6",
         ),
-        (&["render", "small.toml", "-o", "x.part"], "is a part's name"),
+        (&["render", "small.toml", "-o", "x.part"], "names a part"),
     ] {
         let ran = place.run(arguments);
         assert_eq!(ran.code, 2, "{arguments:?}: {}", ran.stderr);
@@ -693,7 +698,7 @@ fn a_time_limit_ends_with_a_whole_picture() {
     let run = |more: &[&str]| place.run(&[&options[..], more].concat());
     let ran = run(&["--time-limit", "0.5", "-o", "a.png", "--stats", "a.json"]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert!(ran.stderr.starts_with("note: the time was up: "), "{}", ran.stderr);
+    assert!(ran.stderr.starts_with("note: time limit reached: "), "{}", ran.stderr);
     assert!(begun.elapsed() < Duration::from_secs(30), "{:?}", begun.elapsed());
     let stats = |name: &str| -> serde_json::Value { serde_json::from_slice(&place.read(name)).expect("JSON") };
     let least = stats("a.json")["least_samples"].as_u64().expect("a number");
@@ -715,7 +720,7 @@ fn a_time_limit_ends_with_a_whole_picture() {
         assert_eq!(ran.code, 2, "{}", ran.stderr);
         assert!(
             ran.stderr
-                .contains("--time-limit: needs samples of which a part is a picture too"),
+                .contains("--time-limit: cannot stop early with --pixel-pattern"),
             "{}",
             ran.stderr
         );

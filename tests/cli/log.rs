@@ -191,22 +191,18 @@ fn a_signal_is_an_error_with_its_exit_code() {
     let mut told = BufReader::new(child.stderr.take().expect("a pipe"))
         .lines()
         .map_while(Result::ok);
-    // From there on signals are heeded.
+    // From there on signals are deferred.
     assert!(told.any(|line| line.contains("\"ready\"")));
     // SAFETY: the process is a child that was not waited for.
     unsafe { libc::kill(child.id() as i32, libc::SIGTERM) };
     let stderr: Vec<String> = told.collect();
     let code = child.wait().expect("its end").code().unwrap_or(-1);
-    let ran = Ran {
-        code,
-        stdout: String::new(),
-        stderr: stderr.join("\n"),
-    };
+    let ran = Ran::new(Some(code), String::new(), &stderr.join("\n"), &[]);
     let lines = lines(&ran);
     let last = lines.last().expect("a line");
     assert_eq!(
         (code, &last["level"], &last["message"]),
-        (143, &"error".into(), &"cancelled".into())
+        (143, &"error".into(), &"interrupted by SIGTERM".into())
     );
     assert_eq!(last["exit_code"], 143);
     assert!(place.files().is_empty());
@@ -216,7 +212,7 @@ fn a_signal_is_an_error_with_its_exit_code() {
 fn lines_for_an_engine_are_not_json() {
     let place = Place::new();
     let (code, lines) = log(&place, &["render", "small.toml", "--progress", "openjd"]);
-    let rule = "--progress: openjd is lines of text, and --log-format json leaves none";
+    let rule = "--progress: openjd cannot be combined with --log-format json";
     assert_eq!((code, &lines[0]["message"]), (2, &rule.into()));
 }
 

@@ -110,7 +110,9 @@ fn offered(place: &Place, words: &[&str]) -> Vec<String> {
         "source <($0 completions bash)\ncompopt() {{ echo \"compopt $*\"; }}\nCOMP_WORDS=('{line}')\nCOMP_CWORD={last}\n_wgray wgray \"${{COMP_WORDS[{last}]}}\" \
          \"${{COMP_WORDS[{last} - 1]}}\"\nprintf '%s\\n' \"${{COMPREPLY[@]}}\""
     );
-    let Ran { code, stdout, stderr } = place.shell("bash", &script);
+    let Ran {
+        code, stdout, stderr, ..
+    } = place.shell("bash", &script);
     assert_eq!((code, stderr.as_str()), (0, ""), "{words:?}");
     stdout.lines().map(str::to_owned).collect()
 }

@@ -8,16 +8,21 @@ mod files;
 mod frames;
 mod gltf;
 mod golden;
+mod help;
 mod info;
 mod jobs;
 mod log;
 mod manual;
 mod messages;
 mod options;
+#[cfg(target_os = "linux")]
+mod out_of_memory;
 mod output;
 mod outputs;
 mod pictures;
 mod scene_options;
+#[cfg(unix)]
+mod summary;
 
 use std::path::Path;
 
@@ -35,11 +40,52 @@ pub fn heed_interrupts() {
     }
 }
 
-/// What a run of the program left.
+/// The result of a run of the program.
 struct Ran {
     code: i32,
     stdout: String,
+    /// Standard error without the lines of `summary`.
     stderr: String,
+    /// The lines about written images, `box.png: 1024 x 1024, 64 spp, 12.3 s`, and the progress that slow machines print.
+    summary: Vec<String>,
+}
+
+impl Ran {
+    fn new(code: Option<i32>, stdout: String, stderr: &str, arguments: &[&str]) -> Ran {
+        let asks_for_progress = arguments.contains(&"--progress");
+        let is_progress = |line: &str| !asks_for_progress && line.contains(" % done after ") && !line.starts_with('{');
+        let (summary, others): (Vec<&str>, Vec<&str>) =
+            (stderr.split_inclusive('\n')).partition(|line| is_summary(line) || is_progress(line));
+        Ran {
+            code: code.unwrap_or(-1),
+            stdout,
+            stderr: others.concat(),
+            summary: summary.iter().map(|line| line.trim_end().to_owned()).collect(),
+        }
+    }
+}
+
+/// Returns standard error without the lines about written images.
+pub fn without_summary(stderr: &str) -> String {
+    stderr.split_inclusive('\n').filter(|line| !is_summary(line)).collect()
+}
+
+/// Returns true for `NAMES: WIDTH x HEIGHT, SAMPLES spp, SECONDS s`.
+fn is_summary(line: &str) -> bool {
+    let Some((_, rest)) = line.trim_end().rsplit_once(": ") else {
+        return false;
+    };
+    let words: Vec<&str> = rest.split(' ').collect();
+    let is_number = |text: &str| text.parse::<f64>().is_ok();
+    match words.as_slice() {
+        [width, "x", height, samples, "spp,", seconds, "s"] => {
+            [*width, height.trim_end_matches(','), seconds]
+                .into_iter()
+                .all(is_number)
+                && samples.split('-').all(is_number)
+        }
+        _ => false,
+    }
 }
 
 /// 10 x 6 pixels, in which everything random differs from pixel to pixel.
@@ -99,11 +145,9 @@ impl Place {
             .timeout(std::time::Duration::from_secs(120))
             .output()
             .expect("the program runs");
-        Ran {
-            code: output.status.code().unwrap_or(-1),
-            stdout: String::from_utf8(output.stdout).expect("UTF-8"),
-            stderr: String::from_utf8(output.stderr).expect("UTF-8"),
-        }
+        let stdout = String::from_utf8(output.stdout).expect("UTF-8");
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        Ran::new(output.status.code(), stdout, &stderr, arguments)
     }
 
     /// Runs a line of a shell in which `$0` is the program.
@@ -115,14 +159,13 @@ impl Place {
             .arg(program())
             .output()
             .expect("a shell");
-        Ran {
-            code: output.status.code().unwrap_or(-1),
-            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
-            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
-        }
+        let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        let arguments: Vec<&str> = line.split_whitespace().collect();
+        Ran::new(output.status.code(), stdout, &stderr, &arguments)
     }
 
-    /// Runs the program, which must succeed in silence.
+    /// Runs the program, which must succeed without messages.
     fn quietly(&self, arguments: &[&str]) {
         let ran = self.run(arguments);
         assert_eq!(

@@ -150,6 +150,11 @@ fn adaptive_sampling_and_its_layers_are_those_of_the_library() {
         counts.contains(&16) && counts.iter().any(|count| *count > 16),
         "{counts:?}"
     );
+    let stats: serde_json::Value = serde_json::from_slice(&place.read("stats.json")).unwrap();
+    let fewest = counts.iter().min().copied();
+    for key in ["min_samples", "least_samples"] {
+        assert_eq!(stats[key].as_u64(), fewest.map(u64::from), "{key}");
+    }
     let image = exr::prelude::read_first_flat_layer_from_file(place.path("out.exr")).unwrap();
     let channels = &image.layer_data.channel_data.list;
     let names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
@@ -266,7 +271,7 @@ fn layers_of_paths_are_refused_without_paths() {
     for name in ["albedo", "direct", "indirect", "emission"] {
         let names = format!("depth,{name}");
         let ran = place.run(&["render", "small.toml", "-o", "out.exr", "--aov", &names]);
-        let message = format!("error: --aov {name}: needs integrator = \"path\", as with --integrator path\n");
+        let message = format!("error: --aov {name}: needs integrator = \"path\" (--integrator path)\n");
         assert_eq!((ran.code, ran.stderr), (2, message));
     }
     assert_eq!(place.files(), [""; 0]);
@@ -404,12 +409,14 @@ fn stats_have_the_promised_fields() {
         "width",
         "height",
         "pixel_samples",
+        "min_samples",
         "least_samples",
         "light_samples",
         "setup_s",
         "render_s",
         "total_s",
         "camera_rays",
+        "fraction_rendered",
         "share_rendered",
         "shadow_rays",
         "nominal_mrays_per_s",
@@ -419,8 +426,16 @@ fn stats_have_the_promised_fields() {
     assert_eq!(names, expected);
     let number = |name: &str| fields[name].as_f64().unwrap_or_else(|| panic!("{name} is no number"));
     assert_eq!(
-        ["width", "height", "pixel_samples", "least_samples", "light_samples"].map(number),
-        [5.0, 4.0, 3.0, 3.0, 9.0]
+        [
+            "width",
+            "height",
+            "pixel_samples",
+            "min_samples",
+            "least_samples",
+            "light_samples"
+        ]
+        .map(number),
+        [5.0, 4.0, 3.0, 3.0, 3.0, 9.0]
     );
     assert_eq!(number("camera_rays"), 60.0);
     assert!(fields["shadow_rays"].is_null());

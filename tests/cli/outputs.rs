@@ -42,27 +42,26 @@ fn with_materials(place: &Place) {
 fn nothing_that_a_mesh_names_is_replaced() {
     let place = Place::new();
     with_materials(&place);
-    let keeps = "is a file that the scene is made of, and must stay; choose another name by --output";
+    let keeps = "is an input of the scene; choose another name with --output";
     for name in ["wood.png", "spare.png"] {
         refused(
             &place,
             &["box.toml", "-o", name],
             2,
-            &format!("--output: {name}: {keeps}"),
+            &format!("--output: {name} {keeps}"),
         );
     }
     for name in ["box.mtl", "box.obj"] {
-        let told = format!("--output: {name}: {keeps}");
+        let told = format!("--output: {name} {keeps}");
         refused(&place, &["box.toml", "-o", name, "--format", "png"], 2, &told);
     }
-    let told = format!("--stats: box.mtl: {}", keeps.replace(" by --output", ""));
+    let told = format!("--stats: box.mtl {}", keeps.replace(" with --output", ""));
     refused(&place, &["box.toml", "--stats", "box.mtl"], 2, &told);
     place.quietly(&["render", "box.toml", "-o", "other.png", "--device", "cpu"]);
     let ran = place.run(&["dev", "box.toml", "--no-page", "--out", "wood.png"]);
     assert_eq!(ran.code, 2, "{}", ran.stderr);
     assert!(
-        ran.stderr
-            .contains("--out: wood.png: is a file that the scene is made of"),
+        ran.stderr.contains("--out: wood.png is an input of the scene"),
         "{}",
         ran.stderr
     );
@@ -113,15 +112,22 @@ pub fn refused(place: &Place, arguments: &[&str], code: i32, message: &str) {
 fn no_input_is_replaced() {
     let place = Place::new();
     textured(&place);
-    let keeps = "is a file that the scene is made of, and must stay; choose another name by --output";
-    refused(&place, &["tiles.toml"], 2, &format!("--output: tiles.png: {keeps}"));
+    let keeps = "is an input of the scene; choose another name with --output";
+    let foreign = "exists and was not written by wgray; name the output with -o";
+    refused(&place, &["tiles.toml"], 2, &format!("tiles.png {foreign}"));
+    refused(
+        &place,
+        &["tiles.toml", "-o", "tiles.png"],
+        2,
+        &format!("--output: tiles.png {keeps}"),
+    );
     refused(
         &place,
         &["tiles.toml", "-o", "spare.png"],
         2,
-        &format!("--output: spare.png: {keeps}"),
+        &format!("--output: spare.png {keeps}"),
     );
-    let aov = format!("--aov normal: wall.normal.png: {keeps}");
+    let aov = format!("--aov normal: wall.normal.png {keeps}");
     refused(
         &place,
         &["tiles.toml", "-o", "wall.png", "--aov", "depth,normal"],
@@ -129,7 +135,7 @@ fn no_input_is_replaced() {
         &aov,
     );
     fs::copy(place.path("small.toml"), place.path("scene.png")).unwrap();
-    refused(&place, &["scene.png"], 2, &format!("--output: scene.png: {keeps}"));
+    refused(&place, &["scene.png"], 2, &format!("scene.png {foreign}"));
     // An EXR has its AOVs inside, so that it replaces nothing.
     place.quietly(&[
         "render",
@@ -154,7 +160,7 @@ fn no_input_is_replaced_through_links() {
     std::os::unix::fs::symlink("small.toml", path("scene.json")).unwrap();
     fs::hard_link(path("tiles.png"), path("hard.png")).unwrap();
     for output in ["soft.png", "hard.png", "folder/tiles.png"] {
-        let told = format!("--output: {output}: is the file ./tiles.png, which the scene is made of and must stay");
+        let told = format!("--output: {output} is the same file as ./tiles.png, an input of the scene");
         refused(&place, &["tiles.toml", "-o", output], 2, &told);
     }
     refused(
@@ -171,20 +177,20 @@ fn no_output_is_written_twice() {
     for (arguments, told) in [
         (
             &["-o", "q", "--format", "png", "--stats", "./q"][..],
-            "--stats: ./q: is where --output writes to",
+            "--stats: ./q is also written by --output",
         ),
         (
             &["-o", "-", "--stats", "-"],
-            "--stats: standard output: is where --output writes to",
+            "--stats: standard output is also written by --output",
         ),
         (
             &["-o", "q.png", "--stats", "q.png"],
-            "--stats: q.png: must not end in .png, nor lead to such a file",
+            "--stats: q.png: must not end in .png or link to such a file",
         ),
         (&["--stats", "Q.EXR"], "--stats: Q.EXR: must not end in .exr"),
         (
             &["--stats", "other.toml"],
-            "--stats: other.toml: must not end in .toml, nor lead to such a file: that is a",
+            "--stats: other.toml: must not end in .toml or link to such a file, which names a",
         ),
         (
             &["-o", "other.toml", "--format", "exr"],
@@ -204,13 +210,9 @@ fn the_picture_of_the_development_mode_is_no_input() {
         (
             "tiles.png",
             2,
-            "--out: tiles.png: is a file that the scene is made of, and must stay; choose another name",
+            "--out: tiles.png is an input of the scene; choose another name",
         ),
-        (
-            "./spare.png",
-            2,
-            "--out: ./spare.png: is a file that the scene is made of",
-        ),
+        ("./spare.png", 2, "--out: ./spare.png is an input of the scene"),
         ("tiles.toml", 2, "--out: tiles.toml: must end in .png"),
         ("folder.png", 8, "folder.png: cannot be written: it is a folder"),
         (
@@ -232,13 +234,13 @@ fn the_format_is_told_by_the_name_or_the_option() {
         &place,
         &["small.toml", "-o", "q.png", "--format", "exr"],
         2,
-        "--format: must be what the name of --output says",
+        "--format: contradicts --output",
     );
     refused(
         &place,
         &["small.toml", "-o", "q.gif"],
         2,
-        "q.gif: must end in .png, .exr, .jpg, .jpeg or .webp, or --format must say which",
+        "q.gif: must end in .png, .exr, .jpg, .jpeg or .webp; or set --format",
     );
     place.quietly(&["render", "small.toml", "-o", "q", "--format", "exr", "--device", "cpu"]);
     place.quietly(&[
@@ -331,7 +333,7 @@ mod unix {
             &place,
             &["small.toml", "-o", "-", "--aov", "normal"],
             2,
-            "--aov normal: is a file beside a PNG, and there is none beside standard output; --format exr puts it into",
+            "--aov normal: needs a file beside standard output, which is a stream; use -o NAME.png",
         );
     }
 
@@ -344,7 +346,7 @@ mod unix {
         assert_eq!(ran.code, 2, "{}", ran.stderr);
         assert!(
             ran.stderr
-                .contains("--output: standard output: is the file ./tiles.png"),
+                .contains("--output: standard output is the same file as ./tiles.png"),
             "{}",
             ran.stderr
         );

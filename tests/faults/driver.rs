@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use std::time::Duration;
 use std::{env, fs};
 
+use crate::cli::without_summary;
 use crate::place::Place;
 use crate::sources::path as project;
 
@@ -171,7 +172,7 @@ impl Place {
         let known = |name: &str| ["scene.toml", "log", "out.exr"].contains(&name) || name.ends_with(".png");
         let strange = self.files_but(known);
         assert_eq!(strange, [""; 0], "a part of a file");
-        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        let stderr = without_summary(&String::from_utf8(output.stderr).expect("UTF-8"));
         assert!(
             !stderr.contains("panicked") && !stderr.contains("backtrace"),
             "{stderr}"

@@ -25,7 +25,7 @@ fn warned(ran: &Ran, anew: usize, rest: &[&str]) {
     for line in &lines[..anew] {
         assert!(line.starts_with("warning: llvmpipe"), "{line}");
         assert!(line.contains(": the device was lost: its driver ended it"), "{line}");
-        assert!(line.ends_with("; it is opened anew"), "{line}");
+        assert!(line.ends_with("; re-opening it"), "{line}");
     }
     for (line, start) in lines[anew..].iter().zip(rest) {
         assert!(line.starts_with(start), "{line}");
@@ -133,7 +133,11 @@ fn a_device_that_never_comes_back_is_an_error_or_leaves_the_work_to_the_cpu() {
         let requeue = ["--device", device, "--requeue-exit", "75"];
         let ran = place.run_on(driver, &requeue, &faults);
         assert_eq!((ran.code, ran.picture.is_some()), (75, false), "{lose}");
-        warned(&ran, 1, &["error: llvmpipe", "note: exit code 75 asks for another try"]);
+        warned(
+            &ran,
+            1,
+            &["error: llvmpipe", "note: exit code 75 requests another attempt"],
+        );
         let ran = place.run_on(driver, &[&AUTO[..], &requeue[2..]].concat(), &faults);
         assert_eq!(ran.code, 0, "{lose}: {}", ran.stderr);
         warned(&ran, 1, &["warning: rendering on the CPU: llvmpipe"]);

@@ -25,6 +25,18 @@ const OF_TASKS: [&str; 11] = [
     "verbose",
 ];
 
+/// Options that `-h` lists.
+const COMMON: [&str; 8] = [
+    "scene",
+    "output",
+    "size",
+    "pixel_samples",
+    "device",
+    "integrator",
+    "define",
+    "frames",
+];
+
 /// Options that are neither refused nor handed on: the files say them in their own way.
 const IN_FILES: [&str; 2] = ["frames", "output"];
 
@@ -102,7 +114,12 @@ impl FromArgMatches for Rendering {
 
 impl Args for Rendering {
     fn augment_args(command: Command) -> Command {
+        let all = ids(&render::Args::augment_args(Command::new("render")));
+        let rare = all.into_iter().filter(|id| !COMMON.contains(&id.as_str()));
         let command = render::Args::augment_args(command);
+        let command = rare.fold(command, |command, id| {
+            command.mut_arg(id, |arg| arg.hide_short_help(true))
+        });
         OF_TASKS
             .into_iter()
             // What such an option needs is not asked for: it is refused by itself.
@@ -181,7 +198,7 @@ mod tests {
                 "--define=a.b=[1, 2]",
                 "--define=c=-1",
                 "--exact-rounding",
-                "--pixel-samples=4",
+                "--spp=4",
             ]
         );
         assert_eq!(told(&rendering.merge), ["--exposure=-1", "--reproducible"]);

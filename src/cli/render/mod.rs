@@ -1,4 +1,4 @@
-//! `wgray render`: a scene file to a picture, or to several.
+//! `wgray render`: renders a scene to one image or several.
 
 mod args;
 mod once_log;
@@ -26,68 +26,67 @@ use super::log::{self, Level};
 use super::outputs::Outputs;
 use super::signal::{Signals, Stop};
 use super::stats::Stats;
-use super::{Interrupted, Usage, facts_of, plain, progress};
+use super::{Interrupted, NoThreads, Usage, facts_of, plain, progress};
 
 pub use args::{Args, parse_duration, parse_size};
 pub use trial::Trial;
 
 pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
-    let mut signals = Signals::unheeded(args.requeue_exit).context("signal handler")?;
+    let mut signals = Signals::immediate(args.requeue_exit).context("signal handler")?;
     let mut job = Job::new(&args)?;
     info!(seconds = start.elapsed().as_secs_f64(), "scene read");
     let (mut start, mut skipped) = (start, 0);
     let count = job.frames.len();
     for (frame, outputs) in std::mem::take(&mut job.frames) {
-        let is_there = args.skip_existing && outputs.are_there();
-        if is_there && outputs.part().is_none() {
+        let exists = args.skip_existing && outputs.exist();
+        if exists && outputs.part().is_none() {
             skipped += 1;
             continue;
         }
         job.go_to(frame)?;
         let plan = Plan::resolve(&args, &job.scene, &job.log, frame, start)?;
         outputs.check_size(plan.region())?;
-        if let Some(part) = outputs.part().filter(|_| is_there) {
+        if let Some(part) = outputs.part().filter(|_| exists) {
             if plan.is_done(part) {
                 skipped += 1;
                 continue;
             }
             let name = part.display();
-            let told = format!("{name} is of another scene or other options, and is rendered anew");
-            job.log.log(Level::Note, &told);
+            let message = format!("{name}: belongs to another scene or other options; rendering it again");
+            job.log.log(Level::Note, &message);
         }
         picture(&plan, outputs, &mut signals, start)?;
         start = Instant::now();
     }
     if skipped > 0 {
-        let told = format!("{skipped} of {count} left out, as their files are there");
-        job.log.log_once(Level::Note, &told);
+        let message = format!("skipped {skipped} of {count}: the output files exist");
+        job.log.log_once(Level::Note, &message);
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// What the options ask for, looked at as a whole.
+/// The scene and the frames that the options request.
 pub struct Job<'a> {
     args: &'a Args,
     pub log: OnceLog,
-    /// The scene, at the frame that was gone to.
+    /// The scene at the current frame.
     pub scene: Scene,
     fps: Option<f64>,
-    /// The frames to render, and where each goes to.
+    /// The frames to render, with their destinations.
     pub frames: Vec<(Frame, Outputs)>,
 }
 
 impl<'a> Job<'a> {
-    /// Reads the scene, and looks at all frames.
+    /// Reads the scene and checks all frames.
     pub fn new(args: &'a Args) -> anyhow::Result<Job<'a>> {
         if args.verbose {
-            log::speak();
+            log::print_events();
         }
-        if let Some(threads) = args.threads {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
-            pool.build_global().context("threads")?; // before anything else is done in parallel
-        }
+        let threads = args.threads.map_or(0, usize::from); // 0: all
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build_global().map_err(NoThreads)?; // before any parallel work, which would panic without threads
         if args.shown_progress() == progress::Mode::Openjd && log::is_json() {
-            let rule = "openjd is lines of text, and --log-format json leaves none";
+            let rule = "openjd cannot be combined with --log-format json";
             return Err(Usage(format!("--progress: {rule}")).into());
         }
         let frames = args.frames().into_iter();
@@ -106,12 +105,12 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// The pixels of a picture that the options ask for.
+    /// Returns the pixels to render of an image.
     pub fn region(&self) -> Result<Region, Problem> {
         self.args.rendering().region(&self.scene)
     }
 
-    /// Makes the scene what it is at a frame.
+    /// Moves the scene to a frame.
     pub fn go_to(&mut self, frame: Frame) -> anyhow::Result<()> {
         if let Some((number, fps)) = frame.number.zip(self.fps) {
             let mut overrides = self.args.overrides();
@@ -119,7 +118,7 @@ impl<'a> Job<'a> {
             let moment = super::load(&self.args.scene, &overrides)?;
             let before = std::mem::replace(&mut self.scene, moment);
             if self.args.options.is_framed(&self.scene) {
-                // Of the file at rest: it stands still, and a frame by itself is the same as in a run.
+                // The automatic camera frames the model at rest, so that a frame does not depend on the other frames.
                 (self.scene.camera, self.scene.camera_path) = (before.camera, before.camera_path);
             }
         }
@@ -131,15 +130,15 @@ impl<'a> Job<'a> {
     }
 }
 
-/// Reads the scene, and tells what is odd about it.
+/// Reads the scene and prints its warnings.
 fn read(args: &Args, log: &OnceLog) -> anyhow::Result<Scene> {
     let (path, overrides) = (&args.scene, args.overrides());
     let scene = progress::named(args.shown_progress(), "reading the scene", || {
         super::load(path, &overrides)
     })?;
     let still = match is_gltf(path) {
-        true => "it has no animation: all frames are the same",
-        false => "it has no camera.path: all frames are the same",
+        true => "no animation: all frames are equal",
+        false => "no camera.path: all frames are equal",
     };
     let moves = scene.camera_path.is_some() || args.fps(&scene)?.is_some();
     let still = (args.frames.is_some() && !moves).then_some(still);
@@ -149,7 +148,7 @@ fn read(args: &Args, log: &OnceLog) -> anyhow::Result<Scene> {
     Ok(scene)
 }
 
-/// Looks at all frames before the first is rendered: no output may be an input, and every camera must have a view.
+/// Checks all frames before the first is rendered: outputs must not be inputs, and every camera must be valid.
 fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame, &'a Outputs)>) -> anyhow::Result<()> {
     let inputs = [std::slice::from_ref(&args.scene), &scene.files].concat();
     let mut files = BTreeMap::new();
@@ -161,7 +160,9 @@ fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame
         for (option, name, path) in outputs.files().chain(kept) {
             if let Some(other) = files.insert(path.to_owned(), frame.number) {
                 let [this, other] = [frame.number, other].map(Option::unwrap_or_default);
-                let rule = format!("{option}: {name}: frames {other} and {this} have this name; choose another one");
+                let rule = format!(
+                    "{option}: {name}: frames {other} and {this} would be written to this file; put # into the name"
+                );
                 return Err(Usage(rule).into());
             }
         }
@@ -172,52 +173,51 @@ fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame
     Ok(())
 }
 
-/// Renders one picture, or a part of one. Signals are heeded from the first one on, and end all.
+/// Renders one image, or a part of one. Signals are deferred from the first image on, and end the command.
 fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant) -> anyhow::Result<()> {
-    let before = signals.heeded().cloned();
+    let before = signals.deferred().cloned();
     let mut checkpoint = plan.open_checkpoint(before.as_ref())?;
     let mut no_checkpoint = NoCheckpoint;
     let store: &mut dyn CheckpointStore = match &mut checkpoint {
         Some(checkpoint) => checkpoint,
         None => &mut no_checkpoint,
     };
-    let names: Vec<String> = outputs.files().map(|(_, name, _)| name.to_owned()).collect();
+    let files: Vec<String> = outputs.files().map(|(_, name, _)| name.to_owned()).collect();
+    let images = outputs.images();
     let outputs = outputs.begin().map_err(RenderError::Output)?;
-    let stop = signals.heed().context("signal handler")?;
+    let stop = signals.defer().context("signal handler")?;
     if let Some(signal) = stop.signal() {
         return Err(Interrupted(signal).into());
     }
     let mut renderer = plan.renderer(stop).map_err(|error| interrupted(error, stop))?;
     let setup = start.elapsed().as_secs_f64();
     info!(seconds = setup, "ready");
-    let took = work::write(plan, &mut renderer, outputs.places, store, stop);
-    let took = took.map_err(|error| interrupted(error.into(), stop));
-    if let (Err(error), Some(kept)) = (&took, &checkpoint) {
-        let path = kept.name().display();
-        if error.is::<Interrupted>() {
-            plan.log.log(
-                Level::Note,
-                &format!("{path} has what was rendered; --resume goes on from it"),
-            );
-        }
+    let totals = work::write(plan, &mut renderer, outputs.files, store, stop);
+    let totals = totals.map_err(|error| interrupted(error.into(), stop));
+    if totals.as_ref().is_err_and(|error| error.is::<Interrupted>()) {
+        let note = match &checkpoint {
+            Some(checkpoint) => format!(
+                "progress is saved in {}; --resume continues",
+                checkpoint.name().display()
+            ),
+            None => "no image was written; --checkpoint FILE saves the progress of a render".to_owned(),
+        };
+        plan.log.log(Level::Note, &note);
     }
-    let took = took?;
+    let totals = totals?;
     let total = start.elapsed().as_secs_f64();
-    if !log::is_json() {
-        info!(render = took.time.as_secs_f64(), seconds = total, "picture written"); // else its figures tell it
+    let stats = stats(plan, renderer.info(), &totals, setup, total);
+    let (requested, all) = (totals.requested_samples, plan.scene.pixel_samples);
+    if requested < all {
+        let note = format!("time limit reached: every pixel has at least {requested} of {all} samples");
+        plan.log.log(Level::Note, &note);
     }
-    let (least, all) = (took.min_samples, plan.scene.pixel_samples);
-    if least < all {
-        plan.log.log(
-            Level::Note,
-            &format!("the time was up: each pixel has {least} of {all} samples, or more"),
-        );
-    }
-    let stats = stats(plan, renderer.info(), &took, setup, total);
-    if log::is_json() && !plan.log.is_quiet() {
-        let stats = serde_json::to_value(&stats)?;
-        let facts = facts_of([("files", names.into()), ("stats", stats)]);
-        log::tell(Level::Info, "render done", facts);
+    match log::is_json() {
+        true => {
+            let facts = facts_of([("files", files.into()), ("stats", serde_json::to_value(&stats)?)]);
+            plan.log.log_with(Level::Info, "render done", facts);
+        }
+        false => plan.log.log(Level::Info, &summary(&images, &stats, requested)),
     }
     if let Some(file) = outputs.stats {
         stats.write(file).map_err(RenderError::Output)?;
@@ -225,7 +225,21 @@ fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant)
     Ok(())
 }
 
-/// An error, or the signal that is the reason of it.
+/// Returns a line about a written image: `box.png: 1024 x 1024, 64 spp, 12.3 s`.
+fn summary(images: &[String], stats: &Stats, requested: u32) -> String {
+    let samples = match stats.min_samples {
+        min if min < requested => format!("{min}-{requested}"), // adaptive sampling
+        _ => requested.to_string(),
+    };
+    let (width, height) = (stats.width, stats.height);
+    format!(
+        "{}: {width} x {height}, {samples} spp, {:.1} s",
+        images.join(", "),
+        stats.total_s
+    )
+}
+
+/// Returns the signal if it caused the error, else the error.
 fn interrupted(error: anyhow::Error, stop: &Stop) -> anyhow::Error {
     match (error.downcast_ref(), stop.signal()) {
         (Some(RenderError::Cancelled), Some(signal)) => Interrupted(signal).into(),
@@ -233,10 +247,10 @@ fn interrupted(error: anyhow::Error, stop: &Stop) -> anyhow::Error {
     }
 }
 
-fn stats(plan: &Plan, device: &DeviceInfo, took: &RenderTotals, setup: f64, total: f64) -> Stats {
+fn stats(plan: &Plan, device: &DeviceInfo, totals: &RenderTotals, setup: f64, total: f64) -> Stats {
     let (region, scene) = (plan.region(), &plan.scene);
-    let render = took.time.as_secs_f64();
-    let rays_now = took.camera_rays as f64 * took.fraction_rendered;
+    let render = totals.time.as_secs_f64();
+    let rays_now = totals.camera_rays as f64 * totals.fraction_rendered;
     Stats {
         frame: plan.frame.number,
         device: device.name.clone(),
@@ -245,13 +259,15 @@ fn stats(plan: &Plan, device: &DeviceInfo, took: &RenderTotals, setup: f64, tota
         width: region.width(),
         height: region.height(),
         pixel_samples: scene.pixel_samples,
-        min_samples: took.min_samples,
+        min_samples: totals.min_samples,
+        former_min_samples: totals.min_samples,
         light_samples: scene.light_samples(),
         setup_s: setup,
         render_s: render,
         total_s: total,
-        camera_rays: took.camera_rays,
-        fraction_rendered: took.fraction_rendered,
+        camera_rays: totals.camera_rays,
+        fraction_rendered: totals.fraction_rendered,
+        former_fraction_rendered: totals.fraction_rendered,
         shadow_rays: None,
         nominal_mrays_per_s: Stats::nominal(rays_now, scene.light_samples(), render),
     }

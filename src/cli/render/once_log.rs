@@ -20,11 +20,6 @@ impl OnceLog {
         }
     }
 
-    /// Returns true if only errors are printed.
-    pub fn is_quiet(&self) -> bool {
-        self.quiet
-    }
-
     /// Prints a line unless it was printed before.
     pub fn log_once(&self, level: Level, line: &str) {
         if !self.quiet && self.lines.borrow_mut().insert(line.to_owned()) {

@@ -1,9 +1,10 @@
-//! What the options of `wgray render` come to, checked against the scene.
+//! The settings of a render, resolved from the options and the scene.
 
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use tracing::info;
 use wgray::device::{FaultHandler, Recovery, Renderer};
 use wgray::error::RenderError;
 use wgray::film::Region;
@@ -24,29 +25,29 @@ use crate::cli::progress::{self, Mode};
 use crate::cli::signal::Stop;
 use crate::cli::{Interrupted, Usage, option, plain};
 
-/// All that is known of a render before it begins, but where it writes to.
+/// The settings of a render, except its destinations.
 pub struct Plan<'a> {
     pub scene: Packed,
-    /// The pixels of the picture.
+    /// The pixels of the image.
     pub picture: Region,
-    /// The part of them that is rendered, and its rows.
+    /// The part to render, and its rows.
     pub tile: Option<(Tile, Region)>,
     pub options: Options,
-    /// When to stop rendering.
+    /// Time to stop rendering at.
     pub deadline: Option<Instant>,
     pub checkpoint: Option<PathBuf>,
     checkpoint_interval: Duration,
     resume: bool,
     pub pictures: PictureOptions,
     pub view: ViewSettings,
-    pub told: RenderMetadata,
+    pub metadata: RenderMetadata,
     pub progress: Mode,
     pub log: &'a OnceLog,
     pub frame: Frame,
 }
 
 impl<'a> Plan<'a> {
-    /// What the options come to for one picture of the scene, begun at `start`.
+    /// Resolves the settings of one image, begun at `start`.
     pub fn resolve(args: &Args, scene: &Scene, log: &'a OnceLog, frame: Frame, start: Instant) -> anyhow::Result<Self> {
         if args.time_limit.is_some() {
             can_end_early(scene)?;
@@ -58,7 +59,9 @@ impl<'a> Plan<'a> {
             Some(tile) => Some((tile, rows(tile, picture)?)),
         };
         let progress = args.shown_progress();
-        let packed = progress::named(progress, "building trees", || options.pack(scene));
+        let packed = progress::named(progress, "preparing geometry, textures and lights", || {
+            options.pack(scene)
+        });
         Ok(Plan {
             picture,
             tile,
@@ -69,7 +72,7 @@ impl<'a> Plan<'a> {
             resume: args.resume,
             view: args.pictures.view(scene.view),
             pictures: args.pictures.clone(),
-            told: RenderMetadata::of(scene, &packed, args.time_limit),
+            metadata: RenderMetadata::of(scene, &packed, args.time_limit),
             scene: packed,
             progress,
             log,
@@ -77,12 +80,12 @@ impl<'a> Plan<'a> {
         })
     }
 
-    /// The pixels that are rendered.
+    /// Returns the pixels to render.
     pub fn region(&self) -> Region {
         self.tile.map_or(self.picture, |(_, rows)| rows)
     }
 
-    /// What its picture holds, if at its middle something is so far away.
+    /// Returns the layout of the image, given the depth at its center.
     pub fn layout(&self, middle_depth: f32) -> Layout {
         Layout {
             picture: (self.scene.camera.width, self.scene.camera.height),
@@ -95,41 +98,41 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Whether a file is the part that this would write, as far as can be told without a device.
+    /// Returns true if a file is the part that this render would write, by its header.
     pub fn is_done(&self, path: &Path) -> bool {
         let (Some((tile, _)), Ok((identity, found))) = (self.tile, job::read_part_header(path)) else {
             return false;
         };
         let layout = self.layout(f32::from_bits(found.middle_depth));
-        identity == self.identity() && found == PartHeader::of(tile, &layout, self.told.lasting())
+        identity == self.identity() && found == PartHeader::of(tile, &layout, self.metadata.lasting())
     }
 
-    /// What the job is.
+    /// Returns the identity of the job.
     pub fn identity(&self) -> Identity {
         Identity::of(&self.scene, self.picture, self.options.exact_rounding)
     }
 
-    /// Opens the checkpoint, if there is one; while another process writes it this one waits. That of a part is one of a
-    /// picture with its rows.
+    /// Opens the checkpoint, if any, and waits while another process writes it. The checkpoint of a part is that of an image
+    /// with its rows.
     pub fn open_checkpoint<'b>(&'b self, stop: Option<&'b Stop>) -> anyhow::Result<Option<Checkpoint<'b>>> {
         let Some(path) = &self.checkpoint else {
             return Ok(None);
         };
-        // Before signals are heeded they end the program at once.
-        let asked = move || stop.and_then(Stop::signal);
+        // Signals that are not deferred yet end the program at once.
+        let signal = move || stop.and_then(Stop::signal);
         let opening = Opening {
             path: path.clone(),
             resume: self.resume,
             interval: self.checkpoint_interval,
-            wait: Box::new(move || asked().is_none() && self.deadline.is_none_or(|end| Instant::now() < end)),
+            wait: Box::new(move || signal().is_none() && self.deadline.is_none_or(|end| Instant::now() < end)),
             tell: Box::new(|what| self.log.log(Level::Warning, what)),
         };
         let identity = Identity::of(&self.scene, self.region(), self.options.exact_rounding);
         match Checkpoint::open(opening, identity, self.scene.form()) {
             Ok(checkpoint) => Ok(Some(checkpoint)),
-            Err(error @ CheckpointError::Busy(_)) => Err(match asked() {
+            Err(error @ CheckpointError::Busy(_)) => Err(match signal() {
                 Some(signal) => Interrupted(signal).into(),
-                None => anyhow::anyhow!("--checkpoint: {error}, and the time is up"),
+                None => anyhow::anyhow!("--checkpoint: {error}, and the time limit is reached"),
             }),
             Err(CheckpointError::Io { path, error }) => {
                 let message = format!("--checkpoint: {}: {error}", path.display());
@@ -139,20 +142,23 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Makes the device ready for the scene.
+    /// Opens the device and prepares it for the scene.
     pub fn renderer<'b>(&'b self, stop: &'b Stop) -> anyhow::Result<Renderer<'b>> {
         let on_fault = FaultHandler {
             tell: Box::new(|why, remedy| match remedy {
-                Recovery::Reopen => self.log.log(Level::Warning, &format!("{why}; it is opened anew")),
+                Recovery::Reopen => self.log.log(Level::Warning, &format!("{why}; re-opening it")),
                 Recovery::Cpu => self
                     .log
                     .log_once(Level::Warning, &format!("rendering on the CPU: {why}")),
             }),
             stopped: Box::new(|| stop.signal().is_some()),
         };
-        let renderer = Renderer::new(&self.scene, &self.options, on_fault).map_err(plain)?;
+        let renderer = progress::named(self.progress, "opening the device and compiling kernels", || {
+            Renderer::new(&self.scene, &self.options, on_fault)
+        });
+        let renderer = renderer.map_err(plain)?;
         if let Some(why) = renderer.why() {
-            self.log.log_once(Level::Note, why);
+            info!("{why}");
         }
         Ok(renderer)
     }
@@ -160,19 +166,19 @@ impl<'a> Plan<'a> {
 
 fn rows(tile: Tile, picture: Region) -> Result<Region, Usage> {
     let rule = format!(
-        "--tile: {tile}: parts are whole rows, and the picture has {} of them",
+        "--tile: {tile}: parts consist of whole rows, and the image has {}",
         picture.height()
     );
     tile.rows(picture).ok_or(Usage(rule))
 }
 
-/// Whether some samples of every pixel are a picture of the scene.
+/// Checks that a prefix of each pixel's samples covers the pixel.
 fn can_end_early(scene: &Scene) -> Result<(), Usage> {
     let pattern = scene.render.pixel_samples.pattern;
     match pattern.needs_square() {
         false => Ok(()),
         true => Err(Usage(format!(
-            "--time-limit: needs samples of which a part is a picture too, which {} is not; --pixel-pattern sobol is",
+            "--time-limit: cannot stop early with --pixel-pattern {}; use sobol",
             pattern.name()
         ))),
     }

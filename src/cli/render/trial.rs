@@ -1,4 +1,4 @@
-//! How long a job would take here: a few strips of one picture are rendered for a moment.
+//! Estimates the time of a job on this machine, by rendering strips of one image for a moment.
 
 use std::time::{Duration, Instant};
 
@@ -13,27 +13,27 @@ use super::{Job, interrupted};
 use crate::cli::frames::Frame;
 use crate::cli::signal;
 
-/// Strips of the picture that are tried, as far apart as can be.
+/// Number of strips, spread evenly over the image.
 const STRIPS: u32 = 16;
-/// How long each of them is tried, unless it is finished before.
+/// Maximum time for each strip.
 const PATIENCE: Duration = Duration::from_millis(250);
-/// The most pixels of a strip: enough to fill a device.
+/// Maximum number of pixels of a strip: enough to fill a device.
 const PIXELS: u64 = 1 << 16;
 
-/// What a trial has found.
+/// The result of a trial.
 pub struct Trial {
-    /// What rendered.
+    /// The name of the device.
     pub device: String,
-    /// From the start of the program until the device is ready: a task needs it whatever it renders.
+    /// Time from the start of the program until the device is ready, needed by every task.
     pub fixed: Duration,
-    /// The rendering of all pixels, in seconds.
+    /// Seconds to render all pixels.
     pub rendering: f64,
-    /// How much longer than the mean the slowest strip takes.
+    /// Time of the slowest strip relative to the mean.
     pub unevenness: f64,
 }
 
 impl Trial {
-    /// Tries one frame of a job, in a program that was begun at `start`.
+    /// Renders strips of one frame, in a program that was started at `start`.
     pub fn of(job: &mut Job, frame: Frame, start: Instant) -> anyhow::Result<Trial> {
         job.go_to(frame)?;
         let plan = Plan::resolve(job.args, &job.scene, &job.log, frame, start)?;
@@ -59,7 +59,7 @@ impl Trial {
     }
 }
 
-/// Whole rows, as parts are.
+/// Returns strips of whole rows, as parts have.
 fn strips(region: Region) -> impl Iterator<Item = Region> {
     let height = region.height();
     let count = height.min(STRIPS);
@@ -77,7 +77,7 @@ fn strips(region: Region) -> impl Iterator<Item = Region> {
     })
 }
 
-/// How long a pixel with all its samples takes, in the mean over a strip.
+/// Returns the mean time of a pixel with all its samples, over a strip.
 fn seconds_of_a_pixel(
     backend: &mut dyn Backend,
     strip: Region,
@@ -86,8 +86,8 @@ fn seconds_of_a_pixel(
 ) -> Result<f64, RenderError> {
     let (start, mut done) = (Instant::now(), 0.0);
     let mut is_stopped = false;
-    let mut progress = |share: f64| {
-        done = share;
+    let mut progress = |fraction: f64| {
+        done = fraction;
         is_stopped = stopped();
         !is_stopped && start.elapsed() < PATIENCE
     };
@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strips_lie_in_the_picture_and_apart() {
+    fn strips_lie_in_the_image_and_do_not_overlap() {
         for (width, height) in [
             (1, 1),
             (1, 16),

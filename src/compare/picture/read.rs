@@ -8,6 +8,7 @@ use std::sync::Arc;
 use image::{DynamicImage, ImageDecoder as _, ImageFormat, ImageReader, Limits};
 
 use super::{Channel, Kind, Picture, Plane};
+use crate::memory::fallible;
 use crate::waiting;
 
 /// What a decoder may take beside the picture, in bytes.
@@ -173,7 +174,7 @@ pub(super) fn room<T>(width: u64, height: u64, count: u64) -> Result<Vec<T>, Unr
     };
     let mut values = Vec::new();
     match usize::try_from(count) {
-        Ok(count) if values.try_reserve_exact(count).is_ok() => Ok(values),
+        Ok(count) if fallible(|| values.try_reserve_exact(count)).is_ok() => Ok(values),
         _ => Err(refused),
     }
 }

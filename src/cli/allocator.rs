@@ -1,0 +1,110 @@
+//! The global allocator: the system's, except that the program ends with exit code 7 when memory runs out where no caller
+//! handles it. The standard library would abort instead, and leave temporary files behind.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::fmt::{self, Write as _};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use super::log;
+
+struct Allocator;
+
+#[global_allocator]
+static ALLOCATOR: Allocator = Allocator;
+
+// SAFETY: the system allocator fulfils the contract, and its results are passed on.
+unsafe impl GlobalAlloc for Allocator {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: the caller's promises are those that the system's allocator needs.
+        checked(unsafe { System.alloc(layout) }, layout.size())
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: as above.
+        checked(unsafe { System.alloc_zeroed(layout) }, layout.size())
+    }
+
+    unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        // SAFETY: as above.
+        checked(unsafe { System.realloc(memory, layout, size) }, size)
+    }
+
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(memory, layout) }
+    }
+}
+
+fn checked(memory: *mut u8, size: usize) -> *mut u8 {
+    if memory.is_null() && !wgray::memory::is_fallible() {
+        end(size);
+    }
+    memory
+}
+
+/// Ends the program without allocating.
+#[cold]
+pub fn end(size: usize) -> ! {
+    static ENDING: AtomicBool = AtomicBool::new(false);
+    if ENDING.swap(true, Ordering::Relaxed) {
+        // Another thread prints the line and ends the program.
+        loop {
+            std::thread::sleep(Duration::from_secs(1));
+        }
+    }
+    let mut line = Line::default();
+    let message = format_args!("out of memory: cannot allocate {size} bytes (--size, --crop, --threads)");
+    let _ = match log::is_json() {
+        true => writeln!(line, r#"{{"level":"error","message":"{message}","exit_code":7}}"#),
+        false => writeln!(line, "error: {message}"),
+    };
+    wgray::image::remove_temporary_files();
+    line.print();
+    #[cfg(unix)]
+    // SAFETY: it ends the process, and runs nothing of it.
+    unsafe {
+        libc::_exit(7)
+    }
+    #[cfg(not(unix))]
+    std::process::exit(7)
+}
+
+/// A line in fixed memory.
+struct Line {
+    bytes: [u8; 256],
+    len: usize,
+}
+
+impl Default for Line {
+    fn default() -> Line {
+        Line {
+            bytes: [0; 256],
+            len: 0,
+        }
+    }
+}
+
+impl Line {
+    /// Writes the line to standard error, past locks that this thread may hold.
+    fn print(&self) {
+        let bytes = &self.bytes[..self.len];
+        #[cfg(unix)]
+        // SAFETY: the bytes are initialized; the result does not matter.
+        unsafe {
+            libc::write(libc::STDERR_FILENO, bytes.as_ptr().cast(), bytes.len());
+        }
+        #[cfg(not(unix))]
+        let _ = std::io::Write::write_all(&mut std::io::stderr(), bytes);
+    }
+}
+
+impl fmt::Write for Line {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        let end = self.len + text.len();
+        let room = self.bytes.get_mut(self.len..end).ok_or(fmt::Error)?;
+        room.copy_from_slice(text.as_bytes());
+        self.len = end;
+        Ok(())
+    }
+}

@@ -1,0 +1,79 @@
+//! Better messages for common mistakes on the command line.
+
+use std::path::Path;
+
+use clap::builder::StyledStr;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use wgray::visible::visible;
+
+/// Options of other renderers, and what to use here.
+const OPTIONS: [(&str, &str); 9] = [
+    ("--width", "--size WIDTHxHEIGHT"),
+    ("--height", "--size WIDTHxHEIGHT"),
+    ("--resolution", "--size WIDTHxHEIGHT"),
+    ("--res", "--size WIDTHxHEIGHT"),
+    ("--bounces", "--max-depth N"),
+    ("--depth", "--max-depth N"),
+    ("--cpu", "--device cpu"),
+    ("--gpu", "--device gpu"),
+    ("--resolution-x", "--size WIDTHxHEIGHT"),
+];
+
+/// Extensions of files that `wgray render` may be asked to show.
+const SCENES: [&str; 7] = ["toml", "json", "gltf", "glb", "obj", "ply", "stl"];
+
+/// Maximum length of a word of the command line in a message, in characters.
+const MAX_WORD_LEN: usize = 200;
+
+/// Adds a hint to an error, and makes its words printable and short.
+pub fn improve(mut error: clap::Error) -> clap::Error {
+    if let Some(hint) = hint(&error) {
+        error.remove(ContextKind::SuggestedArg);
+        error.remove(ContextKind::SuggestedSubcommand);
+        error.insert(
+            ContextKind::Suggested,
+            ContextValue::StyledStrs(vec![StyledStr::from(hint)]),
+        );
+    }
+    for kind in [
+        ContextKind::InvalidArg,
+        ContextKind::InvalidSubcommand,
+        ContextKind::InvalidValue,
+    ] {
+        let Some(ContextValue::String(word)) = error.get(kind) else {
+            continue;
+        };
+        let shown = visible(word);
+        let shown = match shown.chars().count() {
+            0..=MAX_WORD_LEN => shown.into_owned(),
+            _ => shown.chars().take(MAX_WORD_LEN).chain("...".chars()).collect(),
+        };
+        if shown != *word {
+            error.insert(kind, ContextValue::String(shown));
+            error.remove(ContextKind::Suggested); // it repeats the word as it is
+        }
+    }
+    error
+}
+
+fn hint(error: &clap::Error) -> Option<String> {
+    let word = |kind| match error.get(kind) {
+        Some(ContextValue::String(word)) => Some(word.as_str()),
+        _ => None,
+    };
+    match error.kind() {
+        ErrorKind::UnknownArgument => {
+            let word = word(ContextKind::InvalidArg)?;
+            let (_, option) = OPTIONS.into_iter().find(|(name, _)| *name == word)?;
+            Some(format!("use '{option}'"))
+        }
+        ErrorKind::InvalidSubcommand => {
+            let word = word(ContextKind::InvalidSubcommand)?;
+            let extension = Path::new(word).extension()?.to_str()?.to_lowercase();
+            SCENES
+                .contains(&extension.as_str())
+                .then(|| format!("to render it, use 'wgray render {word}'"))
+        }
+        _ => None,
+    }
+}

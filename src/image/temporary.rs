@@ -1,0 +1,101 @@
+//! The paths of temporary files, for programs that end without unwinding.
+
+use std::path::Path;
+use std::sync::{Mutex, TryLockError};
+
+#[cfg(unix)]
+type Name = std::ffi::CString;
+#[cfg(not(unix))]
+type Name = std::path::PathBuf;
+
+static NAMES: Mutex<Vec<Name>> = Mutex::new(Vec::new());
+
+/// Number of names from which on those of files that no longer exist are dropped.
+const PRUNE_FROM: usize = 64;
+
+/// Adds the path of a temporary file.
+pub(super) fn register(path: &Path) {
+    let Some(name) = name(path) else { return };
+    let Ok(mut names) = NAMES.lock() else { return };
+    if names.len() >= PRUNE_FROM {
+        names.retain(|name| exists(name));
+    }
+    // An allocation that ends the program under the lock would keep `remove_temporary_files` from it.
+    if crate::memory::fallible(|| names.try_reserve(1)).is_ok() {
+        names.push(name);
+    }
+}
+
+/// Removes the files that are not complete, without allocating.
+pub fn remove_temporary_files() {
+    const ATTEMPTS: usize = 1000;
+    for _ in 0..ATTEMPTS {
+        let names = match NAMES.try_lock() {
+            Ok(names) => names,
+            Err(TryLockError::Poisoned(names)) => names.into_inner(),
+            Err(TryLockError::WouldBlock) => {
+                std::thread::yield_now();
+                continue;
+            }
+        };
+        names.iter().for_each(remove);
+        return;
+    }
+}
+
+#[cfg(unix)]
+fn name(path: &Path) -> Option<Name> {
+    use std::os::unix::ffi::OsStrExt as _;
+    let path = std::path::absolute(path).ok()?;
+    Name::new(path.as_os_str().as_bytes()).ok()
+}
+
+#[cfg(unix)]
+fn exists(name: &Name) -> bool {
+    rustix::fs::access(name.as_c_str(), rustix::fs::Access::EXISTS).is_ok()
+}
+
+#[cfg(unix)]
+fn remove(name: &Name) {
+    let _ = rustix::fs::unlink(name.as_c_str());
+}
+
+#[cfg(not(unix))]
+fn name(path: &Path) -> Option<Name> {
+    std::path::absolute(path).ok()
+}
+
+#[cfg(not(unix))]
+fn exists(name: &Name) -> bool {
+    name.exists()
+}
+
+#[cfg(not(unix))]
+fn remove(name: &Name) {
+    let _ = std::fs::remove_file(name);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn registered_files_are_removed_and_others_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let paths: Vec<_> = (0..PRUNE_FROM + 3).map(|i| folder.path().join(i.to_string())).collect();
+        for path in &paths {
+            std::fs::write(path, "").unwrap();
+            register(path);
+        }
+        let other = folder.path().join("other");
+        std::fs::write(&other, "").unwrap();
+        // The files of other tests stay: only these names are removed.
+        let names = NAMES.lock().unwrap();
+        names
+            .iter()
+            .filter(|one| paths.iter().any(|path| name(path).as_ref() == Some(*one)))
+            .for_each(remove);
+        drop(names);
+        assert!(paths.iter().all(|path| !path.exists()) && other.exists());
+    }
+}
