@@ -95,6 +95,7 @@ function showBadge() {
     : isFull ? ["Viewer limit reached. Waiting for a free slot…", "lost"]
     : !isLinked ? ["Connection lost. Reconnecting…", "lost"]
     : state?.compiling ? ["Compiling…", "waits"]
+    : state?.reading ? ["Reading files…", "waits"]
     : !picture.header && state?.problems.length ? [errorBadge(state), "lost"]
     : !picture.header ? ["Waiting for the first image…", "waits"]
     : state?.no_comparison ? [state.no_comparison, "lost"]
