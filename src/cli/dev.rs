@@ -1,4 +1,4 @@
-//! `wgray dev`: a scene that is rendered anew as it and its shaders are saved, on a page.
+//! `wgray dev`: renders a scene again whenever it or its shaders are saved, and shows it on a web page.
 
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use clap::ValueHint;
 use clap::builder::NonEmptyStringValueParser;
 use wgray::dev::{Diagnostic, Listener, Measured, Report, Session, Settings, Sources, StartError, measure};
 use wgray::error::RenderError;
-use wgray::gpu::Choice;
+use wgray::gpu::AdapterChoice;
 use wgray::image::Output;
 use wgray::scene::{Define, Description, Overrides, Scene, SceneError};
 
@@ -21,56 +21,54 @@ use super::render::parse_size;
 use super::scene_options::SceneOptions;
 use super::signal;
 
-/// The arguments as they are written.
+/// Arguments of `wgray dev`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = super::EXIT_CODES)]
 pub struct Args {
-    /// Scene file; docs/scene-format.md says what is in it
+    /// Scene file
     scene: PathBuf,
 
-    /// Where the page is. Who can reach this address can look, and can change values of the
-    /// scene file and marked constants of the shaders
+    /// Serve the page at this address. Anyone who can reach it can view the scene and edit values of the scene file and
+    /// annotated shader constants
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7878", value_parser = NonEmptyStringValueParser::new())]
     listen: String,
 
-    /// Folder of the shaders, with the files of the project's own. If absent: ./shaders if it is such a folder, else the
-    /// shaders in the program, which cannot change
-    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
-    shaders: Option<PathBuf>,
-
-    /// What renders. auto or gpu: a real GPU, else software Vulkan; NAME: the adapter with this as a part of its name,
-    /// driver or type, or with this number in the list of wgray devices
-    #[arg(long, value_name = "auto|gpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
-    device: String,
-
-    /// Size of the picture in pixels, in place of the scene's
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    size: Option<(u32, u32)>,
-
-    /// Folder that the files named by the scene, such as textures, must lie in, instead of the scene's own
-    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
-    asset_root: Option<PathBuf>,
-
-    /// Puts a value in place of the scene's: -D render.seed=3
-    #[arg(short = 'D', long, value_name = "KEY=VALUE")]
-    define: Vec<Define>,
-
-    /// Picture to write after each reload, once every pixel has a sample and again when all are there
+    /// Write the image to this file after each reload
     #[arg(short, long, value_name = "FILE.png")]
     out: Option<PathBuf>,
 
-    /// No page: what is seen is the file of --out
+    /// Override the image size, in pixels
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(u32, u32)>,
+
+    /// Watch the shaders in this folder [default: ./shaders if it exists, else the built-in shaders]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    shaders: Option<PathBuf>,
+
+    /// Render on this device: auto and gpu prefer a GPU over software Vulkan; NAME is part of an adapter's name, or its
+    /// number in `wgray devices`
+    #[arg(long, value_name = "auto|gpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
+    device: String,
+
+    /// Override a scene value: -D render.seed=3
+    #[arg(short = 'D', long, value_name = "KEY=VALUE")]
+    define: Vec<Define>,
+
+    /// Allow the scene to read files from this folder instead of its own
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    asset_root: Option<PathBuf>,
+
+    /// Open source lines in an editor by this URL, with {file} and optionally {line} and {column}, or disable the links
+    #[arg(long, value_name = "URL|off", default_value = "vscode://file/{file}:{line}:{column}", value_parser = NonEmptyStringValueParser::new())]
+    editor: String,
+
+    /// Serve no page; requires --out
     #[arg(long, conflicts_with = "listen")]
     no_page: bool,
 
-    /// Measures the time from a save to the picture, on copies of the files, and prints it
+    /// Measure the time from a save to the image on copies of the files, print it, and exit
     #[arg(long, conflicts_with_all = ["listen", "out", "no_page"])]
     measure: bool,
-
-    /// What the page's links to source lines open: an address of an editor with {file}, {line} and {column}, such as
-    /// idea://open?file={file}&line={line}; off: no such links
-    #[arg(long, value_name = "URL|off", default_value = "vscode://file/{file}:{line}:{column}", value_parser = NonEmptyStringValueParser::new())]
-    editor: String,
 
     #[command(flatten)]
     options: SceneOptions,
@@ -88,34 +86,37 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         shaders: shaders(args.shaders)?,
     };
     let device = match args.device.to_lowercase().as_str() {
-        "auto" => Choice::Auto,
-        "gpu" => Choice::Gpu,
+        "auto" => AdapterChoice::Auto,
+        "gpu" => AdapterChoice::Gpu,
         "cpu" => {
-            return Err(Usage("--device: cpu runs no shaders; dev needs a GPU or software Vulkan".to_string()).into());
+            return Err(Usage(
+                "--device: cpu cannot run shaders; use a GPU or software Vulkan, such as lavapipe".to_string(),
+            )
+            .into());
         }
-        _ => Choice::Named(args.device),
+        _ => AdapterChoice::Named(args.device),
     };
     if args.measure {
         return measured(&sources, device);
     }
     if args.no_page && args.out.is_none() {
-        return Err(Usage("--no-page: --out FILE.png must say where the picture goes".to_string()).into());
+        return Err(Usage("--no-page requires --out FILE.png".to_string()).into());
     }
-    // Until the session has read the scene, its meshes are kept, and read once.
+    // TimeRecord until the session has read the scene, so that its meshes are read once.
     let scene = args
         .out
         .as_ref()
         .and_then(|_| Scene::load_with(&sources.scene, &sources.overrides).ok());
-    let out = (args.out.as_deref()).map(|out| checked(out, &sources, scene.as_ref()));
+    let out = (args.out.as_deref()).map(|out| check_output(out, &sources, scene.as_ref()));
     let out = out.transpose()?;
     let listener = if args.no_page {
         None
     } else {
-        Some(Listener::open(&args.listen).map_err(|error| anyhow!("--listen: {error}"))?)
+        Some(Listener::open(&args.listen).map_err(|error| listen_error(&args.listen, &error))?)
     };
     let editor = editor(&args.editor)?;
     let terminal = Terminal::new();
-    let what = format!("{}: watched", watched(&sources));
+    let watching = format!("Watching {}", watched(&sources));
     let session = Session::start(Settings {
         sources,
         device,
@@ -130,28 +131,35 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         error => anyhow::Error::from(error),
     })?;
     drop(scene);
-    terminal.line("", &what);
+    terminal.line("", &watching);
     let Some(listener) = listener else {
-        Terminal::new().line("", &format!("{}: the picture", args.out.unwrap_or_default().display()));
+        Terminal::new().line("", &format!("Writing {}", args.out.unwrap_or_default().display()));
         loop {
             std::thread::park(); // until the user interrupts
         }
     };
     let address = listener.address()?;
-    Terminal::new().line("", &format!("http://{address}/: the page; Ctrl+C ends"));
+    Terminal::new().line("", &format!("Open http://{address}/ (Ctrl+C to quit)"));
     if !address.ip().is_loopback() {
-        let told = format!(
-            "{address} is no loopback address: everybody who can reach it can look, and can change values \
-             of the scene file and marked constants of the shaders"
+        let warning = format!(
+            "{address} is not a loopback address: anyone who can reach it can view the scene and edit values of the scene \
+             file and annotated shader constants"
         );
-        log::say(Level::Warning, &told);
+        log::say(Level::Warning, &warning);
     }
     listener.serve(&session)?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Schemes of addresses that are no editor's: browsers and systems do other things with them.
-const NO_EDITORS: [&str; 14] = [
+fn listen_error(address: &str, error: &io::Error) -> anyhow::Error {
+    match (error.kind(), address.rsplit_once(':')) {
+        (io::ErrorKind::AddrInUse, Some((_, port))) => anyhow!("Port {port} is in use; choose another with --listen"),
+        _ => anyhow!("--listen: {error}"),
+    }
+}
+
+/// URL schemes that browsers and operating systems give other meanings.
+const NON_EDITOR_SCHEMES: [&str; 14] = [
     "javascript",
     "data",
     "http",
@@ -168,43 +176,46 @@ const NO_EDITORS: [&str; 14] = [
     "view-source",
 ];
 
-/// The form of links that open an editor; `None` for no such links.
-fn editor(told: &str) -> anyhow::Result<Option<String>> {
-    if told == "off" {
+/// Parses the template of links to an editor; `None` disables the links.
+fn editor(template: &str) -> anyhow::Result<Option<String>> {
+    if template == "off" {
         return Ok(None);
     }
-    let refused = |rule: &str| Err(Usage(format!("--editor: {told}: {rule}")).into());
-    let (scheme, rest) = told.split_once(':').unwrap_or(("", told));
+    let refuse = |rule: &str| Err(Usage(format!("--editor: {template}: {rule}")).into());
+    let (scheme, rest) = template.split_once(':').unwrap_or(("", template));
     let letters = scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
     if !scheme.starts_with(|c: char| c.is_ascii_alphabetic()) || !letters {
-        return refused("must begin with an editor's scheme, such as vscode:, or be off");
+        return refuse("must start with the URL scheme of an editor, such as vscode:, or be off");
     }
-    if NO_EDITORS.iter().any(|known| scheme.eq_ignore_ascii_case(known)) {
-        return refused(&format!("{scheme}: is no editor's scheme"));
+    if NON_EDITOR_SCHEMES
+        .iter()
+        .any(|known| scheme.eq_ignore_ascii_case(known))
+    {
+        return refuse(&format!("{scheme}: is not the URL scheme of an editor"));
     }
     if rest.contains(|c: char| c.is_whitespace() || c.is_control()) {
-        return refused("must have no blanks");
+        return refuse("must not contain white space");
     }
     let unknown = ["{file}", "{line}", "{column}"]
         .iter()
         .fold(rest.to_string(), |rest, known| rest.replace(known, ""));
     if unknown.contains(['{', '}']) || !rest.contains("{file}") {
-        return refused("must have {file}, may have {line} and {column}, and no other braces");
+        return refuse("must contain {file}, may contain {line} and {column}, and no other braces");
     }
-    Ok(Some(told.to_string()))
+    Ok(Some(template.to_string()))
 }
 
-/// The file that --out means, behind its links: no file that is watched, nor anything but a PNG file.
-fn checked(out: &Path, sources: &Sources, loaded: Option<&Scene>) -> anyhow::Result<PathBuf> {
+/// Resolves the links of `--out`, and refuses watched files and anything but a PNG file.
+fn check_output(out: &Path, sources: &Sources, loaded: Option<&Scene>) -> anyhow::Result<PathBuf> {
     let is_png = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
     if !is_png(out) {
         return Err(Usage(format!("--out: {}: must end in .png", out.display())).into());
     }
     let output = Output::find(out).map_err(RenderError::Output)?;
     let Some(path) = output.path() else {
-        return Err(Usage(format!("--out: {}: must be a file, which is replaced", out.display())).into());
+        return Err(Usage(format!("--out: {}: must be a regular file", out.display())).into());
     };
-    let text = std::fs::read_to_string(&sources.scene).unwrap_or_default(); // that of a glTF file describes nothing
+    let text = std::fs::read_to_string(&sources.scene).unwrap_or_default(); // the text of a glTF file is not a description
     let described = Description::parse(&text, &sources.scene.display().to_string()).ok();
     let folder = sources.scene.parent().unwrap_or(Path::new(""));
     let named = described.iter().flat_map(|described| described.files(folder));
@@ -215,11 +226,11 @@ fn checked(out: &Path, sources: &Sources, loaded: Option<&Scene>) -> anyhow::Res
     Ok(path.to_owned())
 }
 
-/// The folder of the shaders, if they are not those in the program.
-fn shaders(told: Option<PathBuf>) -> anyhow::Result<Option<PathBuf>> {
-    match told {
+/// Returns the folder of the shaders; `None` for the built-in ones.
+fn shaders(given: Option<PathBuf>) -> anyhow::Result<Option<PathBuf>> {
+    match given {
         Some(folder) if folder.is_dir() => Ok(Some(folder)),
-        Some(folder) => Err(Usage(format!("--shaders: {}: is no folder", folder.display())).into()),
+        Some(folder) => Err(Usage(format!("--shaders: {}: is not a folder", folder.display())).into()),
         None => Ok(Some(PathBuf::from("shaders")).filter(|folder| folder.join("kernels/render.wgsl").is_file())),
     }
 }
@@ -228,11 +239,11 @@ fn watched(sources: &Sources) -> String {
     let scene = sources.scene.display();
     match &sources.shaders {
         Some(folder) => format!("{scene} and {}", folder.join("").display()),
-        None => format!("{scene}, with the shaders in the program"),
+        None => format!("{scene} (built-in shaders)"),
     }
 }
 
-/// What happens, line by line on standard error.
+/// Reports events on standard error, one per line.
 #[derive(Clone, Copy)]
 struct Terminal {
     colored: bool,
@@ -253,40 +264,40 @@ impl Terminal {
     fn report(self, report: &Report) {
         match report {
             Report::Problem(problem) => self.problem(problem),
-            Report::Mended => self.line(GREEN, "no errors any more"),
+            Report::Mended => self.line(GREEN, "All errors fixed"),
             Report::Reloaded {
                 seconds,
                 compiled: None,
-            } => self.line("", &format!("picture after {}", time(*seconds))),
+            } => self.line("", &format!("Image after {}", time(*seconds))),
             Report::Reloaded {
                 seconds,
                 compiled: Some(compiled),
             } => {
                 self.line(
                     "",
-                    &format!("picture after {}, {} of it to compile", time(*seconds), time(*compiled)),
+                    &format!("Image after {}, including {} to compile the shaders", time(*seconds), time(*compiled)),
                 );
             }
-            Report::Finished { seconds } => self.line("", &format!("all samples after another {}", time(*seconds))),
+            Report::Finished { seconds } => self.line("", &format!("Finished after another {}", time(*seconds))),
             Report::Note(note) => self.line("", &format!("note: {note}")),
             Report::Smaller([width, height], [less_wide, less_high]) => self.line(
                 "",
                 &format!(
-                    "{width} x {height} pixels are too many to be shown: every picture here is {less_wide} x {less_high}; \
-                     wgray render makes the whole one"
+                    "{width} x {height} is too large to display; showing {less_wide} x {less_high}. Use wgray render for the \
+                     full size"
                 ),
             ),
-            Report::Wrote(what, Ok(())) => self.line(GREEN, &format!("{what} saved into the scene file")),
-            Report::Wrote(what, Err(error)) => self.line(RED, &format!("{what} not saved: {error}")),
+            Report::Wrote(what, Ok(())) => self.line(GREEN, &format!("Saved {what} to the scene file")),
+            Report::Wrote(what, Err(error)) => self.line(RED, &format!("Cannot save {what}: {error}")),
             Report::Written(what, Ok(())) => self.line(GREEN, what),
-            Report::Written(what, Err(error)) => self.line(RED, &format!("not {what}: {error}")),
+            Report::Written(what, Err(error)) => self.line(RED, &format!("{what}: failed: {error}")),
             Report::Turned(what, Ok(())) => self.line(GREEN, what),
-            Report::Turned(what, Err(error)) => self.line(RED, &format!("not {what}: {error}")),
+            Report::Turned(what, Err(error)) => self.line(RED, &format!("{what}: failed: {error}")),
         }
     }
 
     fn problem(self, problem: &Diagnostic) {
-        let place = problem
+        let location = problem
             .place
             .as_ref()
             .map(|place| format!("{place}: "))
@@ -298,13 +309,13 @@ impl Terminal {
                     .marked_line()
                     .map(|excerpt| ("excerpt".to_owned(), excerpt.into())),
             );
-            log::tell(Level::Error, &format!("{place}{}", problem.message), facts);
+            log::tell(Level::Error, &format!("{location}{}", problem.message), facts);
             return;
         }
         let head = format!(
             "{} {}",
             self.painted(RED, "error:"),
-            self.painted(BOLD, &format!("{place}{}", problem.message))
+            self.painted(BOLD, &format!("{location}{}", problem.message))
         );
         let excerpt = problem
             .marked_line()
@@ -313,7 +324,7 @@ impl Terminal {
         say(&format!("{} {head}\n{excerpt}", clock()));
     }
 
-    /// An excerpt with its marks in red.
+    /// Returns an excerpt with its marks in red.
     fn marked(self, excerpt: &str) -> String {
         let lines = excerpt.lines().map(|line| match line.find('^') {
             Some(at) if !line.starts_with(char::is_numeric) => {
@@ -342,10 +353,10 @@ impl Terminal {
 }
 
 fn say(text: &str) {
-    let _ = io::stderr().lock().write_all(text.as_bytes()); // where this cannot be written there is nobody to tell
+    let _ = io::stderr().lock().write_all(text.as_bytes()); // without standard error there is nowhere to report that
 }
 
-/// The time of day in UTC: what tells one reload from the next.
+/// Returns the time of day in UTC.
 fn clock() -> String {
     let since = SystemTime::now()
         .duration_since(SystemTime::UNIX_EPOCH)
@@ -362,7 +373,7 @@ fn time(seconds: f64) -> String {
     }
 }
 
-fn measured(sources: &Sources, device: Choice) -> anyhow::Result<ExitCode> {
+fn measured(sources: &Sources, device: AdapterChoice) -> anyhow::Result<ExitCode> {
     let stopped = signal::stop().context("signal handler")?;
     let all = measure(sources, device, stopped.flag()).map_err(|error| match error {
         Some(error) => anyhow!(error),
@@ -373,11 +384,11 @@ fn measured(sources: &Sources, device: Choice) -> anyhow::Result<ExitCode> {
 
 fn print(scene: &Path, all: Vec<Measured>) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    writeln!(out, "{}: milliseconds, median and worst", scene.display())?;
+    writeln!(out, "{}: milliseconds, median and maximum", scene.display())?;
     writeln!(
         out,
         "{:<14}{:>16}{:>18}{:>22}",
-        "change", "old one stopped", "first picture", "every pixel sampled"
+        "change", "old one stopped", "first image", "every pixel sampled"
     )?;
     for row in all {
         let cells = [row.stopped, row.first, row.whole].map(|mut times| {

@@ -1,5 +1,5 @@
-//! Making a scene ready on a device, on a thread of its own: a driver's compiler cannot be interrupted, and whoever looks
-//! at the picture must not wait for it.
+//! Compiles the kernels of a scene on a separate thread: a driver's compiler cannot be interrupted, and viewers must
+//! not wait for it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -7,53 +7,67 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use super::source::Constants;
 use super::times::Times;
 use crate::error::{RenderError, ShaderErrors};
 use crate::gpu::compose::Shaders;
 use crate::gpu::marks::Layer;
-use crate::gpu::{Choice, Device, Forms, Gpu, Live, Options, check_kernels, choose};
+use crate::gpu::{AdapterChoice, Device, Forms, Gpu, Live, Options, check_kernels, choose};
 use crate::pack::Packed;
 
-/// What is to be made.
+/// A request to compile a kernel.
 pub struct Request {
-    /// Given back with the result, so that a late one is known as such.
+    /// Returned with the result, which identifies late ones.
     pub id: u64,
-    /// The device; a new one is opened if there is none.
+    /// The device; `None` opens a new one.
     pub device: Option<Device>,
     /// The scene.
     pub packed: Packed,
     /// The shaders.
     pub shaders: Arc<Shaders>,
-    /// The layer that takes the place of light.
+    /// The layer that replaces color.
     pub layer: Option<Layer>,
-    /// Shaders that are known to be right, to be used if those are wrong.
+    /// Known good shaders, for use if those have errors.
     pub fallback: Option<Arc<Shaders>>,
+    /// The constants that the kernel is compiled for.
+    pub constants: Constants,
+    /// When the change was noticed that the kernel shows.
+    pub noticed: Instant,
 }
 
-/// A scene on a device, and the shaders that it has.
+/// A scene on a device, and its shaders.
 pub type Ready = (Box<Gpu>, Arc<Shaders>);
 
-/// What was made of a request.
+/// The result of a request.
 pub struct Built {
-    /// The request's.
+    /// The id of the request.
     pub id: u64,
-    /// The scene on a device; `None` if the request's are wrong, and have no fallback.
+    /// The constants of the request.
+    pub constants: Constants,
+    /// The time of the request.
+    pub noticed: Instant,
+    /// The scene on a device; `None` if the request's shaders have errors, and there is no fallback.
     pub result: Option<Result<Ready, RenderError>>,
-    /// What is wrong with the request's shaders.
+    /// The errors in the request's shaders.
     pub refused: Option<ShaderErrors>,
-    /// How long it took to compile.
+    /// Time spent on checking and compiling.
     pub took: Duration,
 }
 
-/// The thread; it ends when this is dropped, after what it is doing.
+/// The compiler thread. It ends after its current work when this is dropped.
 pub struct Builder {
     requests: Option<Sender<Request>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Builder {
-    /// Starts the thread. It gives `done` its results, except those of requests that a newer one has overtaken.
-    pub fn start(choice: Choice, times: Times, done: impl Fn(Built) + Send + 'static) -> std::io::Result<Builder> {
+    /// Starts the thread. It passes its results to `done`. Requests that were overtaken by a newer one before they
+    /// began are dropped.
+    pub fn start(
+        choice: AdapterChoice,
+        times: Times,
+        done: impl Fn(Built) + Send + 'static,
+    ) -> std::io::Result<Builder> {
         let (sender, receiver) = channel();
         let thread = std::thread::Builder::new()
             .name("build".to_string())
@@ -64,7 +78,7 @@ impl Builder {
         })
     }
 
-    /// Asks for something; what was asked for earlier and has not begun is dropped.
+    /// Sends a request. Earlier requests that have not begun are dropped.
     pub fn request(&self, request: Request) {
         if let Some(requests) = &self.requests {
             let _ = requests.send(request); // the thread lives as long as this
@@ -81,7 +95,7 @@ impl Drop for Builder {
     }
 }
 
-fn run(choice: &Choice, times: &Times, requests: &Receiver<Request>, done: impl Fn(Built)) {
+fn run(choice: &AdapterChoice, times: &Times, requests: &Receiver<Request>, done: impl Fn(Built)) {
     while let Ok(mut request) = requests.recv() {
         while let Ok(newer) = requests.try_recv() {
             request = newer;
@@ -90,7 +104,7 @@ fn run(choice: &Choice, times: &Times, requests: &Receiver<Request>, done: impl 
     }
 }
 
-fn build(choice: &Choice, times: &Times, request: Request) -> Built {
+fn build(choice: &AdapterChoice, times: &Times, request: Request) -> Built {
     let Request {
         id,
         device,
@@ -98,9 +112,11 @@ fn build(choice: &Choice, times: &Times, request: Request) -> Built {
         shaders,
         layer,
         fallback,
+        constants,
+        noticed,
     } = request;
     let start = Instant::now();
-    // Every kernel, whether it is used now or by another view later.
+    // Every kernel, including those of other views.
     let refused = times.of("check shaders", || {
         check_kernels(&packed, &shaders, Forms::Buffers).err()
     });
@@ -108,7 +124,7 @@ fn build(choice: &Choice, times: &Times, request: Request) -> Built {
     let result = usable.map(|shaders| {
         guarded(|| {
             let device = device.map_or_else(|| choose(choice), Ok)?;
-            // In buffers: a change of the scene then needs no compiler.
+            // In buffers, so that a change of the scene needs no compiler.
             let options = Options {
                 baked: false,
                 ..Options::best(&device)
@@ -124,13 +140,15 @@ fn build(choice: &Choice, times: &Times, request: Request) -> Built {
     });
     Built {
         id,
+        constants,
+        noticed,
         result,
         refused,
         took: start.elapsed(),
     }
 }
 
-/// Runs what calls a driver. wgpu panics when a device is lost while it waits: that is an error here.
+/// Runs code that calls a driver. wgpu panics if a device is lost while it waits, which becomes an error.
 pub fn guarded<T>(work: impl FnOnce() -> Result<T, RenderError>) -> Result<T, RenderError> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let message = panic.downcast_ref::<String>().map(String::as_str);

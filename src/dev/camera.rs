@@ -1,41 +1,44 @@
-//! Moving a camera by hand, and writing it as the text of a scene file.
+//! Interactive moves of a camera, and its text in a scene file.
 
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::scene::CameraDescription;
 
-/// A change of a camera.
+/// A move of a camera.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Move {
-    /// Around what it looks at: angles to the right and upwards, in radians, that the scene seems to turn by.
+    /// Orbits around the point looked at: angles to the right and upwards, in radians, by which the scene seems to
+    /// turn.
     Orbit(f64, f64),
-    /// Sideways: how far the scene moves to the right and upwards, in heights of the picture.
+    /// Pans sideways: how far the scene moves to the right and upwards, in image heights.
     Pan(f64, f64),
-    /// Towards what it looks at: the logarithm of the factor by which the scene grows.
+    /// Approaches the point looked at: the logarithm of the factor by which the scene grows.
     Dolly(f64),
-    /// Without turning, what it looks at with it: to the right, upwards and forwards, in distances of what it looks at.
+    /// Moves without turning: to the right, upwards and forwards, in multiples of the distance to the point looked
+    /// at.
     Fly(f64, f64, f64),
-    /// Turns where it stands: angles to the right and upwards, in radians.
-    Look(f64, f64),
+    /// Turns on the spot: angles to the right and upwards, in radians.
+    #[serde(rename = "look")]
+    Turn(f64, f64),
 }
 
-/// Where a camera stands and what it sees, as a viewer keeps it.
+/// The viewpoint of a camera, as a viewer keeps it.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Viewpoint {
-    /// Where it is.
+    /// The position.
     pub position: DVec3,
-    /// What it looks at.
+    /// The point that the camera looks at.
     pub look_at: DVec3,
-    /// What is up.
+    /// The up direction.
     pub up: DVec3,
-    /// The vertical angle of view in degrees, or the height of an orthographic camera; a panorama has none.
+    /// The vertical angle of view in degrees, or the height of an orthographic camera; none for a panorama.
     pub extent: Option<f64>,
 }
 
 impl Viewpoint {
-    /// That of a camera.
+    /// Returns the viewpoint of a camera.
     pub fn of(camera: &CameraDescription) -> Viewpoint {
         let View {
             position, look_at, up, ..
@@ -54,11 +57,11 @@ impl Viewpoint {
     }
 }
 
-/// A camera of the same kind elsewhere.
+/// Returns a camera of the same kind at another viewpoint.
 ///
 /// # Errors
 ///
-/// What is wrong with such a camera.
+/// The rule that such a camera breaks.
 pub fn placed(camera: &CameraDescription, viewpoint: Viewpoint) -> Result<CameraDescription, String> {
     let Viewpoint {
         position,
@@ -82,14 +85,14 @@ pub fn placed(camera: &CameraDescription, viewpoint: Viewpoint) -> Result<Camera
     }
 }
 
-/// A camera that sees the whole of a ball from where it looks now, and turns around its middle.
+/// Returns a camera that sees a whole sphere from the current direction, and orbits around its center.
 pub fn framed(camera: &CameraDescription, center: DVec3, radius: f64) -> CameraDescription {
     let View { position, look_at, .. } = view(camera);
     let back = (position - look_at).normalize_or_zero();
     let radius = radius.max(f64::MIN_POSITIVE);
     let mut viewpoint = Viewpoint::of(camera);
     let distance = match camera {
-        // The ball touches the cone of view; a quarter of its size is left around it.
+        // The sphere touches the cone of view; a margin of a quarter of its size remains.
         CameraDescription::Perspective(c) => 1.25 * radius / (c.fov.to_radians() / 2.0).sin(),
         CameraDescription::Orthographic(_) => {
             viewpoint.extent = Some(2.5 * radius);
@@ -101,12 +104,13 @@ pub fn framed(camera: &CameraDescription, center: DVec3, radius: f64) -> CameraD
     placed(camera, viewpoint).unwrap_or_else(|_| camera.clone())
 }
 
-/// The least angle between the view and the vertical, in radians.
+/// Minimum angle between the view and the vertical, in radians.
 const STEEPEST: f64 = 0.02;
-/// A camera is written with so many digits of its distance: the eye sees no more, and the file stays readable.
+/// Number of significant digits of a camera, relative to its distance: more are invisible, and hard to read in a
+/// file.
 const DIGITS: i32 = 5;
 
-/// The position, what it looks at, and what the height of the picture spans there.
+/// The position, the point looked at, and the height of the image at that point.
 struct View {
     position: DVec3,
     look_at: DVec3,
@@ -137,7 +141,7 @@ fn view(camera: &CameraDescription) -> View {
     }
 }
 
-/// A camera after a move, or the same if the move would make it invalid.
+/// Returns a camera after a move, or the same camera if the move would make it invalid.
 pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
     let mut new = camera.clone();
     let View {
@@ -154,7 +158,7 @@ pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
             let turned = DQuat::from_axis_angle(up, -x) * offset;
             let right = DQuat::from_axis_angle(up, -x) * right;
             let angle = turned.angle_between(up);
-            // To look from higher up is to come nearer to the vertical.
+            // Looking from higher up means a smaller angle to the vertical.
             let new_angle = (angle - y).clamp(STEEPEST, std::f64::consts::PI - STEEPEST);
             position = look_at + DQuat::from_axis_angle(right, new_angle - angle) * turned;
         }
@@ -171,7 +175,7 @@ pub fn moved(camera: &CameraDescription, by: Move) -> CameraDescription {
             position += shift;
             look_at += shift;
         }
-        Move::Look(x, y) => {
+        Move::Turn(x, y) => {
             let forwards = DQuat::from_axis_angle(up, -x) * -offset;
             let right = DQuat::from_axis_angle(up, -x) * right;
             let angle = forwards.angle_between(up);
@@ -222,8 +226,8 @@ pub fn dollied(camera: &CameraDescription, by: f64, file: &CameraDescription) ->
     near_end
 }
 
-/// A moved camera after the file's was edited: what the edit changed is the file's, the rest stays. `None` if that is
-/// the file's camera.
+/// Returns a moved camera after an edit of the file's camera: edited values come from the file, the others stay.
+/// `None` if the result is the file's camera.
 pub fn merged(
     moved: &CameraDescription,
     old: &CameraDescription,
@@ -240,7 +244,7 @@ pub fn merged(
             take(&mut c.look_at, &old.look_at, &new.look_at);
             take(&mut c.up, &old.up, &new.up);
             take(&mut c.fov, &old.fov, &new.fov);
-            // A move changes nothing of the lens.
+            // A move does not change the lens.
             (c.focal_length, c.aperture, c.f_number) = (new.focal_length, new.aperture, new.f_number);
             (c.focus_distance, c.blades, c.blade_rotation) = (new.focus_distance, new.blades, new.blade_rotation);
             c.path.clone_from(&new.path);
@@ -277,14 +281,14 @@ fn rounded(point: DVec3, scale: f64) -> DVec3 {
     DVec3::from(point.to_array().map(|x| round(x, scale)))
 }
 
-/// A number with few decimals: the ones that count for lengths like `scale`.
+/// Rounds a number to few decimals, relative to lengths like `scale`.
 fn round(x: f64, scale: f64) -> f64 {
     let decimals = (DIGITS - scale.log10().floor() as i32).clamp(0, 15) as usize;
     let x = format!("{x:.decimals$}").parse().unwrap_or(x);
     if x == 0.0 { 0.0 } else { x } // no -0
 }
 
-/// The keys and values of a camera as a scene file has them, those that a move can change.
+/// Returns the keys and values of a camera that a move can change, as in a scene file.
 pub fn entries(camera: &CameraDescription) -> Vec<(&'static str, Entry)> {
     match camera {
         CameraDescription::Perspective(c) => vec![
@@ -307,7 +311,7 @@ pub fn entries(camera: &CameraDescription) -> Vec<(&'static str, Entry)> {
     }
 }
 
-/// What else a camera's section says, which no move changes: of its lens, if it has one.
+/// Returns the settings of a camera that no move changes, such as those of its lens.
 fn settings(camera: &CameraDescription) -> Vec<(&'static str, f64)> {
     let CameraDescription::Perspective(c) = camera else {
         return Vec::new();
@@ -335,7 +339,7 @@ pub enum Entry {
     Point(DVec3),
 }
 
-/// A camera as the section of a scene file.
+/// Returns a camera as the section of a scene file.
 pub fn text(camera: &CameraDescription) -> String {
     let kind = match camera {
         CameraDescription::Perspective(_) => "",
@@ -364,7 +368,7 @@ mod tests {
         camera("position = [0, -4, 1]\nlook_at = [0, 0, 1]\nfov = 45")
     }
 
-    /// Those of a lens, told in both ways, and of a panorama.
+    /// Cameras with a lens, described in both ways, and a panorama.
     fn others() -> [CameraDescription; 3] {
         let view = "position = [0, -4, 1]\nlook_at = [0, 0, 1]\n";
         [
@@ -454,13 +458,13 @@ mod tests {
                 assert!((shift.dot(forwards.cross(old.up).normalize()) - far * x).abs() < 1e-3 * far);
             }
             for (x, y) in [(0.3, 0.0), (0.0, 0.2), (0.0, 9.0), (0.0, -9.0), (-0.4, 0.1)] {
-                let new = view(&moved(&file, Move::Look(x, y)));
+                let new = view(&moved(&file, Move::Turn(x, y)));
                 assert_eq!(new.position, old.position);
                 assert!((new.position.distance(new.look_at) - far).abs() < 1e-4 * far);
             }
             // To the right is to the right, upwards is upwards.
             let right = (old.look_at - old.position).cross(old.up).normalize();
-            let new = view(&moved(&file, Move::Look(0.2, 0.1)));
+            let new = view(&moved(&file, Move::Turn(0.2, 0.1)));
             assert!((new.look_at - old.look_at).dot(right) > 0.1 * far);
             assert!((new.look_at - old.look_at).dot(old.up) > 0.05 * far);
         }

@@ -1,5 +1,5 @@
-//! A picture in the making: coarse at first, then all pixels with few samples, then more. What interrupts it waits for
-//! one call at most.
+//! Progressive rendering of an image: coarse at first, then all pixels with few samples, then more. An interruption
+//! waits for one dispatch at most.
 
 use std::ops::Range;
 use std::time::Duration;
@@ -16,49 +16,50 @@ use crate::pack::{Camera, FirstHit, Packed};
 use super::film_layer::FilmLayer;
 use super::picture::{Content, View, means};
 
-/// What one call aims to take: a save or a move of the camera waits so long.
+/// Target duration of a dispatch: a save or a move of the camera waits this long.
 const CALL: Duration = Duration::from_millis(30);
-/// What a coarse picture aims to take: with what it takes to show it, 20 in a second.
+/// Target duration of a coarse image: with the time to show it, 20 per second.
 const COARSE: Duration = Duration::from_millis(30);
-/// Pixels of a coarse picture as long as nothing is known of the speed.
+/// Pixels of a coarse image while the speed is unknown.
 const COARSE_PIXELS: f64 = 10_000.0;
-/// The coarsest picture has one pixel for so many along each side.
+/// The scale of the coarsest image.
 const COARSEST: u32 = 32;
-/// The most pixels that are shown, and the most along a side: browsers show no larger pictures.
-const MOST_PIXELS: u64 = 1 << 24;
-const LONGEST_SIDE: u32 = 1 << 14;
-/// First hits that are found in one call.
+/// Maximum number of displayed pixels, and maximum length of a side: browsers show no larger images.
+const MAX_PIXELS: u64 = 1 << 24;
+const MAX_SIDE: u32 = 1 << 14;
+/// Number of first hits per dispatch.
 const HITS_PER_CALL: u32 = 1 << 17;
 
-/// A scene on a device, seen by a camera.
+/// A progressively rendered scene on a device.
 pub struct Canvas {
     gpu: Gpu,
-    /// The scene, with the camera of the stage under way.
+    /// The scene, with the camera of the current stage.
     scene: Packed,
-    /// The camera of the whole picture.
+    /// The camera of the full-size image.
     camera: Camera,
-    /// Pixels of the whole picture along each side of one of the finished film: more than one where it is too large.
+    /// The scale of the finished film: more than 1 if the image is too large.
     finest: u32,
-    /// Whether the CPU renders the same.
+    /// True if the CPU renders the same.
     compare: bool,
     stage: Stage,
     steps: Steps,
-    /// The last coarser film, by the GPU and by the CPU.
+    /// The last coarser films, of the GPU and of the CPU.
     under: Option<(Film, Option<Film>)>,
-    /// What the CPU has of the stage.
+    /// The film of the CPU in this stage.
     cpu: Film,
-    /// The first rows' hits.
+    /// The hits of the first rows.
     hits: Vec<FirstHit>,
     shown: bool,
     limits: Limits,
 }
 
-/// How much of the picture is rendered.
+/// Limits on what is rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Samples of a pixel at most, one at least.
+    /// Maximum number of samples per pixel, at least 1.
     pub samples: u32,
-    /// Pixels of the picture along each side of one that is shown, one at least.
+    /// The scale of the preview, at least 1: each displayed pixel covers this many pixels of the image along each
+    /// side.
     pub scale: u32,
 }
 
@@ -71,19 +72,19 @@ impl Default for Limits {
     }
 }
 
-/// Which picture the film is of.
+/// The resolution that the film has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stage {
-    /// Pixels of the picture along each side of one of the film.
+    /// The scale of the film: each of its pixels covers this many pixels of the image along each side.
     scale: u32,
     width: u32,
     height: u32,
-    /// Whether anything of it is rendered.
+    /// True if anything of it is rendered.
     begun: bool,
 }
 
 impl Canvas {
-    /// Starts a picture of a scene that is on the device.
+    /// Starts to render a scene that is on the device.
     pub fn new(gpu: Gpu, scene: Packed, view: View, limits: Limits) -> Result<Canvas, RenderError> {
         let camera = scene.camera;
         let stage = Stage {
@@ -110,12 +111,12 @@ impl Canvas {
         Ok(canvas)
     }
 
-    /// Whether it is this scene that is rendered.
+    /// Returns whether this scene is being rendered.
     pub fn shows(&self, scene: &Packed) -> bool {
         scene.camera == self.camera && scene.same_but_camera(&self.scene)
     }
 
-    /// Starts a picture of a changed scene. Returns false, and does nothing, if it takes another kernel.
+    /// Starts to render a changed scene. Returns false, and does nothing, if the scene needs another kernel.
     pub fn update(&mut self, scene: &Packed, view: View) -> Result<bool, RenderError> {
         let same_kernel = self.gpu.update(scene)?;
         if same_kernel {
@@ -125,22 +126,22 @@ impl Canvas {
         Ok(same_kernel)
     }
 
-    /// What the kernel has that is not as the files say.
+    /// Returns the parts of the kernel that differ from the files.
     pub fn live(&self) -> &Live {
         self.gpu.live()
     }
 
-    /// Gives the kernel's sliders their values. The picture must be started again.
+    /// Sets the values of the kernel's sliders. The image must be started again.
     pub fn set_sliders(&mut self, values: &[[u32; 4]]) -> Result<(), RenderError> {
         self.gpu.set_sliders(values)
     }
 
-    /// The calls that have ended since this was asked last.
+    /// Returns the dispatches that have ended since the last call.
     pub fn calls(&mut self) -> Vec<Call> {
         self.gpu.calls()
     }
 
-    /// Starts the picture again, from a camera.
+    /// Starts the image again, with a camera.
     pub fn restart(&mut self, camera: Camera, view: View) -> Result<(), RenderError> {
         self.camera = camera;
         if self.compare != view.is_by_both() {
@@ -160,7 +161,7 @@ impl Canvas {
         self.begin(scale)
     }
 
-    /// Goes over to another view of the same picture.
+    /// Switches to another view of the same image.
     pub fn change_view(&mut self, view: View) -> Result<(), RenderError> {
         let film = self.hits_of(view).is_none();
         let nothing_there = self.stage.scale == self.finest && self.steps.samples() == 0;
@@ -175,7 +176,7 @@ impl Canvas {
         }
     }
 
-    /// What a view shows of the first hits.
+    /// Returns the layer of the first hits that a view shows.
     fn hits_of(&self, view: View) -> Option<Aov> {
         view.of_hits(self.scene.integrator)
     }
@@ -221,7 +222,7 @@ impl Canvas {
         Ok(())
     }
 
-    /// Renders more or less of the picture from now on.
+    /// Changes the limits.
     pub fn set_limits(&mut self, limits: Limits, view: View) -> Result<(), RenderError> {
         let (old, fewer) = (self.limits, limits.samples < self.steps.samples());
         self.limits = limits;
@@ -237,12 +238,12 @@ impl Canvas {
         [self.camera.width.div_ceil(scale), self.camera.height.div_ceil(scale)]
     }
 
-    /// Whether nothing of the picture has been worth showing yet.
+    /// Returns whether nothing of the image has been worth showing yet.
     pub fn is_new(&self) -> bool {
         !self.shown
     }
 
-    /// Whether there is nothing left to do for a view.
+    /// Returns whether a view is finished.
     pub fn is_done(&self, view: View) -> bool {
         match self.hits_of(view) {
             Some(_) => {
@@ -253,7 +254,7 @@ impl Canvas {
         }
     }
 
-    /// Makes one call. Returns whether there is something new that must not wait to be shown.
+    /// Makes one dispatch. Returns whether its result must be shown without delay.
     pub fn step(&mut self, view: View) -> Result<bool, RenderError> {
         let show = match self.hits_of(view) {
             Some(_) => self.step_hits(view)?,
@@ -303,7 +304,7 @@ impl Canvas {
         Ok(first_pass || self.steps.is_done())
     }
 
-    /// The picture as it is now, and its width and height.
+    /// Returns the current image, and its width and height.
     pub fn content(&mut self, view: View) -> Result<(Content, [u32; 2]), RenderError> {
         if let Some(aov) = self.hits_of(view) {
             return Ok((self.hits_so_far(aov), self.finest_size()));
@@ -321,7 +322,7 @@ impl Canvas {
         }
         let film;
         let under = self.under.as_ref();
-        // Before the next stage has anything the last one is sent, which is smaller.
+        // Until the next stage has any result the previous, smaller one is sent.
         let (gpu, cpu, under) = match under.filter(|_| !self.stage.begun) {
             Some((gpu, cpu)) => (gpu, cpu.as_ref(), None),
             None => {
@@ -359,17 +360,17 @@ impl Canvas {
         Content::Hits(aov, hits)
     }
 
-    /// Width and height of the whole picture.
+    /// Returns width and height of the full-size image.
     pub fn size(&self) -> [u32; 2] {
         [self.camera.width, self.camera.height]
     }
 
-    /// Width and height of what is shown of it at the end.
+    /// Returns width and height of the image that is shown in the end.
     pub fn finest_size(&self) -> [u32; 2] {
         self.size_at(self.finest)
     }
 
-    /// Samples that every pixel of the whole picture has, and will have.
+    /// Returns the samples per pixel so far, and in the end.
     pub fn samples(&self) -> (u32, u32) {
         let so_far = if self.stage.scale == self.finest {
             self.steps.samples()
@@ -379,23 +380,23 @@ impl Canvas {
         (so_far, self.scene.pixel_samples.min(self.limits.samples))
     }
 
-    /// Samples of pixels per second.
+    /// Returns the samples per second.
     pub fn speed(&self) -> Option<f64> {
         self.steps.speed()
     }
 }
 
-/// The least scale from `least` on at which a picture can be shown.
+/// Returns the smallest scale from `least` on at which an image can be shown.
 fn finest(width: u32, height: u32, largest_film: u64, least: u32) -> u32 {
-    let most = largest_film.min(MOST_PIXELS);
+    let most = largest_film.min(MAX_PIXELS);
     let fits = |scale: &u32| {
         let (width, height) = (width.div_ceil(*scale), height.div_ceil(*scale));
-        Region::whole(width, height).pixels() <= most && width.max(height) <= LONGEST_SIDE
+        Region::whole(width, height).pixels() <= most && width.max(height) <= MAX_SIDE
     };
-    (least..).find(fits).unwrap_or(1) // the picture of one pixel fits
+    (least..).find(fits).unwrap_or(1) // an image of one pixel fits
 }
 
-/// The same work done by both backends.
+/// The same work by both backends.
 struct Both<'a> {
     gpu: &'a mut Gpu,
     cpu: Cpu<'a>,

@@ -1,35 +1,36 @@
-//! What is wrong, as the terminal and the page show it.
+//! Errors as the terminal and the page show them.
 
 use std::path::{Path, absolute};
 
 use serde::Serialize;
 
+use super::edit::Layout;
 use crate::error::{RenderError, ShaderError};
 use crate::excerpt;
 use crate::gpu::compose::Shaders;
-use crate::scene::SceneError;
+use crate::scene::{Problem, SceneError, Segment};
 
-/// An error that a person can mend: what kind of thing is wrong, where, and the lines around the place.
+/// An error that the user can fix: its kind, its location, and the lines around it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Diagnostic {
     /// `shader`, `scene`, `file` or `device`.
     pub kind: &'static str,
-    /// File, line and column, if it has a place.
+    /// File, line and column, if known.
     pub place: Option<String>,
-    /// The whole path of the file, for an editor.
+    /// The absolute path of the file, for an editor.
     pub file: Option<String>,
     /// Counted from 1.
     pub line: Option<usize>,
     /// In characters, counted from 1.
     pub column: Option<usize>,
-    /// What is wrong.
+    /// The message.
     pub message: String,
-    /// The line with the place marked, between the one before and the one after, if there is a source.
+    /// The line with the location marked, between its neighbors, if there is a source.
     pub excerpt: Option<String>,
 }
 
 impl Diagnostic {
-    /// Something that has no place in a file.
+    /// Returns an error without a location.
     pub fn plain(kind: &'static str, message: impl Into<String>) -> Diagnostic {
         Diagnostic {
             kind,
@@ -42,7 +43,7 @@ impl Diagnostic {
         }
     }
 
-    /// A scene that cannot be read, with the line of its text.
+    /// Returns the diagnostic of a scene that cannot be read, with the line of its text.
     pub fn scene(error: &SceneError, text: &str) -> Diagnostic {
         let (origin, line, column) = match error {
             SceneError::Syntax {
@@ -58,10 +59,16 @@ impl Diagnostic {
         };
         let whole = error.to_string();
         let message = whole.strip_prefix(&format!("{place}: ")).unwrap_or(&whole).to_string();
+        let marked = match (error, column) {
+            (_, Some(column)) => Some((column, 1)),
+            (SceneError::Invalid { problem, .. }, None) => mark_of(text, line, problem),
+            _ => None,
+        };
+        let column = marked.map(|(column, _)| column);
         Diagnostic {
             kind: "scene",
-            excerpt: marked(text, line, column).map(|excerpt| around(text, line, &excerpt)),
-            place: Some(place),
+            excerpt: excerpt_of(text, line, marked).map(|excerpt| around(text, line, &excerpt)),
+            place: Some(column.map_or(format!("{origin}:{line}"), |column| format!("{origin}:{line}:{column}"))),
             file: whole_path(Path::new(origin)),
             line: Some(line),
             column,
@@ -69,7 +76,7 @@ impl Diagnostic {
         }
     }
 
-    /// A mistake in a file of shaders, which lie in a folder unless they are those in the program.
+    /// Returns the diagnostic of an error in a shader file of a folder, or in a built-in one.
     pub fn shader(error: &ShaderError, shaders: &Shaders, folder: Option<&Path>) -> Diagnostic {
         let mut told = Diagnostic {
             place: Some(error.place.clone()),
@@ -84,7 +91,7 @@ impl Diagnostic {
         };
         let text = shaders.text(file);
         if text.is_empty() {
-            return told; // the program's own part of a kernel
+            return told; // generated code
         }
         told.excerpt = told.excerpt.map(|excerpt| around(text, line, &excerpt));
         (told.line, told.column) = (Some(line), Some(column));
@@ -96,7 +103,7 @@ impl Diagnostic {
         told
     }
 
-    /// Of the excerpt the line that has the place, and the mark below it: what a terminal has room for.
+    /// Returns the line of the excerpt with the location, and the mark below it: a terminal has little room.
     pub fn marked_line(&self) -> Option<String> {
         let lines: Vec<&str> = self.excerpt.as_ref()?.lines().collect();
         let mark = lines.iter().position(|line| line.starts_with(excerpt::NO_NUMBER))?;
@@ -108,7 +115,7 @@ fn whole_path(path: &Path) -> Option<String> {
     absolute(path).ok()?.to_str().map(str::to_string)
 }
 
-/// An excerpt of a line of a text, counted from 1, with the lines before and after it.
+/// Returns the excerpt of a line, counted from 1, with the lines before and after it.
 fn around(text: &str, line: usize, excerpt: &str) -> String {
     let numbered = |line: usize| Some((line, text.lines().nth(line.checked_sub(1)?)?));
     let shown = |(line, content)| excerpt::numbered(line, content);
@@ -118,12 +125,28 @@ fn around(text: &str, line: usize, excerpt: &str) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// A line of a text, counted from 1, with its number and a mark under a column.
-fn marked(text: &str, line: usize, column: Option<usize>) -> Option<String> {
+/// Texts above this size are not searched for the column of a value.
+const MAX_SEARCHED_BYTES: usize = 1 << 20;
+
+/// Returns column and length of the value that breaks a rule, or of the unknown key, if it is on this line.
+fn mark_of(text: &str, line: usize, problem: &Problem) -> Option<(usize, usize)> {
+    let layout = Layout::of(text).filter(|_| text.len() <= MAX_SEARCHED_BYTES)?;
+    let range = match (problem.message.starts_with("unknown key"), problem.key.0.last()) {
+        (true, Some(Segment::Key(key))) => layout.extent(&problem.key).map(|all| all.start..all.start + key.len()),
+        _ => layout.value(&problem.key),
+    }?;
+    let before = text.get(..range.start)?;
+    let start = before.rfind('\n').map_or(0, |at| at + 1);
+    let marked = text.get(range)?.lines().next()?.chars().count().max(1);
+    (before.matches('\n').count() + 1 == line).then_some((before[start..].chars().count() + 1, marked))
+}
+
+/// Returns a line of a text, counted from 1, with its number and a mark at a column and of a length, or under the whole line.
+fn excerpt_of(text: &str, line: usize, mark: Option<(usize, usize)>) -> Option<String> {
     let content = text.lines().nth(line.checked_sub(1)?)?;
     let indent = content.chars().take_while(|c| c.is_whitespace()).count();
-    let (start, length) = match column {
-        Some(column) => (column.saturating_sub(1), 1),
+    let (start, length) = match mark {
+        Some((column, length)) => (column.saturating_sub(1), length),
         None => (indent, content.trim().chars().count().max(1)),
     };
     Some(excerpt::marked(line, content, start, length))
@@ -145,16 +168,30 @@ mod tests {
         let text = "[image]\nwidth = 0\nheight = 4\n[camera]\nposition = [0, 1, 0]\nlook_at = [1, 0, 0]\nfov = 40\n";
         let error = Scene::parse(text, "s.toml").unwrap_err();
         let shown = Diagnostic::scene(&error, text);
-        assert_eq!(shown.place.as_deref(), Some("s.toml:2"));
+        assert_eq!(shown.place.as_deref(), Some("s.toml:2:9"));
         assert_eq!(shown.message, "image.width: 0 must be from 1 to 65536");
-        let lines = "    1 | [image]\n    2 | width = 0\n      | ^^^^^^^^^\n    3 | height = 4";
+        let lines = "    1 | [image]\n    2 | width = 0\n      |         ^\n    3 | height = 4";
         assert_eq!(shown.excerpt.as_deref(), Some(lines));
         assert_eq!(
             shown.marked_line().as_deref(),
-            Some("    2 | width = 0\n      | ^^^^^^^^^")
+            Some("    2 | width = 0\n      |         ^")
         );
         assert!(Path::new(shown.file.as_ref().unwrap()).is_absolute() && shown.file.unwrap().ends_with("s.toml"));
-        assert_eq!((shown.line, shown.column), (Some(2), None));
+        assert_eq!((shown.line, shown.column), (Some(2), Some(9)));
+        let unknown = text.replace("fov", "  fovv");
+        let shown = Diagnostic::scene(
+            &Scene::parse(&unknown.replace("= 0", "= 4"), "s.toml").unwrap_err(),
+            &unknown,
+        );
+        assert_eq!((shown.line, shown.column), (Some(7), Some(3)));
+        assert_eq!(
+            shown.marked_line().as_deref(),
+            Some("    7 |   fovv = 40\n      |   ^^^^")
+        );
+        // Without a value the whole line is marked.
+        let missing = text.replace("width = 0\n", "");
+        let shown = Diagnostic::scene(&Scene::parse(&missing, "s.toml").unwrap_err(), &missing);
+        assert_eq!(shown.column, None);
         let text = "[image]\nwidth = = 2";
         let error = Scene::parse(text, "s.toml").unwrap_err();
         let shown = Diagnostic::scene(&error, text);
@@ -188,7 +225,7 @@ mod tests {
         assert_eq!(shown.marked_line(), error("").excerpt);
         let inside = Diagnostic::shader(&error("phong.wgsl:3:10"), &shaders, None);
         assert_eq!((inside.place.as_deref(), inside.file), (Some("phong.wgsl:3:10"), None));
-        // The program's own part of a kernel has no file that can be opened.
+        // Generated code has no file that can be opened.
         let own = Diagnostic::shader(&error("src/pack/layout.rs:3:10"), &shaders, Some(Path::new("/s")));
         assert_eq!((own.file, own.line), (None, None));
         assert_eq!(own.excerpt, error("").excerpt);

@@ -1,4 +1,4 @@
-//! The picture that is shown as a file: a PNG of what is seen, or an EXR of its numbers.
+//! The displayed image as a file: a PNG of what is seen, or an EXR of the values.
 
 use std::io::{self, Cursor};
 
@@ -10,7 +10,7 @@ use ::exr::prelude::{
 use super::picture::{Content, Frame, png, png_of};
 use crate::image::{Channel, Pixels};
 
-/// A PNG file of what a frame shows, without marks: of a comparison its first picture.
+/// Encodes a frame as PNG, without marks; of a comparison the first image.
 pub fn png_file(frame: &Frame) -> Vec<u8> {
     match &frame.content {
         Content::Color(pixels) | Content::Compare(pixels, _) => png_of(pixels, frame.look),
@@ -22,11 +22,11 @@ pub fn png_file(frame: &Frame) -> Vec<u8> {
     }
 }
 
-/// An EXR file of a frame's numbers, 32 bits each, with the channels that `wgray render` gives them.
+/// Encodes the values of a frame as EXR with 32-bit channels, named as by `wgray render`.
 ///
 /// # Errors
 ///
-/// What the library does not write.
+/// Errors of the EXR library.
 pub fn exr_file(frame: &Frame) -> io::Result<Vec<u8>> {
     let [width, height] = frame.header.sent;
     let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = match &frame.content {
@@ -86,7 +86,7 @@ mod tests {
 
     use super::*;
     use crate::dev::film_layer::FilmLayer;
-    use crate::dev::look::Look;
+    use crate::dev::look::DisplaySettings;
     use crate::dev::picture::{Header, Names};
     use crate::image::Aov;
 
@@ -115,7 +115,12 @@ mod tests {
                 sent: [2, 1],
                 ..Header::default()
             };
-            let frame = Frame::new(header, Content::Film(layer), Names::default(), Look::default());
+            let frame = Frame::new(
+                header,
+                Content::Film(layer),
+                Names::default(),
+                DisplaySettings::default(),
+            );
             let file = exr_file(&frame).unwrap();
             let image = ::exr::prelude::read()
                 .no_deep_data()

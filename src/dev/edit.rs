@@ -1,5 +1,5 @@
-//! Changing one value of a scene file's text. Only the bytes of that value change: comments, layout, line ends and a byte-order
-//! mark stay. A key that is absent is added where its table is, in the way in which that is written.
+//! Edits of single values in the text of a scene file. Only the bytes of the value change: comments, layout, line
+//! ends and a byte-order mark stay. An absent key is added to its table, in the style of that table.
 
 use std::ops::Range;
 
@@ -8,29 +8,29 @@ use toml_edit::{Document, InlineTable, Item, Table, Value as Written};
 
 use crate::scene::{KeyPath, Pieces, Segment};
 
-/// What to put where in a text.
+/// A replacement of a part of a text.
 type Edit = (Range<usize>, String);
 
-/// A text in which a key has a value, or none; the same text if it has it already.
+/// Returns a text in which a key has a value, or is absent; the same text if nothing changes.
 ///
 /// # Errors
 ///
-/// Why there is no place for it.
+/// Why the value cannot be placed.
 pub fn edited(text: &str, path: &KeyPath, value: Option<&Value>) -> Result<String, String> {
     edited_in(&Pieces::of(text), path, value)
 }
 
-/// The same of a text whose pieces are known.
+/// Like [`edited`], for a text whose pieces are known.
 ///
 /// # Errors
 ///
-/// Why there is no place for it.
+/// Why the value cannot be placed.
 pub fn edited_in(pieces: &Pieces, path: &KeyPath, value: Option<&Value>) -> Result<String, String> {
     let piece = pieces.find(path);
     let edits = edits(&piece.text, &piece.path, value).map_err(|why| format!("{path}: {why}"))?;
     let mut whole: Vec<Edit> = Vec::with_capacity(edits.len());
     for (range, new) in edits {
-        // What is replaced lies in one piece of the text: its end may be the beginning of another.
+        // The replaced part lies in one piece of the text: its end may be the start of another one.
         let start = piece.place(range.start);
         whole.push((start..start + range.len(), new));
     }
@@ -43,21 +43,21 @@ pub fn edited_in(pieces: &Pieces, path: &KeyPath, value: Option<&Value>) -> Resu
     Ok(text)
 }
 
-/// A text whose keys and values can be found.
+/// A text in which keys and values can be located.
 pub struct Layout<'a>(Document<&'a str>);
 
 impl<'a> Layout<'a> {
-    /// That of a text, if it is TOML.
+    /// Parses a text, if it is TOML.
     pub fn of(text: &'a str) -> Option<Layout<'a>> {
         Document::parse(text).ok().map(Layout)
     }
 
-    /// Where what is at a path stands, from the first to the last byte of its keys and values.
+    /// Returns the range of everything at a path, from the first to the last byte of its keys and values.
     pub fn extent(&self, path: &KeyPath) -> Option<Range<usize>> {
         let way = Way::along(self.0.as_table(), &path.0);
         way.rest.is_empty().then_some(())?;
         let mut found = None;
-        // A key stands before its value; the header of a table is told by the table.
+        // A key stands before its value; the header of a table belongs to the table.
         if let Some(Node::Table(parent)) = way.nodes.iter().rev().nth(1)
             && let Some(Segment::Key(key)) = path.0.last()
             && !matches!(way.nodes.last()?, Node::Table(table) if !table.is_dotted())
@@ -67,9 +67,18 @@ impl<'a> Layout<'a> {
         cover(&mut found, *way.nodes.last()?);
         found
     }
+
+    /// Returns the range of the value at a path.
+    pub fn value(&self, path: &KeyPath) -> Option<Range<usize>> {
+        let way = Way::along(self.0.as_table(), &path.0);
+        match way.nodes.last()? {
+            Node::Value(value) if way.rest.is_empty() => value.span(),
+            _ => None,
+        }
+    }
 }
 
-/// One thing of a document.
+/// A node of a document.
 #[derive(Clone, Copy)]
 enum Node<'a> {
     Table(&'a Table),
@@ -104,7 +113,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// Whether it is a table that is made by the dots of its keys.
+    /// Returns whether a table is defined by dotted keys.
     fn is_dotted(self) -> bool {
         match self {
             Node::Table(table) => table.is_dotted(),
@@ -114,11 +123,11 @@ impl<'a> Node<'a> {
     }
 }
 
-/// The way from the top of a document towards something, as far as there is one.
+/// The nodes from the root of a document along a path, as far as they exist.
 struct Way<'a, 'p> {
-    /// The document's own table first.
+    /// The nodes, starting with the root table.
     nodes: Vec<Node<'a>>,
-    /// The steps that lead to nothing.
+    /// The segments of the path that do not exist.
     rest: &'p [Segment],
 }
 
@@ -170,7 +179,7 @@ fn edits(text: &str, path: &KeyPath, value: Option<&Value>) -> Result<Vec<Edit>,
     }
 }
 
-/// The edits that make one value another; none where they are the same.
+/// Adds the edits that replace one value by another; none if they are equal.
 fn replacement(old: &Written, new: &Value, edits: &mut Vec<Edit>) -> Option<()> {
     let is_same = match (old, new) {
         (Written::Array(before), Value::Array(after)) if before.len() == after.len() => {
@@ -191,10 +200,10 @@ fn replacement(old: &Written, new: &Value, edits: &mut Vec<Edit>) -> Option<()> 
     Some(())
 }
 
-/// A key that is not there yet, in the table at the end of a way: after the last key there.
+/// Returns the edits that add an absent key to the table at the end of a path, after its last key.
 fn addition(text: &str, way: &Way, path: &[Segment], key: &str, value: &str) -> Result<Edit, String> {
     let here = *way.nodes.last().ok_or("has no place")?;
-    // A table of dotted keys goes on with the same words before each.
+    // A table of dotted keys repeats the same prefix before each key.
     let dots = way.nodes.iter().rev().take_while(|node| node.is_dotted()).count();
     let prefix = KeyPath(path[path.len() - dots..].to_vec()).exact();
     let dot = if dots > 0 { "." } else { "" };
@@ -241,7 +250,7 @@ fn addition(text: &str, way: &Way, path: &[Segment], key: &str, value: &str) -> 
     }
 }
 
-/// A section that a text has nothing of: behind the camera's, or that of the image.
+/// Returns the edit that adds an absent section: after that of the camera or the image.
 fn new_section(text: &str, root: &Table, name: &str, value: &str) -> Edit {
     let mut place = None;
     if let Some(item) = root.get("camera").or(root.get("image")) {
@@ -249,7 +258,7 @@ fn new_section(text: &str, root: &Table, name: &str, value: &str) -> Edit {
     }
     let at = place.map_or(text.len(), |place| place.end);
     let ends = line_break(text, at);
-    // `{ a = 1 }` under a header is its line alone.
+    // `{ a = 1 }` becomes one line under a header.
     let inner = value
         .strip_prefix("{ ")
         .and_then(|inner| inner.strip_suffix(" }"))
@@ -257,13 +266,13 @@ fn new_section(text: &str, root: &Table, name: &str, value: &str) -> Edit {
     behind_line(text, at, &format!("{ends}[{name}]{ends}{inner}"))
 }
 
-/// A new line behind the one on which a byte is.
+/// Returns the edit that adds a line after the one that contains a byte.
 fn behind_line(text: &str, at: usize, line: &str) -> Edit {
     let end = line_end(text, at);
     (end..end, format!("{}{line}", line_break(text, at)))
 }
 
-/// Where the line begins in which a byte is.
+/// Returns the start of the line that contains a byte.
 pub fn line_start(text: &str, at: usize) -> usize {
     let start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
     let mark = '\u{feff}'.len_utf8();
@@ -274,13 +283,13 @@ pub fn line_start(text: &str, at: usize) -> usize {
     }
 }
 
-/// Where it ends, without its line break.
+/// Returns the end of that line, without its line break.
 pub fn line_end(text: &str, at: usize) -> usize {
     let end = text[at..].find('\n').map_or(text.len(), |newline| at + newline);
     if text[at..end].ends_with('\r') { end - 1 } else { end }
 }
 
-/// How the line of a byte ends; the last one as the first does.
+/// Returns the line break of a line; the last line gets that of the first.
 fn line_break(text: &str, at: usize) -> &'static str {
     let own = text[at..].find('\n').map(|newline| at + newline);
     match own.or(text.find('\n')) {
@@ -289,9 +298,9 @@ fn line_break(text: &str, at: usize) -> &'static str {
     }
 }
 
-/// Takes the key at the end of a way out of its table; with it the table, if it is nothing but this key's.
+/// Returns the edits that remove the key at the end of a path, and the table if it becomes empty.
 fn removal(text: &str, way: &Way, path: &[Segment]) -> Result<Edit, String> {
-    let refused = || Err("is taken out in the scene file itself".to_owned());
+    let refused = || Err("can only be removed in the scene file".to_owned());
     let mut depth = path.len();
     loop {
         let ([.., parent, here], Some(Segment::Key(key))) = (&way.nodes[..=depth], path.get(depth - 1)) else {
@@ -338,7 +347,7 @@ fn removal(text: &str, way: &Way, path: &[Segment]) -> Result<Edit, String> {
     }
 }
 
-/// Where the keys of a table's own body stand, if it has any: not those under headers of their own.
+/// Returns the range of the keys in a table's own body, if it has any, without those under headers of their own.
 fn own(table: &Table) -> Option<Range<usize>> {
     let mut found = None;
     for (key, item) in table.iter() {
@@ -355,7 +364,7 @@ fn own(table: &Table) -> Option<Range<usize>> {
     found
 }
 
-/// Widens a range by all that belongs to something.
+/// Extends a range by everything that belongs to a node.
 fn cover(found: &mut Option<Range<usize>>, node: Node) {
     match node {
         Node::Value(value) => match value.as_inline_table().filter(|table| table.is_dotted()) {
@@ -387,7 +396,7 @@ fn widen(found: &mut Option<Range<usize>>, span: Range<usize>) {
     });
 }
 
-/// A value as a scene file has it: whole numbers without a point, as people write them.
+/// Formats a value for a scene file: whole numbers without a decimal point.
 fn literal(value: &Value) -> String {
     match value {
         Value::Float(x) if x.fract() == 0.0 && x.abs() < 1e15 => format!("{x:.0}"),

@@ -1,22 +1,22 @@
-//! Pixels that are no light: NaN, infinite or negative. A display shows them like black or white; here they are counted
-//! and marked.
+//! Invalid pixels: NaN, infinite or negative. A display shows them like black or white; here they are counted and
+//! marked.
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// What is wrong with a pixel.
+/// The kind of an invalid pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// A value is no number.
+    /// A value is NaN.
     Nan,
-    /// One is infinite.
+    /// A value is infinite.
     Infinite,
-    /// One is below zero.
+    /// A value is negative.
     Negative,
 }
 
 impl Fault {
-    /// What is wrong with values; the worst if it is several things.
+    /// Returns the kind of invalid values, the worst of several.
     pub fn of(values: &[f32]) -> Option<Fault> {
         let faults = [
             (Fault::Nan, values.iter().any(|v| v.is_nan())),
@@ -26,7 +26,7 @@ impl Fault {
         faults.into_iter().find(|(_, found)| *found).map(|(fault, _)| fault)
     }
 
-    /// The colour of its mark, which nobody takes for light.
+    /// Returns the color of the mark, which stands out from light.
     pub fn color(self) -> [u8; 3] {
         match self {
             Fault::Nan => [255, 0, 255],
@@ -36,28 +36,28 @@ impl Fault {
     }
 }
 
-/// A picture is cut into so many parts along each side; of each one place is told.
+/// Number of tiles along each side of an image; one location is listed per tile.
 const PARTS: usize = 8;
 
-/// How many pixels of a picture are wrong.
+/// The number of invalid pixels of an image.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Faults {
-    /// Pixels with a value that is no number.
+pub struct BadPixels {
+    /// Pixels with a NaN.
     pub nan: usize,
-    /// Others with an infinite one.
+    /// Other pixels with an infinite value.
     pub infinite: usize,
-    /// Others with a negative one.
+    /// Other pixels with a negative value.
     pub negative: usize,
-    /// The places of some of them, one in each part of the picture that has any.
+    /// The location of one invalid pixel per tile.
     pub places: Vec<[u32; 2]>,
 }
 
-impl Faults {
-    /// Counts the faults of a picture, given row by row from the top, of this width in pixels.
-    pub fn count(faults: &[Option<Fault>], width: u32) -> Faults {
+impl BadPixels {
+    /// Counts the invalid pixels of an image, given row by row from the top, of this width in pixels.
+    pub fn count(faults: &[Option<Fault>], width: u32) -> BadPixels {
         let width = width as usize;
         let height = faults.len().div_ceil(width.max(1));
-        let mut counted = Faults::default();
+        let mut counted = BadPixels::default();
         let mut told = [false; PARTS * PARTS];
         for (i, fault) in faults.iter().enumerate() {
             match fault {
@@ -76,7 +76,7 @@ impl Faults {
     }
 }
 
-/// What is wrong with each pixel. Where filters have negative lobes, `negative` values are light too.
+/// Returns the kind of each invalid pixel. With filters that have negative lobes, `negative` values are valid.
 pub fn faults<T: Sync, const N: usize>(
     pixels: &[T],
     negative: bool,
@@ -86,7 +86,7 @@ pub fn faults<T: Sync, const N: usize>(
     pixels.par_iter().with_min_len(1024).map(fault).collect()
 }
 
-/// Paints the marks over the bytes of a picture.
+/// Paints the marks over the bytes of an image.
 pub fn mark(rgb: &mut [u8], faults: &[Option<Fault>]) {
     for (pixel, fault) in rgb.chunks_exact_mut(3).zip(faults) {
         if let Some(fault) = fault {
@@ -117,20 +117,20 @@ mod tests {
     fn faults_are_counted_and_marked() {
         let pixels = [[0.5; 3], [f32::NAN; 3], [f32::INFINITY; 3], [-1.0; 3]];
         let found = faults(&pixels, false, |color| *color);
-        let counted = Faults::count(&found, 2);
+        let counted = BadPixels::count(&found, 2);
         assert_eq!((counted.nan, counted.infinite, counted.negative), (1, 1, 1));
         assert_eq!(counted.places, [[1, 0], [0, 1], [1, 1]]);
         let mut rgb = [7; 12];
         mark(&mut rgb, &found);
         assert_eq!(rgb, [7, 7, 7, 255, 0, 255, 0, 255, 255, 0, 255, 0]);
         let allowed = faults(&pixels, true, |color| *color);
-        assert_eq!(Faults::count(&allowed, 4).negative, 0);
+        assert_eq!(BadPixels::count(&allowed, 4).negative, 0);
         let mut many = [Some(Fault::Negative); 1000];
-        let counted = Faults::count(&many, 10);
+        let counted = BadPixels::count(&many, 10);
         assert_eq!((counted.negative, counted.places.len()), (1000, PARTS * PARTS));
         many[10..].fill(None);
         many[999] = Some(Fault::Nan);
-        let counted = Faults::count(&many, 10);
+        let counted = BadPixels::count(&many, 10);
         assert!(counted.places.contains(&[9, 99]), "one that is alone is not left out");
     }
 }

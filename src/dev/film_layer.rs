@@ -1,26 +1,26 @@
-//! Layers of the film as pictures: means over a pixel's samples, and the variance that adaptive sampling knows.
+//! Layers of the film as images: means over the samples of a pixel, and the variance from adaptive sampling.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::look::Look;
+use super::look::DisplaySettings;
 use super::picture::{bits, bytes, numbers, of_film};
 use crate::film::{Film, Layer, variance_of_mean};
 use crate::image::{Aov, Pixels, to_8_bits};
 
-/// A layer of a film, as `wgray render --aov` gives it.
+/// A layer of a film, as written by `wgray render --aov`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmLayer {
-    /// Which one.
+    /// The layer.
     pub aov: Aov,
-    /// Its three numbers for each pixel. Before a pixel has two samples its variance is 0.
+    /// Three values per pixel. The variance is 0 below two samples.
     pub values: Pixels,
-    /// Of normals the share of each pixel's samples that meet anything, else nothing.
+    /// For normals: the fraction of each pixel's samples that hit anything. Empty for other layers.
     pub covered: Vec<f32>,
 }
 
 impl FilmLayer {
-    /// That of a film. In rows that have no samples yet `under` shows through, a smaller film of the same picture.
+    /// Returns a layer of a film. Rows without samples show `under`, a smaller film of the same image.
     pub fn of(aov: Aov, film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> FilmLayer {
         let covered = match aov {
             Aov::ShadingNormal => of_film(film, under, has_samples, &Film::alpha),
@@ -37,19 +37,19 @@ impl FilmLayer {
         }
     }
 
-    /// Whether it is a part of the picture's light.
+    /// Returns whether the layer is a part of the image's radiance.
     pub fn is_light(&self) -> bool {
         matches!(self.aov, Aov::Direct | Aov::Indirect | Aov::Emission)
     }
 
-    /// Whether its numbers may be below zero.
+    /// Returns whether the values may be negative.
     pub fn may_be_negative(&self) -> bool {
         self.aov == Aov::ShadingNormal
     }
 
-    /// The bytes that are shown: light as the picture is, albedo by the display's curve alone, of variances the standard error
-    /// in false colours.
-    pub fn bytes(&self, look: &Look) -> Vec<u8> {
+    /// Returns the displayed bytes: radiance like the image, albedo by the display's curve alone, and variance as its
+    /// standard error in false colors.
+    pub fn bytes(&self, look: &DisplaySettings) -> Vec<u8> {
         let values = &self.values.colors;
         match self.aov {
             Aov::ShadingNormal => {
@@ -64,7 +64,7 @@ impl FilmLayer {
         }
     }
 
-    fn shown(&self, value: [f32; 3], look: &Look) -> [u8; 3] {
+    fn shown(&self, value: [f32; 3], look: &DisplaySettings) -> [u8; 3] {
         match self.aov {
             Aov::Variance => look.error_color(standard_error(value)),
             Aov::Albedo => look.view.display_share(value).map(to_8_bits),
@@ -72,8 +72,8 @@ impl FilmLayer {
         }
     }
 
-    /// What is known of pixel `i`, by name.
-    pub fn pixel(&self, i: usize, look: &Look) -> Option<Vec<(&'static str, String)>> {
+    /// Returns the values of pixel `i` by name.
+    pub fn pixel(&self, i: usize, look: &DisplaySettings) -> Option<Vec<(&'static str, String)>> {
         let value = *self.values.colors.get(i)?;
         let name = match self.aov {
             Aov::ShadingNormal => "shading normal",
@@ -93,7 +93,7 @@ fn standard_error(variance: [f32; 3]) -> [f32; 3] {
     variance.map(f32::sqrt)
 }
 
-/// The numbers of a pixel; 0 where a film does not have them.
+/// Returns the values of a pixel; 0 if the film does not have them.
 fn value(aov: Aov, film: &Film, i: usize) -> [f32; 3] {
     match aov {
         Aov::Variance => match film.moments.get(i).filter(|moments| moments.w >= 2.0) {
@@ -142,12 +142,12 @@ mod tests {
         let normal = FilmLayer::of(Aov::ShadingNormal, &film(), None, &all);
         assert_eq!(normal.covered, [0.5; 2]);
         // 1.25 / 2 + 0.5 / 2, 0.25, and what is below.
-        assert_eq!(normal.bytes(&Look::default())[..3], [223, 64, 0]);
+        assert_eq!(normal.bytes(&DisplaySettings::default())[..3], [223, 64, 0]);
         let variance = FilmLayer::of(Aov::Variance, &film(), None, &all);
         assert_eq!(variance.values.colors, [[0.25, 1.0, 0.0], [0.0; 3]]);
-        let told = variance.pixel(0, &Look::default()).unwrap();
+        let told = variance.pixel(0, &DisplaySettings::default()).unwrap();
         assert_eq!(told[2], ("standard error", "0.5  1  0".to_string()));
-        assert_eq!(variance.pixel(2, &Look::default()), None);
+        assert_eq!(variance.pixel(2, &DisplaySettings::default()), None);
         // A film that lacks them has none.
         let plain = Film::new(Region::whole(1, 2));
         for aov in [Aov::Variance, Aov::Direct] {
@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn light_follows_the_exposure_and_albedo_does_not() {
         let bytes = |aov, exposure: f64| {
-            let mut look = Look::default();
+            let mut look = DisplaySettings::default();
             look.view.exposure = exposure;
             FilmLayer::of(aov, &film(), None, &|_| true).bytes(&look)
         };

@@ -1,33 +1,34 @@
-//! Which requests are answered. A page from elsewhere must not reach the session through the user's browser: not by a
-//! name that it points to this address (DNS rebinding: the Host is foreign), not by a WebSocket (the Origin is foreign).
+//! The check of requests. Another page must not reach the session through the user's browser: not by a name that
+//! points to this address (DNS rebinding, with a foreign Host), and not by a WebSocket (with a foreign Origin).
 
 use std::net::IpAddr;
 
 use axum::http::uri::Authority;
-use axum::http::{HeaderMap, HeaderName, header};
+use axum::http::{HeaderMap, HeaderName, Uri, header};
 
-/// The hosts that a server may be called by.
+/// The host names of a server.
 #[derive(Clone, Debug)]
 pub struct Guard {
-    /// The name that it was told to listen on, if it is no address.
+    /// The host name that it listens on, unless that is an address.
     pub name: Option<String>,
-    /// Whether it listens on loopback only.
+    /// True if it listens on loopback only.
     pub loopback: bool,
 }
 
 impl Guard {
-    /// Whether a request may be answered; if not, what is wrong. A WebSocket must have an Origin.
+    /// Checks a request. A request that changes anything must have an Origin.
     ///
     /// # Errors
     ///
-    /// What to tell whoever asks.
-    pub fn check(&self, headers: &HeaderMap, socket: bool) -> Result<(), &'static str> {
+    /// The reason, as text for the client.
+    pub fn check(&self, target: &Uri, headers: &HeaderMap, socket: bool) -> Result<(), &'static str> {
         let host = one(headers, header::HOST).and_then(|host| host.parse::<Authority>().ok());
-        let host = host
-            .filter(|host| self.knows(host))
-            .ok_or("this Host is not served here")?;
+        let host = host.filter(|host| self.knows(host)).ok_or("this Host is not allowed")?;
+        if target.authority().is_some_and(|authority| *authority != host) {
+            return Err("this Host is not allowed"); // the target is a whole URL, of another host
+        }
         match (one(headers, header::ORIGIN), headers.contains_key(header::ORIGIN)) {
-            // Through a tunnel or a proxy the browser may see https.
+            // A tunnel or a proxy may use https.
             (Some(origin), _) => {
                 let authority = origin
                     .strip_prefix("http://")
@@ -36,17 +37,17 @@ impl Guard {
                 if same {
                     Ok(())
                 } else {
-                    Err("pages from elsewhere are not served")
+                    Err("requests from other pages are not allowed")
                 }
             }
-            (None, true) => Err("pages from elsewhere are not served"),
-            (None, false) if socket => Err("this request needs an Origin"),
+            (None, true) => Err("requests from other pages are not allowed"),
+            (None, false) if socket => Err("this request must have an Origin"),
             (None, false) => Ok(()),
         }
     }
 
-    /// An address cannot be pointed elsewhere, unlike a name: of names only those that are known count. Any port will do,
-    /// for those who come through a tunnel.
+    /// An address cannot be redirected, unlike a name: only known names are allowed. Any port is allowed, for
+    /// tunnels.
     fn knows(&self, host: &Authority) -> bool {
         if host.as_str().contains('@') {
             return false;
@@ -64,7 +65,7 @@ impl Guard {
     }
 }
 
-/// A header's value, if it is there once.
+/// Returns the value of a header that occurs exactly once.
 fn one(headers: &HeaderMap, name: HeaderName) -> Option<&str> {
     let mut values = headers.get_all(name).iter();
     let value = values.next()?;
@@ -81,7 +82,7 @@ mod tests {
         if let Some(origin) = origin {
             headers.insert(header::ORIGIN, origin.parse().unwrap());
         }
-        guard.check(&headers, socket).is_ok()
+        guard.check(&Uri::from_static("/"), &headers, socket).is_ok()
     }
 
     #[test]
@@ -154,16 +155,41 @@ mod tests {
     }
 
     #[test]
+    fn a_target_with_another_authority_is_refused() {
+        let guard = Guard {
+            name: None,
+            loopback: true,
+        };
+        let mut headers = HeaderMap::new();
+        headers.append(header::HOST, "localhost:7878".parse().unwrap());
+        assert!(
+            guard
+                .check(&Uri::from_static("http://LOCALHOST:7878/"), &headers, false)
+                .is_ok()
+        );
+        for target in [
+            "http://evil.example/",
+            "http://localhost/",
+            "http://localhost:7878@evil.example/",
+        ] {
+            assert!(
+                guard.check(&target.parse().unwrap(), &headers, false).is_err(),
+                "{target}"
+            );
+        }
+    }
+
+    #[test]
     fn a_missing_or_doubled_host_is_refused() {
         let guard = Guard {
             name: None,
             loopback: true,
         };
-        assert!(guard.check(&HeaderMap::new(), false).is_err());
+        assert!(guard.check(&Uri::from_static("/"), &HeaderMap::new(), false).is_err());
         let mut headers = HeaderMap::new();
         headers.append(header::HOST, "localhost".parse().unwrap());
-        assert!(guard.check(&headers, false).is_ok());
+        assert!(guard.check(&Uri::from_static("/"), &headers, false).is_ok());
         headers.append(header::HOST, "evil.example".parse().unwrap());
-        assert!(guard.check(&headers, false).is_err());
+        assert!(guard.check(&Uri::from_static("/"), &headers, false).is_err());
     }
 }

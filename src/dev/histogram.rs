@@ -1,35 +1,35 @@
-//! How bright the pixels of a picture are.
+//! The distribution of brightness over the pixels of an image.
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// The exponents that are counted: 2^-12 up to 2^8. What is darker or brighter is in the first or the last bin.
+/// The lowest exponent: bins cover 2^-12 to 2^8. Values outside are counted in the first or the last bin.
 const FIRST: i32 = -12;
 const LAST: i32 = 8;
-/// Bins of a stop: from 2^e to 2^(e + 1/4), and so on.
+/// Bins per stop.
 const OF_A_STOP: i32 = 4;
 /// 2^(1/4), 2^(1/2) and 2^(3/4).
 const BOUNDS: [f32; 3] = [1.189_207_1, std::f32::consts::SQRT_2, 1.681_792_9];
 const BINS: usize = ((LAST - FIRST) * OF_A_STOP) as usize;
 
-/// How many pixels have which value, for red, green and blue.
+/// The number of pixels per value, for red, green and blue.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Histogram {
-    /// The stop at which the first bin begins.
+    /// The stop at which the first bin starts.
     pub first: i32,
-    /// The bins of a stop.
+    /// The number of bins per stop.
     pub of_a_stop: i32,
-    /// Red, green and blue. Values of zero or less, and what is no number, are in none.
+    /// Red, green and blue. Values that are not positive numbers are not counted.
     pub counts: [Vec<u32>; 3],
-    /// Of each how many are brighter than what is shown as white.
+    /// The number of values per channel that are brighter than white.
     pub above_white: [u32; 3],
 }
 
-/// What is counted.
+/// The counts per channel, and the number above white.
 type Counts = [(Vec<u32>, u32); 3];
 
 impl Histogram {
-    /// Counts linear colours, of which 1 is white after an exposure, in stops.
+    /// Counts linear colors. After an exposure in stops 1 is white.
     pub fn of(colors: &[[f32; 3]], exposure: f64) -> Histogram {
         let white = (-exposure).exp2() as f32;
         let none = || [(); 3].map(|()| (vec![0; BINS], 0));
@@ -60,7 +60,7 @@ impl Histogram {
     }
 }
 
-/// The bin of a value, read from the bits of the float: the exponent, and where the rest is among the bounds.
+/// Returns the bin of a value from the bits of the float: from the exponent, and the mantissa among the bounds.
 fn bin(value: f32) -> Option<usize> {
     if value.is_nan() || value <= 0.0 {
         return None;

@@ -1,29 +1,29 @@
-//! What was written into the scene file in this session, step by step, so that it can be taken back and made again.
+//! The changes of the scene file by this session, for undo and redo.
 
 use crate::scene::KeyPath;
 
-/// So many steps are kept.
+/// Maximum number of steps.
 const MOST: usize = 1000;
 
-/// One change of the file.
+/// A change of the file.
 #[derive(Debug)]
 pub struct Step {
-    /// What was changed, for people.
+    /// The changed key, for display.
     pub what: String,
-    /// Inside of which table.
+    /// The table that contains the change.
     pub at: KeyPath,
-    /// Whether it was the camera that was saved.
+    /// True if the camera was saved.
     pub is_camera: bool,
-    /// Changes of one gesture are one step.
+    /// Changes of the same gesture are one step.
     gesture: Option<u64>,
-    /// What stood at a byte, and what stands there now.
+    /// The offset of the change, and the bytes there before and after it.
     start: usize,
     before: Vec<u8>,
     after: Vec<u8>,
 }
 
 impl Step {
-    /// A change by itself.
+    /// Returns a change with no text yet.
     pub fn new(what: String, at: KeyPath, gesture: Option<u64>) -> Step {
         Step {
             what,
@@ -36,7 +36,7 @@ impl Step {
         }
     }
 
-    /// Between two texts.
+    /// Completes the step by the difference of two texts.
     fn between(mut self, before: &str, after: &str) -> Step {
         let (a, b) = (before.as_bytes(), after.as_bytes());
         self.start = a.iter().zip(b).take_while(|(a, b)| a == b).count();
@@ -54,7 +54,7 @@ impl Step {
     }
 }
 
-/// All of them, for a file that nobody else has changed since.
+/// The changes of a file that no other program has changed since.
 #[derive(Debug, Default)]
 pub struct History {
     done: Vec<Step>,
@@ -62,7 +62,7 @@ pub struct History {
 }
 
 impl History {
-    /// Remembers a change that was made of a text.
+    /// Adds a change of a text.
     pub fn add(&mut self, step: Step, before: &str, after: &str) {
         self.undone.clear();
         let is_same = |last: &Step| last.gesture.is_some() && last.gesture == step.gesture && last.what == step.what;
@@ -83,12 +83,12 @@ impl History {
         !(done.is_empty() && undone.is_empty())
     }
 
-    /// What was changed last, and what was taken back last.
+    /// Returns the last change, or the last change that was undone.
     pub fn last(&self, again: bool) -> Option<&Step> {
         if again { self.undone.last() } else { self.done.last() }
     }
 
-    /// The text without the last change, or with the one that was taken back last.
+    /// Returns the text after undo or redo.
     pub fn turned(&self, text: &str, again: bool) -> Option<String> {
         let step = self.last(again)?;
         match again {
@@ -97,14 +97,14 @@ impl History {
         }
     }
 
-    /// The file has that text now.
+    /// Notes that the file has the text of [`Self::turned`].
     pub fn turn(&mut self, again: bool) {
         let (from, to) = match again {
             false => (&mut self.done, &mut self.undone),
             true => (&mut self.undone, &mut self.done),
         };
         to.extend(from.pop());
-        // Another change of the same gesture is none of what was taken back.
+        // A later change of the same gesture must not be merged with a step that was redone.
         self.done
             .iter_mut()
             .last()
@@ -140,7 +140,7 @@ mod tests {
             history.turn(true);
             assert_eq!(text, *wanted);
         }
-        // Another change: what was taken back is gone.
+        // Another change drops the changes that were undone.
         history.add(step("x", None), texts[2], "x");
         assert!(history.last(true).is_none());
         assert_eq!(history.turned("x", false).as_deref(), Some(texts[2]));
@@ -168,7 +168,7 @@ mod tests {
             assert_eq!(text, wanted);
         }
         assert!(history.last(false).is_none());
-        // Back to where it began: nothing was changed.
+        // A gesture that ends where it began changes nothing.
         history.add(step("a", Some(3)), "a = 1", "a = 2");
         history.add(step("a", Some(3)), "a = 2", "a = 1");
         assert!(history.last(false).is_none());

@@ -1,4 +1,5 @@
-//! How a picture is shown: the scene's view transform and exposure or those chosen on the page, false colours, and marks.
+//! Display settings: the view transform and the exposure of the scene or those chosen on the page, false colors, and
+//! marks.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -7,28 +8,28 @@ use crate::compare::color;
 use crate::image::Pixels;
 use crate::scene::{ViewSettings, ViewTransform};
 
-/// What is chosen of how light is shown; what is not chosen is the scene's.
+/// Display settings that override those of the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Choice {
-    /// Stops, -100 to 100.
+pub struct DisplayOverrides {
+    /// The exposure in stops, -100 to 100.
     pub exposure: Option<f64>,
-    /// From light to what a display is sent.
+    /// The view transform.
     pub transform: Option<ViewTransform>,
-    /// Whether colours tell how bright light is.
+    /// True for false colors by luminance.
     pub false_color: bool,
 }
 
-impl Choice {
-    /// A choice that is within its ranges.
-    pub fn checked(self) -> Result<Choice, String> {
+impl DisplayOverrides {
+    /// Returns the overrides, if they are within their ranges.
+    pub fn checked(self) -> Result<DisplayOverrides, String> {
         if let Some(stops) = self.exposure {
             ViewSettings::check_exposure(stops).map_err(|rule| format!("exposure: {stops} {rule}"))?;
         }
         Ok(self)
     }
 
-    /// The scene's settings, with what is chosen.
+    /// Returns the settings of the scene with the overrides.
     pub fn over(self, scene: ViewSettings) -> ViewSettings {
         ViewSettings {
             transform: self.transform.unwrap_or(scene.transform),
@@ -37,27 +38,27 @@ impl Choice {
     }
 }
 
-/// How a frame is shown, beside what it is of.
+/// The settings by which a frame is displayed.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Look {
-    /// The factor of the difference of [`View::Compare`](super::View::Compare).
+pub struct DisplaySettings {
+    /// The gain of the difference in [`View::Compare`](super::View::Compare).
     pub gain: f32,
-    /// Whether pixels that are no light are marked.
+    /// True if invalid pixels are marked.
     pub marks: bool,
-    /// Whether negative ones are light, as under filters with negative lobes.
+    /// True if negative values are valid, as under filters with negative lobes.
     pub negative: bool,
-    /// How light is shown.
+    /// The view transform and the exposure.
     pub view: ViewSettings,
-    /// Whether colours tell how bright light is.
+    /// True for false colors by luminance.
     pub false_color: bool,
 }
 
-/// The stops of luminance, after the exposure, from the first false colour to the last: of light, and of standard errors.
+/// The range of false colors in stops of luminance, after exposure: of radiance, and of standard errors.
 const FALSE_COLORS: [f32; 2] = [-10.0, 6.0];
 const ERRORS: [f32; 2] = [-12.0, 0.0];
 
-impl Look {
-    /// The bytes that are shown for linear light.
+impl DisplaySettings {
+    /// Returns the displayed bytes of a linear color.
     pub fn shown(&self, light: [f32; 3]) -> [u8; 3] {
         match self.false_color {
             true => self.false_color(light, FALSE_COLORS),
@@ -65,40 +66,40 @@ impl Look {
         }
     }
 
-    /// The bytes of a picture of light.
+    /// Returns the displayed bytes of an image.
     pub fn bytes(&self, pixels: &Pixels) -> Vec<u8> {
         let colors = pixels.colors.par_iter().with_min_len(1024);
         colors.flat_map_iter(|color| self.shown(*color)).collect()
     }
 
-    /// The false colour of a standard error of light.
+    /// Returns the false color of a standard error.
     pub fn error_color(&self, error: [f32; 3]) -> [u8; 3] {
         self.false_color(error, ERRORS)
     }
 
-    /// Luminance is that of Rec. 709; none is shown as the least.
+    /// Uses the luminance of Rec. 709; zero gets the first color.
     fn false_color(&self, [r, g, b]: [f32; 3], [first, last]: [f32; 2]) -> [u8; 3] {
         let stops = (0.2126 * r + 0.7152 * g + 0.0722 * b).log2() + self.view.exposure as f32;
         color(((stops - first) / (last - first) * 255.0 + 0.5) as u8) // saturates; NaN is 0
     }
 }
 
-/// What false colours mean.
+/// The scale of false colors.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Legend {
-    /// The stops of luminance of the first colour and of the last.
+    /// The luminance of the first and the last color, in stops.
     pub stops: [f64; 2],
-    /// Colours, evenly spaced.
+    /// Evenly spaced colors.
     pub colors: Vec<[u8; 3]>,
 }
 
 impl Legend {
-    /// That of light, under an exposure.
+    /// Returns the scale of radiance under an exposure.
     pub fn of(exposure: f64) -> Legend {
         Legend::over(FALSE_COLORS, exposure)
     }
 
-    /// That of standard errors of light.
+    /// Returns the scale of standard errors under an exposure.
     pub fn of_errors(exposure: f64) -> Legend {
         Legend::over(ERRORS, exposure)
     }
@@ -117,13 +118,13 @@ mod tests {
 
     #[test]
     fn false_colours_follow_the_stops() {
-        let look = |exposure| Look {
+        let look = |exposure| DisplaySettings {
             view: ViewSettings {
                 exposure,
                 ..ViewSettings::default()
             },
             false_color: true,
-            ..Look::default()
+            ..DisplaySettings::default()
         };
         let grey = |stops: f32| [stops.exp2(); 3];
         let [first, last] = FALSE_COLORS;
@@ -147,7 +148,7 @@ mod tests {
             assert_eq!(look(0.0).shown([light; 3]), wanted, "{light}");
         }
         assert_ne!(look(0.0).shown(grey(0.0)), look(0.0).shown(grey(-3.0)));
-        // Standard errors have a scale of their own.
+        // Standard errors have their own scale.
         let Legend { stops, colors: legend } = Legend::of_errors(3.0);
         assert_eq!(stops, [-15.0, -3.0]);
         for (stops, wanted) in [(-15.0, legend[0]), (-9.0, legend[8]), (-3.0, legend[16])] {
@@ -165,10 +166,10 @@ mod tests {
             transform: ViewTransform::Agx,
             exposure: 2.0,
         };
-        assert_eq!(Choice::default().over(scene), scene);
-        let chosen = Choice {
+        assert_eq!(DisplayOverrides::default().over(scene), scene);
+        let chosen = DisplayOverrides {
             exposure: Some(-1.0),
-            ..Choice::default()
+            ..DisplayOverrides::default()
         };
         assert_eq!(
             chosen.over(scene),
@@ -179,7 +180,7 @@ mod tests {
         );
         for stops in [100.5, -101.0, f64::NAN, f64::INFINITY] {
             let exposure = Some(stops);
-            assert!(Choice { exposure, ..chosen }.checked().is_err(), "{stops}");
+            assert!(DisplayOverrides { exposure, ..chosen }.checked().is_err(), "{stops}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! How long it takes from a change to the picture: saves copies of a scene and of the shaders, and looks at the clock.
+//! Measurement of the time from a change to its image, on copies of a scene and of the shaders.
 
 use std::fs;
 use std::path::Path;
@@ -14,43 +14,49 @@ use super::picture::Frame;
 use super::save::replace;
 use super::session::{Session, Settings};
 use super::source::Sources;
-use crate::gpu::Choice;
+use crate::gpu::AdapterChoice;
 use crate::gpu::compose::{self, Shaders};
 use crate::scene::{Overrides, is_course, is_gltf};
 
-/// Saves of each kind.
+/// Number of changes of each kind.
 const ROUNDS: usize = 7;
-/// The first seed, one that hardly any scene has.
+/// The first seed, which hardly any scene uses.
 const SEEDS: i64 = 7_361_000;
-/// No picture takes so long.
+/// Maximum time to wait for an image.
 const LONGEST: Duration = Duration::from_secs(120);
-/// The expression in `kernels/render.wgsl` that is changed, so that the picture changes and no cache knows the kernel.
+/// The expression in `kernels/render.wgsl` that is changed, so that the image changes and no cache contains the
+/// kernel.
 const PLACE: &str = "path_value(path)";
 
-/// Times from one kind of change.
+/// The times of one kind of change.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
-    /// What was changed.
+    /// The kind of change.
     pub change: &'static str,
-    /// Until the old picture's rendering was given up.
+    /// Times until the rendering of the old image was given up.
     pub stopped: Vec<Duration>,
-    /// Until the first picture, which may be coarse.
+    /// Times until the first image, which may be coarse.
     pub first: Vec<Duration>,
-    /// Until every pixel has a sample.
+    /// Times until each pixel has a sample.
     pub whole: Vec<Duration>,
 }
 
-/// Measures a value of a scene that is set as on the page, saves of the scene, moves of its camera and saves of a shader. Copies are saved, the scene's beside it.
+/// Measures setting a value as on the page, saves of the scene, moves of the camera and saves of a shader. Copies are
+/// saved, that of the scene in its own folder.
 ///
 /// # Errors
 ///
-/// What to tell the user; `None` if it was stopped. The copies are gone in every case.
-pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Result<Vec<Measured>, Option<String>> {
+/// The message for the user; `None` if it was stopped. The copies are removed in every case.
+pub fn measure(
+    sources: &Sources,
+    device: AdapterChoice,
+    stopped: &AtomicBool,
+) -> Result<Vec<Measured>, Option<String>> {
     let told = |error: std::io::Error| Some(error.to_string());
     for (is_it, kind) in [(is_course as fn(&Path) -> bool, "JSON"), (is_gltf, "glTF")] {
         if is_it(&sources.scene) {
             let place = sources.scene.display();
-            return Err(Some(format!("{place}: must be TOML to be measured; it is {kind}")));
+            return Err(Some(format!("{place}: only TOML scenes can be measured, not {kind}")));
         }
     }
     let text =
@@ -98,10 +104,10 @@ pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Resul
     let kernel_text = shaders.text("kernels/render.wgsl").to_string();
     if !kernel_text.contains(PLACE) {
         return Err(Some(format!(
-            "kernels/render.wgsl must contain '{PLACE}', which is changed to measure"
+            "kernels/render.wgsl must contain '{PLACE}', which the measurement changes"
         )));
     }
-    // Every run has kernels of its own: factors that are not the same as f32.
+    // Each run has its own kernels: the factors differ as f32.
     let now = SystemTime::now()
         .duration_since(SystemTime::UNIX_EPOCH)
         .map_or(0, |time| time.as_millis() % 65_536);
@@ -115,7 +121,7 @@ pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Resul
             Ok(())
         })?,
         clock.all("scene save", &mut |i, _| {
-            // In one step: a large file that is half written would be read, and told to be wrong.
+            // In one step: half of a large file would be read, and reported as an error.
             replace(scene.path(), reseeded(&text, i).as_bytes()).map_err(told)
         })?,
         clock.all("camera move", &mut |_, session| {
@@ -130,7 +136,7 @@ pub fn measure(sources: &Sources, device: Choice, stopped: &AtomicBool) -> Resul
     ])
 }
 
-/// The scene with other random numbers: whatever it is made of, that is another picture.
+/// Returns the scene with another seed, which changes the image of any scene.
 fn reseeded(text: &str, i: usize) -> String {
     let mut document: DocumentMut = text.parse().unwrap_or_default();
     document["render"]["seed"] = value(SEEDS + (ROUNDS + i) as i64);
@@ -164,7 +170,7 @@ impl Clock<'_> {
         Ok(measured)
     }
 
-    /// The times from a change.
+    /// Returns the times after a change.
     fn after(
         &self,
         change: &str,
@@ -196,7 +202,7 @@ impl Clock<'_> {
             }
             std::thread::sleep(Duration::from_millis(1));
         }
-        Err(Some(format!("{change}: no picture within {} s", LONGEST.as_secs())))
+        Err(Some(format!("{change}: no image within {} s", LONGEST.as_secs())))
     }
 
     fn frame(&self) -> Option<Arc<Frame>> {

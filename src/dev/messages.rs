@@ -1,4 +1,4 @@
-//! What reaches the thread that renders, and what it tells those who look.
+//! The events that reach the painter, and the messages for viewers and the terminal.
 
 use std::num::NonZeroU32;
 use std::time::Instant;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::build::Built;
 use super::camera::{Move, Viewpoint};
 use super::diagnostic::Diagnostic;
-use super::look::Choice;
+use super::look::DisplayOverrides;
 use super::picture::{LayerName, View};
 use super::reference::{Apart, Reference};
 use super::sliders::SliderState;
@@ -16,35 +16,34 @@ use super::source::Snapshot;
 use crate::gpu::marks::Value;
 use crate::scene::ViewTransform;
 
-/// Something that happened.
+/// A report for the terminal.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Report {
-    /// Something is wrong.
+    /// An error.
     Problem(Diagnostic),
-    /// Nothing is wrong any more.
+    /// All errors are fixed.
     Mended,
-    /// The first picture of a saved file was shown, so many seconds after the save was noticed; if a kernel was compiled,
-    /// that took so many.
+    /// The first image after a save was shown.
     Reloaded {
-        /// From the save to the picture.
+        /// Seconds from the change to the image; the time to compile is part of it.
         seconds: f64,
-        /// To compile.
+        /// Seconds spent on compiling.
         compiled: Option<f64>,
     },
-    /// The picture has all its samples.
+    /// The image has all its samples.
     Finished {
-        /// Since the first picture.
+        /// Seconds since the first image.
         seconds: f64,
     },
-    /// Something to know of the scene.
+    /// A note about the scene.
     Note(String),
-    /// The picture is larger than what can be shown: the size asked for, and the size of what is shown.
+    /// The image is too large to display: its size, and the size that is shown.
     Smaller([u32; 2], [u32; 2]),
-    /// The values of sliders were written into the shaders, or that was taken back, as is said here; or why not.
+    /// The sliders were saved to the shaders, or that was undone; or the error.
     Written(&'static str, Result<(), String>),
-    /// Something was written into the scene file, the camera or a value; or why it could not be.
+    /// The camera or a value was saved to the scene file; or the error.
     Wrote(String, Result<(), String>),
-    /// What was written last was taken back, or what was taken back last was made again; or why not.
+    /// A change of the scene file was undone or redone; or the error.
     Turned(String, Result<(), String>),
 }
 
@@ -52,85 +51,86 @@ pub enum Report {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Set {
-    /// The way to it: `materials.red.color`.
+    /// The path of the key: `materials.red.color`.
     pub path: String,
-    /// The value; null takes the key out of the file.
+    /// The value; null removes the key from the file.
     pub value: serde_json::Value,
     /// Changes of the same key with the same number are one step of undo.
     #[serde(default)]
     pub gesture: Option<u64>,
 }
 
-/// What someone who looks asks for.
+/// A command of a viewer.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Command {
-    /// A hand takes hold of the camera: the moves that follow are one step of its history.
+    /// Starts a drag of the camera: the moves that follow are one step of its history.
     Grab,
-    /// To move the camera.
+    /// Moves the camera.
     Move(Move),
-    /// To put the camera elsewhere.
+    /// Sets the viewpoint.
     Viewpoint(Viewpoint),
-    /// To see the whole of the object at a pixel of the whole picture, or of all that there is.
+    /// Frames the object at a pixel of the full-size image, or the whole scene.
     Frame(Option<[u32; 2]>),
-    /// To take the last step of the camera back.
+    /// Returns to the previous viewpoint.
     Back,
-    /// To make the step again that was taken back.
+    /// Returns to the next viewpoint.
     Forth,
-    /// The scene file's camera.
+    /// Resets the camera to that of the scene file.
     ResetCamera,
-    /// To write the camera into the scene file.
+    /// Saves the camera to the scene file.
     SaveCamera,
-    /// To write a value into the scene file.
+    /// Sets a value in the scene file.
     Set(Set),
-    /// To take back what was written into the scene file last.
+    /// Undoes the last change of the scene file.
     UndoWrite,
-    /// To write again what was taken back last.
+    /// Redoes the last undone change of the scene file.
     RedoWrite,
-    /// Another view.
+    /// Selects a view.
     View(View),
-    /// The factor of the difference of [`View::Compare`].
+    /// Sets the gain of the difference in [`View::Compare`].
     Gain(f32),
-    /// Whether pixels that are no light are marked.
+    /// Marks invalid pixels.
     Marks(bool),
-    /// Another value of a slider of the shaders.
+    /// Moves a slider of the shaders.
     Slide {
-        /// The file of its constant.
+        /// The file of the constant.
         file: String,
-        /// The constant's name.
+        /// The name of the constant.
         name: String,
         /// The value.
         value: Value,
     },
-    /// The value of the file for a slider, given as file and name.
+    /// Resets a slider, given by file and name, to the value of its file.
     ResetSlider(String, String),
-    /// The values of the files for all.
+    /// Resets all sliders.
     ResetSliders,
-    /// To write the sliders' values into the shaders.
+    /// Saves the values of the sliders to the shaders.
     WriteSliders,
-    /// To take that back.
+    /// Undoes that.
     UndoSliders,
-    /// How light is shown.
-    Look(Choice),
-    /// Whether nothing but first pictures is rendered.
+    /// Overrides exposure, transform and false colors.
+    #[serde(rename = "look")]
+    DisplaySettings(DisplayOverrides),
+    /// Pauses after the first image of a change.
     Pause(bool),
-    /// To render the picture anew.
+    /// Renders the image again.
     Restart,
-    /// The most samples of a pixel; all of the scene's if absent.
+    /// Sets the maximum number of samples per pixel; absent for that of the scene.
     Samples(Option<NonZeroU32>),
-    /// Pixels of the picture along each side of one that is shown.
+    /// Sets the scale of the preview.
     Preview(Preview),
-    /// To keep the picture as the reference.
+    /// Sets the image as the reference.
     Keep,
 }
 
-/// How coarse the picture is shown.
+/// The scale of the preview: each pixel that is shown covers this many pixels of the image along each side.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(try_from = "u32", into = "u32")]
 pub struct Preview(u32);
 
 impl Preview {
-    /// Pixels of the picture along each side of one that is shown, one at least.
+    /// Returns the scale, at least 1.
     pub fn scale(self) -> u32 {
         self.0.max(1)
     }
@@ -153,109 +153,115 @@ impl TryFrom<u32> for Preview {
     }
 }
 
-/// What is known beside the picture; it goes to the page as JSON.
+/// Everything that the page shows beside the images, sent as JSON.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct State {
     /// The scene file.
     pub scene: String,
-    /// The shaders' folder; the program's own if absent.
+    /// The folder of the shaders; absent for the built-in ones.
     pub shaders: Option<String>,
     /// The device and its driver.
     pub device: String,
-    /// What is shown.
+    /// The selected view.
     pub view: View,
-    /// The factor of the difference of [`View::Compare`].
+    /// The gain of the difference in [`View::Compare`].
     pub gain: f32,
-    /// Whether pixels that are no light are marked.
+    /// True if invalid pixels are marked.
     pub marks: bool,
-    /// The camera, as the section of a scene file.
+    /// The camera, as a section of a scene file.
     pub camera: String,
-    /// The same for whoever keeps it.
+    /// The viewpoint of the camera, for bookmarks.
     pub viewpoint: Option<Viewpoint>,
-    /// Whether it is not that of the file.
+    /// True if the camera differs from the file's.
     pub camera_moved: bool,
-    /// Counts the scenes that were right.
+    /// Number of valid scenes so far.
     pub scenes: u64,
-    /// What was written into the scene file last, and can be taken back: `camera`, `materials.red.color`.
+    /// The last change of the scene file, which can be undone: `camera`, `materials.red.color`.
     pub undo: Option<String>,
     /// Why nothing can be undone, if another program's change of the file dropped the history.
     pub undo_blocked: Option<String>,
     /// Why the scene file cannot be edited here, if that is so: it is glTF or JSON.
     pub read_only: Option<String>,
-    /// What was taken back last, and can be written again.
+    /// The last change that was undone, which can be redone.
     pub redo: Option<String>,
-    /// Whether the camera's last step can be taken back, and one be made again.
+    /// True if there is a previous and a next viewpoint.
     pub steps: [bool; 2],
-    /// How light is shown, as it was chosen.
-    pub look: Choice,
-    /// How the scene has it: exposure in stops, and the transform.
+    /// The display settings that the viewer overrides.
+    pub look: DisplayOverrides,
+    /// The exposure in stops and the transform of the scene.
     pub scene_look: (f64, ViewTransform),
-    /// Whether nothing but first pictures is rendered.
+    /// True if rendering pauses after the first image of a change.
     pub paused: bool,
-    /// The most samples of a pixel, and those of the scene.
+    /// The maximum number of samples per pixel, and the number of the scene.
     pub samples: (Option<NonZeroU32>, u32),
-    /// How coarse the picture is shown.
+    /// The scale of the preview.
     pub preview: Preview,
-    /// What there is to compare with, beside the CPU: whether a picture before the last change, and the reference's name.
+    /// The images to compare with, beside the CPU: the image before the last change, and the reference by
+    /// its name.
     pub comparable: (bool, Option<String>),
-    /// Why there is nothing to compare with, where that was asked for.
+    /// Why the selected comparison cannot be shown.
     pub no_comparison: Option<String>,
-    /// How far the two pictures of a comparison are apart.
+    /// The difference of the two images of a comparison.
     pub apart: Option<Apart>,
-    /// What is wrong now.
+    /// The current errors.
     pub problems: Vec<Diagnostic>,
     /// The sliders of the shaders.
     pub sliders: Vec<SliderState>,
-    /// Whether the last writing of their values can be taken back.
+    /// True if saving the sliders can be undone.
     pub sliders_undo: bool,
-    /// The layers of the shaders that can be shown.
+    /// The layers of the shaders.
     pub layers: Vec<LayerName>,
-    /// The views that the scene does not have, and why.
+    /// The views that the scene does not provide, and why.
     pub missing_views: Vec<(View, &'static str)>,
-    /// The form of links that open an editor, with `{file}`, `{line}` and `{column}`; none if there are no such links.
+    /// The template of links to an editor, with `{file}`, `{line}` and `{column}`; absent if there are no links.
     pub editor: Option<String>,
-    /// Whether a kernel is being compiled.
+    /// True while a kernel is compiled.
     pub compiling: bool,
-    /// Seconds that the last one took.
+    /// True while changed files of the scene are read.
+    pub reading: bool,
+    /// Seconds spent on the last compilation.
     pub compile_seconds: Option<f64>,
-    /// How many commands have been followed.
+    /// Number of executed commands.
     pub heard: u64,
     /// The number of the last frame.
     pub frame: u64,
-    /// Whether there will be more frames without anything happening.
+    /// True if more frames follow without any event.
     pub busy: bool,
-    /// The last thing that was said, and how many were before it.
+    /// The last notice.
     pub notice: Option<Notice>,
 }
 
-/// An answer to a command.
+/// A notice for the viewers.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Notice {
-    /// Counts them.
+    /// The number of the notice.
     pub number: u64,
-    /// Which command it answers, counted as [`State::heard`] does.
+    /// The command that it answers, as a count like [`State::heard`].
     pub command: u64,
-    /// What is said; nothing where what was said before holds no more.
+    /// The text; empty if the previous notice no longer applies.
     pub text: String,
-    /// Whether it is bad.
+    /// True for an error.
     pub bad: bool,
 }
 
-/// What reaches the thread that renders.
+/// An event for the painter.
 pub enum Event {
-    /// The files have changed; noticed at that time, when so many writes of this session were known.
+    /// The files changed: the new state, the time at which that was noticed, and the number of writes of this session
+    /// before.
     Files(Box<Snapshot>, Instant, u64),
+    /// Changed files of the scene are being read, or turned out to be unchanged.
+    Reading(bool),
     /// A kernel has been compiled.
     Built(Box<Built>),
-    /// Someone asks for something.
+    /// A command of a viewer.
     Command(Command),
-    /// Someone gave a picture to compare with.
+    /// A viewer gave an image to compare with.
     Reference(Reference),
-    /// Two pictures were measured.
+    /// The difference of two images was measured.
     Measured(Apart),
-    /// Someone came who looks.
+    /// A viewer arrived.
     Viewers,
-    /// A driver loses its device.
+    /// The driver loses the device.
     #[cfg(test)]
     Lose,
     /// The session ends.

@@ -1,10 +1,10 @@
-//! The development mode: a scene and its shaders are watched, rendered anew as they are saved, and shown on a page.
+//! The development mode: a scene and its shaders are watched, rendered again whenever they are saved, and shown on a page.
 //!
 //! ```text
 //! files ── watch ──> Snapshot ──> painter ──> builder (compiles)
 //!                                    │  ^─────────┘
 //!                       Canvas (renders, call by call)
-//!                                    └──> State, Frame, Seen ──> server ──> page
+//!                                    └──> State, Frame, SceneView ──> server ──> page
 //! ```
 
 mod build;
@@ -31,18 +31,19 @@ mod session;
 mod sliders;
 mod source;
 mod times;
+mod viewer;
 mod watch;
 
 pub use crate::gpu::marks::{Kind, Value};
 pub use camera::{Move, Viewpoint};
 pub use diagnostic::Diagnostic;
-pub use faults::Faults;
+pub use faults::BadPixels;
 pub use film_layer::FilmLayer;
 pub use histogram::Histogram;
-pub use look::{Choice, Legend, Look};
+pub use look::{DisplayOverrides, DisplaySettings, Legend};
 pub use measure::{Measured, measure};
 pub use messages::{Command, Notice, Preview, Report, Set, State};
-pub use object::{Group, Listed, Object, Seen};
+pub use object::{Group, Listed, Object, SceneView};
 pub use picture::{Against, Content, Frame, Header, LayerName, View};
 pub use reference::{Apart, Reference};
 pub use server::Listener;

@@ -1,4 +1,4 @@
-//! What is at a pixel, and what the scene file says of it: its lines, and its values with what they may be.
+//! The object at a pixel, and its part of the scene file: lines, values, and the values that are allowed.
 
 use std::sync::Arc;
 
@@ -12,43 +12,43 @@ use crate::cpu::geometry::pixel_first_hit;
 use crate::pack::{Camera, NOTHING, Packed};
 use crate::scene::{Description, Field, KeyPath, Names, Pieces, Segment, ShapeDescription, fields};
 
-/// So many lines of a table are told.
-const MOST_LINES: usize = 40;
-/// So many objects are listed.
-const MOST_LISTED: usize = 50;
-/// So many tables are told of that belong to an object: materials, textures, a mesh.
-const MOST_GROUPS: usize = 12;
+/// Maximum number of lines that are shown of a table.
+const MAX_LINES: usize = 40;
+/// Maximum number of listed objects.
+const MAX_LISTED: usize = 50;
+/// Maximum number of tables that are shown with an object: materials, textures, a mesh.
+const MAX_GROUPS: usize = 12;
 
-/// The scene as it is looked at: what questions about its objects are answered from.
+/// The scene and the camera, which answer questions about objects.
 #[derive(Clone, Debug)]
-pub struct Seen {
+pub struct SceneView {
     /// The scene.
     pub(super) loaded: Arc<Loaded>,
-    /// The camera that is looked through.
+    /// The current camera.
     pub(super) camera: Camera,
-    /// Its file.
+    /// The files.
     pub(super) sources: Sources,
 }
 
 /// An object of the scene file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Object {
-    /// As messages name it: `shapes[3]`.
+    /// The name, as in messages: `shapes[3]`.
     pub name: String,
     /// The scene file.
     pub file: String,
-    /// The pixel that was asked about.
+    /// The pixel of the question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at: Option<[u32; 2]>,
-    /// The material at that pixel, or that which was asked for.
+    /// The material at that pixel, or in the question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// It, and what it names: its material, the textures of that.
+    /// The object and what it refers to: its material, and the textures of that.
     pub groups: Vec<Group>,
-    /// What else is to be known of it.
+    /// A note.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
-    /// Why there is nothing to be told.
+    /// Why there is no object.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gone: Option<String>,
 }
@@ -60,29 +60,29 @@ pub struct Group {
     pub name: String,
     /// Its type, if it has one.
     pub kind: String,
-    /// The first of its lines in the file, from 1; 0 if it is not there.
+    /// Its first line in the file, from 1; 0 if it is not in the file.
     pub line: usize,
-    /// The lines, the first of them where they are many.
+    /// The lines, without those after the first few.
     pub text: String,
-    /// How many more there are.
+    /// Number of further lines.
     pub more: usize,
     /// Its values.
     pub fields: Vec<Field>,
 }
 
-/// Objects whose names have a text in them.
+/// The objects whose names contain a text.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Listed {
-    /// That text.
+    /// The text.
     pub part: String,
-    /// Their names, and of what type or material they are.
+    /// Names, each with the type or material.
     pub objects: Vec<(String, String)>,
-    /// How many more there are.
+    /// Number of further objects.
     pub more: usize,
 }
 
 impl Object {
-    /// Of a scene that there is not yet.
+    /// Returns the answer while no scene is loaded.
     pub(super) fn none(name: &str, at: Option<[u32; 2]>) -> Object {
         Object {
             name: name.to_owned(),
@@ -91,17 +91,17 @@ impl Object {
             material: None,
             groups: Vec::new(),
             note: None,
-            gone: Some("there is no scene yet".to_owned()),
+            gone: Some("No scene has been loaded yet".to_owned()),
         }
     }
 }
 
-impl Seen {
-    /// What is seen at a pixel of the whole picture.
+impl SceneView {
+    /// Returns the object at a pixel of the full-size image.
     pub fn at(&self, [x, y]: [u32; 2]) -> Object {
         let mut object = match x < self.camera.width && y < self.camera.height {
             true => self.hit(UVec2::new(x, y)),
-            false => self.gone("", format!("pixel {x}, {y} is not in the picture")),
+            false => self.gone("", format!("pixel {x}, {y} is outside the image")),
         };
         object.at = Some([x, y]);
         object
@@ -121,7 +121,7 @@ impl Seen {
                 "render"
             };
             let mut object = self.object(around, None);
-            object.note = Some("nothing is here but what is behind everything".to_owned());
+            object.note = Some("Nothing here but the background".to_owned());
             return object;
         }
         let (name, note) = place_of(loaded, hit.shape as usize);
@@ -131,13 +131,13 @@ impl Seen {
         object
     }
 
-    /// The object of a name, if there is one; of its materials this one is told first.
+    /// Returns the object of a name; this one of its materials comes first.
     pub fn object(&self, name: &str, material: Option<&str>) -> Object {
         let (own, brought) = match material {
             Some(name) if self.loaded.description.materials.contains_key(name) => (material, None),
             _ => (None, material),
         };
-        let brought = brought.map(|name| format!("its material here, {name}, comes from another file"));
+        let brought = brought.map(|name| format!("the material here, {name}, is in another file"));
         Object {
             material: material.map(str::to_owned),
             note: brought,
@@ -145,7 +145,7 @@ impl Seen {
         }
     }
 
-    /// The names that objects have for each other.
+    /// Returns the names that values may refer to.
     pub(super) fn names(&self) -> Names {
         let all = &self.loaded.description;
         Names {
@@ -155,7 +155,7 @@ impl Seen {
         }
     }
 
-    /// The values of the table that a path leads into, if it leads to a value that can be told.
+    /// Returns the field at a path, if the path leads to a value.
     pub(super) fn field(&self, path: &KeyPath) -> Option<Field> {
         let object = object_of(path)?;
         let pieces = self.loaded.pieces();
@@ -193,7 +193,7 @@ impl Seen {
                 while let Some(next) = wanted.get(i).cloned() {
                     i += 1;
                     let is_known = wanted[..i - 1].contains(&next) || !is_there(&self.loaded.description, &next);
-                    if is_known || groups.len() >= MOST_GROUPS {
+                    if is_known || groups.len() >= MAX_GROUPS {
                         continue;
                     }
                     if let Some(group) = self.group(&pieces, &next, &names) {
@@ -212,7 +212,7 @@ impl Seen {
         self.gone(name, reason)
     }
 
-    /// The table of the scene file at a path.
+    /// Returns the table of the scene file at a path.
     fn group(&self, pieces: &Pieces, path: &KeyPath, names: &Names) -> Option<Group> {
         let piece = pieces.find(path);
         let whole: Table = toml::from_str(piece.text.trim_start_matches('\u{feff}')).ok()?;
@@ -243,10 +243,10 @@ impl Seen {
             field.squares = samples.is_some_and(|(_, samples)| samples.pattern(render.integrator).needs_square());
             let of_field = field.path.parse().ok();
             if let Some(option) = of_field.and_then(|path| self.sources.overrides.in_place_of(&path)) {
-                field.fixed = Some(format!("{option} stands in for what the file says"));
+                field.fixed = Some(format!("{option} overrides the value of the file"));
             }
         }
-        // Those that are there first, as they stand in the file.
+        // Keys of the file come first, in the order of the file.
         let place = |field: &Field| {
             let path: KeyPath = field.path.parse().ok()?;
             let below = path.0.get(path_len(path.0.len(), field)..)?.to_vec();
@@ -265,7 +265,7 @@ impl Seen {
         })
     }
 
-    /// The objects whose names have a text in them, in the order of the file's sections.
+    /// Returns the objects whose names contain a text, in the order of the file's sections.
     pub fn objects(&self, part: &str) -> Listed {
         let all = &self.loaded.description;
         let wanted = part.to_lowercase();
@@ -277,7 +277,7 @@ impl Seen {
         let mut add = |name: &dyn Fn() -> String, about: String| {
             let name = name();
             if format!("{name} {about}").to_lowercase().contains(&wanted) {
-                match listed.objects.len() < MOST_LISTED {
+                match listed.objects.len() < MAX_LISTED {
                     true => listed.objects.push((name, about)),
                     false => listed.more += 1,
                 }
@@ -310,18 +310,18 @@ impl Seen {
     }
 }
 
-/// How much of a field's path is its object's.
+/// Returns the number of a field's path segments that belong to its object.
 fn path_len(whole: usize, field: &Field) -> usize {
     let below = field.name.parse::<KeyPath>().map_or(0, |name| name.0.len());
     whole.saturating_sub(below)
 }
 
-/// A name of one of the sections that have names.
+/// Returns the path of a named object.
 fn named(section: &str, name: &str) -> KeyPath {
     KeyPath([section, name].map(Segment::from).to_vec())
 }
 
-/// The object that a path leads into: `shapes[3]` of `shapes[3].radius`.
+/// Returns the object that contains a path: `shapes[3]` for `shapes[3].radius`.
 pub(super) fn object_of(path: &KeyPath) -> Option<KeyPath> {
     let length = match path.0.first()? {
         Segment::Key(section) if ["image", "camera", "render", "environment"].contains(&section.as_str()) => 1,
@@ -330,7 +330,7 @@ pub(super) fn object_of(path: &KeyPath) -> Option<KeyPath> {
     path.0.get(..length).map(|object| KeyPath(object.to_vec()))
 }
 
-/// Whether a scene has an object.
+/// Returns whether a scene has an object.
 fn is_there(all: &Description, path: &KeyPath) -> bool {
     match path.0.as_slice() {
         [Segment::Key(section)] => match section.as_str() {
@@ -354,7 +354,7 @@ fn is_there(all: &Description, path: &KeyPath) -> bool {
     }
 }
 
-/// What a table names: materials, textures, a mesh.
+/// Returns the objects that a table refers to: materials, textures, a mesh.
 fn named_by(group: &Group) -> Vec<KeyPath> {
     let mut found = Vec::new();
     for field in &group.fields {
@@ -373,7 +373,8 @@ fn named_by(group: &Group) -> Vec<KeyPath> {
     found
 }
 
-/// The lines of a range, with the comments right above: the first one's number, the text, and how many more there are.
+/// Returns the lines of a range and the comments directly above it: the number of the first line, the text, and the
+/// number of omitted lines.
 fn lines(text: &str, start: usize, end: usize) -> (usize, String, usize) {
     let mut start = line_start(text, start);
     while let Some(above) = text[..start].strip_suffix('\n') {
@@ -385,11 +386,11 @@ fn lines(text: &str, start: usize, end: usize) -> (usize, String, usize) {
     }
     let whole = &text[start..line_end(text, end)];
     let number = 1 + text.as_bytes()[..start].iter().filter(|byte| **byte == b'\n').count();
-    let shown: Vec<&str> = whole.lines().take(MOST_LINES).collect();
+    let shown: Vec<&str> = whole.lines().take(MAX_LINES).collect();
     (number, shown.join("\n"), whole.lines().count() - shown.len())
 }
 
-/// The object of the file that a shape of the scene is, by its number, and what is to be said of it.
+/// Returns the object of the file for a shape of the scene, by index, and a note.
 fn place_of(loaded: &Loaded, number: usize) -> (String, Option<String>) {
     let all = &loaded.description;
     let gltf: Vec<(usize, bool)> = (all.shapes.iter().enumerate())
@@ -409,7 +410,7 @@ fn place_of(loaded: &Loaded, number: usize) -> (String, Option<String>) {
     };
     let imported = |file: usize| loaded.scene.imported.get(file);
     let plain = all.shapes.len() - gltf.len();
-    let of_gltf = "it is of this glTF file, whose materials wgray convert writes into a scene";
+    let of_gltf = "part of this glTF file, which is read-only here. Run `wgray convert` for an editable scene.";
     if number < plain {
         let mut plain = all
             .shapes
@@ -439,7 +440,7 @@ fn place_of(loaded: &Loaded, number: usize) -> (String, Option<String>) {
     }
 }
 
-/// Of what type and material a shape is.
+/// Returns the type and the material of a shape.
 fn about(shape: &ShapeDescription) -> String {
     let (kind, name) = match shape {
         ShapeDescription::Rectangle(shape) => ("rectangle", &shape.material),

@@ -1,55 +1,55 @@
-//! What the page and the terminal's file show of a render: pictures of several views, and the numbers behind a pixel.
+//! Frames: the images of a view for the page and for `--out`, and the values of each pixel.
 
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::faults::{Fault, Faults, faults, mark};
+use super::faults::{BadPixels, Fault, faults, mark};
 use super::film_layer::FilmLayer;
 use super::histogram::Histogram;
-use super::look::{Legend, Look};
+use super::look::{DisplaySettings, Legend};
 use crate::film::{Film, mean};
-use crate::gpu::marks::LONGEST_NAME;
+use crate::gpu::marks::MAX_NAME_LEN;
 use crate::image::{self, Aov, AovSource, Pixels, difference};
 use crate::pack::{FirstHit, NOTHING};
 use crate::scene::Integrator;
 
-/// What is shown of the scene.
+/// The view of the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum View {
     /// Radiance.
     #[default]
     Color,
-    /// The first hit's normal.
+    /// The normal of the first hit.
     Normal,
-    /// The normal that it is shaded by; under the integrator `path` the mean over the samples.
+    /// The shading normal of the first hit; with the integrator `path` the mean over the samples.
     ShadingNormal,
-    /// Its distance.
+    /// The distance of the first hit.
     Depth,
-    /// Its texture coordinates.
+    /// The texture coordinates of the first hit.
     Uv,
-    /// Which shape or triangle it is on.
+    /// The shape or triangle.
     Primitive,
-    /// Which shape it is on.
+    /// The shape.
     Instance,
-    /// Where in its triangle it is.
+    /// The barycentric coordinates in the triangle.
     Barycentric,
-    /// The share of light that surfaces reflect.
+    /// The fraction of light that surfaces reflect.
     Albedo,
-    /// Light that was reflected once.
+    /// Light after one reflection.
     Direct,
-    /// Light that was reflected more often.
+    /// Light after more reflections.
     Indirect,
-    /// Light that was not reflected.
+    /// Light without reflections.
     Emission,
-    /// The variance of a pixel's value.
+    /// The variance of a pixel.
     Variance,
-    /// How many samples a pixel has.
+    /// The number of samples.
     Samples,
-    /// Radiance, another picture of it, and their difference.
+    /// Radiance, another image of it, and their difference.
     Compare(Against),
-    /// A variable of the shaders that is marked as a layer.
+    /// A variable of the shaders with the annotation `layer`.
     Layer(LayerName),
 }
 
@@ -57,20 +57,20 @@ pub enum View {
 #[derive(Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct LayerName {
-    bytes: [u8; LONGEST_NAME],
+    bytes: [u8; MAX_NAME_LEN],
     length: u8,
 }
 
 impl LayerName {
-    /// A name; `None` if it is longer than any layer's.
+    /// Returns a name; `None` if it is longer than any layer's.
     pub fn new(name: &str) -> Option<LayerName> {
-        let mut bytes = [0; LONGEST_NAME];
+        let mut bytes = [0; MAX_NAME_LEN];
         bytes.get_mut(..name.len())?.copy_from_slice(name.as_bytes());
         let length = u8::try_from(name.len()).ok()?;
         Some(LayerName { bytes, length })
     }
 
-    /// The name.
+    /// Returns the name as text.
     pub fn as_str(&self) -> &str {
         let bytes = self.bytes.get(..usize::from(self.length)).unwrap_or_default();
         std::str::from_utf8(bytes).unwrap_or_default()
@@ -87,7 +87,7 @@ impl TryFrom<String> for LayerName {
     type Error = String;
 
     fn try_from(name: String) -> Result<LayerName, String> {
-        LayerName::new(&name).ok_or_else(|| format!("a layer's name must have {LONGEST_NAME} bytes at most"))
+        LayerName::new(&name).ok_or_else(|| format!("a layer's name must have {MAX_NAME_LEN} bytes at most"))
     }
 }
 
@@ -97,20 +97,20 @@ impl From<LayerName> for String {
     }
 }
 
-/// What radiance is compared with.
+/// The image that radiance is compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Against {
-    /// The same by the CPU.
+    /// The image of the CPU.
     Cpu,
-    /// What it was before the last saved change of the scene or the shaders.
+    /// The image before the last saved change of the scene or the shaders.
     Before,
-    /// A picture that was kept, or a file that a viewer gave.
+    /// An image that was set as the reference, or a file of a viewer.
     Reference,
 }
 
 impl View {
-    /// The layer of the shaders that it shows.
+    /// Returns the layer of the shaders.
     pub fn layer(self) -> Option<LayerName> {
         match self {
             View::Layer(name) => Some(name),
@@ -118,7 +118,7 @@ impl View {
         }
     }
 
-    /// All that are layers of `wgray render --aov`.
+    /// The views that are layers of `wgray render --aov`.
     pub const LAYERS: [View; 12] = [
         View::Normal,
         View::ShadingNormal,
@@ -134,17 +134,17 @@ impl View {
         View::Variance,
     ];
 
-    /// What it shows of the first hits, if it does not show the film.
+    /// Returns the layer of the first hits that it shows, if any.
     pub fn of_hits(self, integrator: Integrator) -> Option<Aov> {
         self.aov().filter(|aov| aov.source(integrator) == AovSource::FirstHit)
     }
 
-    /// What it shows of the film, beside light.
+    /// Returns the layer of the film that it shows, other than color.
     pub fn of_film(self, integrator: Integrator) -> Option<Aov> {
         self.aov().filter(|aov| aov.source(integrator) != AovSource::FirstHit)
     }
 
-    /// The layer of `wgray render --aov` that it is.
+    /// Returns the layer of `wgray render --aov`.
     pub fn aov(self) -> Option<Aov> {
         match self {
             View::Normal => Some(Aov::Normal),
@@ -163,13 +163,13 @@ impl View {
         }
     }
 
-    /// Whether the CPU renders what it shows too.
+    /// Returns whether the CPU also renders it.
     pub fn is_by_both(self) -> bool {
         self == View::Compare(Against::Cpu)
     }
 }
 
-/// The means of a film's sums. In rows that have no samples yet `under` shows through, a smaller film of the same picture.
+/// Returns the means of a film's sums. Rows without samples show `under`, a smaller film of the same image.
 pub fn means(film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bool + Sync)) -> Pixels {
     Pixels {
         width: film.region.width(),
@@ -178,7 +178,7 @@ pub fn means(film: &Film, under: Option<&Film>, has_samples: &(dyn Fn(u32) -> bo
     }
 }
 
-/// What a film says of each pixel, or, in rows that have no samples yet, a smaller film of the same picture.
+/// Returns a value of each pixel of a film, or, in rows without samples, of a smaller film of the same image.
 pub(super) fn of_film<T: Default + Send>(
     film: &Film,
     under: Option<&Film>,
@@ -199,14 +199,14 @@ pub(super) fn of_film<T: Default + Send>(
     pixels.map(of_pixel).collect()
 }
 
-/// From a picture to the same in another size.
+/// A mapping from an image to the same image in another size.
 pub(super) struct Scaled {
     pub from: [u32; 2],
     pub to: [u32; 2],
 }
 
 impl Scaled {
-    /// The index of the pixel that covers pixel (x, y); `None` outside of the picture.
+    /// Returns the index of the pixel that covers pixel (x, y); `None` outside the image.
     pub fn index(&self, x: u32, y: u32) -> Option<usize> {
         let scaled = |at: u32, i: usize| {
             (at < self.from[i]).then(|| u64::from(at) * u64::from(self.to[i]) / u64::from(self.from[i]))
@@ -215,25 +215,26 @@ impl Scaled {
     }
 }
 
-/// The numbers of a frame.
+/// The values of a frame.
 #[derive(Clone, Debug)]
 pub enum Content {
     /// [`View::Color`]
     Color(Pixels),
-    /// [`View::Samples`]: of how many there will be.
+    /// [`View::Samples`], and the number in the end.
     Samples(Vec<u32>, u32),
-    /// The views of the first hits.
+    /// The views of first hits.
     Hits(Aov, Vec<FirstHit>),
-    /// [`View::Compare`]: the picture, and the other one of the same size.
+    /// [`View::Compare`]: the image, and the other one of the same size.
     Compare(Pixels, Pixels),
-    /// [`View::Layer`], and how many numbers it has.
+    /// [`View::Layer`], and the number of components.
     Layer(Pixels, usize),
-    /// The views of the film's layers.
+    /// The views of film layers.
     Film(FilmLayer),
 }
 
 impl Content {
-    /// The bytes that are shown of what is no light, nor a layer of the film, for a picture of this size; else none.
+    /// Returns the displayed bytes of first hits and sample counts for an image of this size; empty for other
+    /// content.
     pub(super) fn plain_bytes(&self, [width, height]: [u32; 2]) -> Vec<u8> {
         match self {
             Content::Samples(counts, total) => bytes(counts, |n| Vec3::splat(*n as f32 / (*total).max(1) as f32)),
@@ -248,91 +249,91 @@ impl Content {
     }
 }
 
-/// What is told about a frame beside its pictures.
+/// The description of a frame that is sent before its images.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Header {
-    /// Counts the frames.
+    /// The number of the frame.
     pub number: u64,
-    /// Counts the changes of scene, shaders and camera: which of them the frame shows.
+    /// The number of changes of scene, shaders and camera that the frame shows.
     pub revision: u64,
-    /// What it shows.
+    /// The view.
     pub view: View,
-    /// Width of the whole picture; that of a coarse frame's pixels is a fraction of it.
+    /// Width of the full-size image; a coarse frame has fewer pixels.
     pub width: u32,
-    /// Height of the whole picture.
+    /// Height of the full-size image.
     pub height: u32,
-    /// Width and height of what is sent.
+    /// Width and height of the images that are sent.
     pub sent: [u32; 2],
-    /// Width and height of what is sent at the end: less than the whole where that is too large to be shown.
+    /// Width and height of the finished image: less than the full size if that is too large to display.
     pub finest: [u32; 2],
-    /// Samples that every pixel has.
+    /// Samples per pixel so far.
     pub samples: u32,
-    /// Samples that it will have.
+    /// Samples per pixel in the end.
     pub total: u32,
-    /// Whether nothing will be added.
+    /// True if the image is finished.
     pub done: bool,
-    /// Whether it shows the first hits, one ray a pixel.
+    /// True if it shows first hits, with 1 ray per pixel.
     pub first_hits: bool,
-    /// Samples of pixels per second.
+    /// Samples per second.
     pub speed: Option<f64>,
-    /// Seconds from the last change to the first frame that showed it.
+    /// Seconds from the last change to its first frame.
     pub latency: Option<f64>,
-    /// What [`View::Compare`] found: pixels that differ in any bit, and the largest difference.
+    /// The result of [`View::Compare`]: the number of pixels that differ in any bit, and the largest difference.
     pub differing: Option<(usize, f32)>,
-    /// What the two pictures of [`View::Compare`] are called.
+    /// The names of the two images of [`View::Compare`].
     pub sides: Option<[String; 2]>,
-    /// How bright the picture's pixels are, if it is one of light.
+    /// The histogram of a color image.
     pub histogram: Option<Histogram>,
-    /// What false colours mean, where they are shown.
+    /// The scale of false colors, if they are shown.
     pub legend: Option<Legend>,
-    /// Pixels that are no light, for each picture that can have them.
-    pub faults: Vec<(&'static str, Faults)>,
-    /// Names and sizes in bytes of the pictures that follow.
+    /// The invalid pixels of each image that can have them.
+    pub faults: Vec<(&'static str, BadPixels)>,
+    /// Names and sizes in bytes of the images that follow.
     pub parts: Vec<(&'static str, usize)>,
 }
 
-/// A picture that the viewers get, as PNG files and as numbers.
+/// The images of a view, as PNG files and as values.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// About it.
+    /// The description.
     pub header: Header,
     /// PNG files, one for each part of the header.
     pub pictures: Vec<Vec<u8>>,
-    /// The numbers.
+    /// The values.
     pub content: Content,
-    /// How names are given to what the numbers count.
+    /// The names behind the numbers in the values.
     pub names: Names,
-    /// How it is shown.
-    pub look: Look,
+    /// The display settings.
+    pub look: DisplaySettings,
 }
 
-/// How shapes and materials are called in the scene file.
+/// The names of shapes and materials in the scene file.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
-    /// How many shapes there are; instances of meshes follow them.
+    /// Number of shapes; instances of meshes follow them.
     pub shapes: u32,
-    /// How many instances there are; lights follow them.
+    /// Number of instances; lights follow them.
     pub instances: u32,
-    /// The materials' names.
+    /// The names of the materials.
     pub materials: Vec<String>,
 }
 
 impl Frame {
-    /// Makes the pictures of `content`; what the header says of that is found here.
-    pub fn new(mut header: Header, content: Content, names: Names, look: Look) -> Frame {
+    /// Encodes the images of `content`, and completes the header.
+    pub fn new(mut header: Header, content: Content, names: Names, look: DisplaySettings) -> Frame {
         let [width, height] = header.sent;
         let mut found = Vec::new();
         let mut marked = |name, mut rgb: Vec<u8>, faults: Vec<Option<Fault>>| {
             if look.marks {
                 mark(&mut rgb, &faults);
             }
-            found.push((name, Faults::count(&faults, width)));
+            found.push((name, BadPixels::count(&faults, width)));
             (name, rgb)
         };
         let light = |pixels: &Pixels| faults(&pixels.colors, look.negative, |color| *color);
         let pictures: Vec<(&'static str, Vec<u8>)> = match &content {
             Content::Color(colors) => vec![marked("picture", look.bytes(colors), light(colors))],
-            // Numbers as they are, of which any may be negative.
+            // Raw values, which may be negative.
             Content::Layer(values, _) => {
                 let found = faults(&values.colors, true, |color| *color);
                 vec![marked("picture", content.plain_bytes(header.sent), found)]
@@ -344,7 +345,7 @@ impl Frame {
             }
             Content::Samples(..) => vec![("picture", content.plain_bytes(header.sent))],
             Content::Hits(aov, hits) => {
-                // Below zero are normals and texture coordinates by right.
+                // Normals and texture coordinates may be negative.
                 let values = |hit: &FirstHit| match aov {
                     Aov::Normal => hit.normal.into(),
                     Aov::ShadingNormal => hit.shading_normal.into(),
@@ -398,7 +399,7 @@ impl Frame {
         }
     }
 
-    /// What is known of a pixel of the whole picture, by name; `None` outside of it.
+    /// Returns the values of a pixel of the full-size image by name; `None` outside it.
     pub fn pixel(&self, x: u32, y: u32) -> Option<Vec<(&'static str, String)>> {
         let Header {
             width, height, sent, ..
@@ -471,7 +472,7 @@ pub(super) fn numbers<const N: usize>(values: [f32; N]) -> String {
     values.map(|v| format!("{v}")).join("  ")
 }
 
-/// The bits of floats, in hexadecimal.
+/// Formats the bits of floats in hexadecimal.
 pub(super) fn bits<const N: usize>(values: [f32; N]) -> String {
     values.map(|v| format!("{:08x}", v.to_bits())).join("  ")
 }
@@ -480,7 +481,7 @@ fn values<const N: usize>(name: &'static str, values: [f32; N]) -> Vec<(&'static
     vec![(name, numbers(values)), ("bits", bits(values))]
 }
 
-/// The bytes of values that are shown as they are, not as light.
+/// Returns the bytes of values that are displayed without a transform.
 pub(super) fn bytes<T: Sync>(pixels: &[T], color: impl Fn(&T) -> Vec3 + Sync) -> Vec<u8> {
     let byte = |v: f32| (v * 255.0 + 0.5) as u8; // saturates
     pixels
@@ -490,7 +491,7 @@ pub(super) fn bytes<T: Sync>(pixels: &[T], color: impl Fn(&T) -> Vec3 + Sync) ->
         .collect()
 }
 
-/// A picture of the differences: `gain` times as large, but never so small that they cannot be seen.
+/// Returns an image of the differences: `gain` times as large, with a minimum that stays visible.
 fn amplified(gpu: &Pixels, cpu: &Pixels, gain: f32) -> Vec<u8> {
     const LEAST: f32 = 0.2;
     let pairs: Vec<_> = gpu.colors.iter().copied().zip(cpu.colors.iter().copied()).collect();
@@ -499,7 +500,7 @@ fn amplified(gpu: &Pixels, cpu: &Pixels, gain: f32) -> Vec<u8> {
             return Vec3::ZERO;
         }
         let apart = (Vec3::from(*gpu) - Vec3::from(*cpu)).abs() * gain;
-        // What is no number is as wrong as can be.
+        // NaN counts as the largest difference.
         let apart = Vec3::select(apart.is_nan_mask(), Vec3::ONE, apart);
         if apart.max_element() < LEAST {
             Vec3::splat(LEAST)
@@ -509,16 +510,17 @@ fn amplified(gpu: &Pixels, cpu: &Pixels, gain: f32) -> Vec<u8> {
     })
 }
 
-/// A picture of radiance as a PNG file.
-pub(super) fn png_of(pixels: &Pixels, look: Look) -> Vec<u8> {
+/// Encodes radiance as PNG.
+pub(super) fn png_of(pixels: &Pixels, look: DisplaySettings) -> Vec<u8> {
     png(pixels.width, pixels.height, &look.bytes(pixels))
 }
 
-/// A PNG file of 8-bit RGB, packed for speed.
+/// Encodes 8-bit RGB as PNG with fast compression.
 pub(super) fn png(width: u32, height: u32, rgb: &[u8]) -> Vec<u8> {
-    // Writing to memory fails only if the sizes do not fit; the page then shows no picture, which the tests would see.
+    // Encoding to memory fails only if the sizes do not match; the page then shows no image, which the tests would
+    // notice.
     image::in_memory(width, height, rgb).unwrap_or_else(|error| {
-        tracing::error!("a picture of {width} x {height} cannot be made: {error}");
+        tracing::error!("cannot encode an image of {width} x {height} pixels: {error}");
         Vec::new()
     })
 }

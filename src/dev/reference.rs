@@ -1,4 +1,4 @@
-//! What the picture is compared with: pictures by viewers, kept ones, and how far two are apart.
+//! Images to compare with, given by viewers or kept, and the difference of two images.
 
 use std::sync::Arc;
 
@@ -9,29 +9,30 @@ use crate::compare::{self, Channel, Kind, PIXELS_PER_DEGREE, Picture, Plane};
 use crate::image::Pixels;
 use crate::scene::{ViewSettings, ViewTransform};
 
-/// What a viewer gives may have so many pixels, as many as 7680 x 4320 and a little more: a file of them may be small.
-const MOST_PIXELS: u64 = 1 << 25;
+/// Maximum number of pixels of a viewer's file, a little more than 7680 x 4320: a small file may have many pixels.
+const MAX_PIXELS: u64 = 1 << 25;
 
-/// A picture to compare with.
+/// An image to compare with.
 #[derive(Clone, Debug)]
 pub struct Reference {
-    /// What it is called: a file's name, or how it came to be.
+    /// The name: that of a file, or a description.
     pub name: String,
-    /// Linear colours.
+    /// Linear colors.
     pub pixels: Arc<Pixels>,
 }
 
 impl Reference {
-    /// Reads a picture file: OpenEXR or Radiance as linear light; of PNG, JPEG and WebP the display's curve is taken back.
+    /// Decodes an image file: OpenEXR or Radiance as linear values; for PNG, JPEG and WebP the display's curve is
+    /// inverted.
     ///
     /// # Errors
     ///
-    /// What to tell whoever sent it.
+    /// The message for the sender.
     pub fn decode(name: String, bytes: Vec<u8>, view: ViewSettings) -> Result<Reference, String> {
-        let picture = Picture::decode(bytes, MOST_PIXELS).map_err(|error| format!("{name}: {error}"))?;
+        let picture = Picture::decode(bytes, MAX_PIXELS).map_err(|error| format!("{name}: {error}"))?;
         let colors = picture
             .colors()
-            .ok_or_else(|| format!("{name}: has no colours: a channel R, G and B, or Y, must be there"))?;
+            .ok_or_else(|| format!("{name}: has no color: channels R, G and B, or Y, are required"))?;
         let count = picture.pixels();
         let mut pixels = vec![[0.0; 3]; count];
         let mut values = vec![0.0; count];
@@ -54,7 +55,7 @@ impl Reference {
         })
     }
 
-    /// Its pixels in another size, each that in its place; `None` if it is not the picture of this size.
+    /// Returns the pixels in another size, each in its place; `None` if the image does not have this full size.
     pub fn at(&self, whole: [u32; 2], sent: [u32; 2]) -> Option<Pixels> {
         let Pixels { width, height, .. } = *self.pixels;
         if [width, height] != whole {
@@ -76,7 +77,7 @@ impl Reference {
     }
 }
 
-/// The light for what a display was sent. Of AgX and PBR Neutral only the curve of sRGB can be taken back.
+/// Returns the linear value of a displayed one. For AgX and PBR Neutral only the curve of sRGB can be inverted.
 fn light_of(value: f64, transform: ViewTransform) -> f64 {
     match transform {
         ViewTransform::Gamma22 => value.powf(2.2),
@@ -85,19 +86,19 @@ fn light_of(value: f64, transform: ViewTransform) -> f64 {
     }
 }
 
-/// How far two pictures are apart.
+/// The difference of two images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Apart {
     /// The frame that was measured.
     pub frame: u64,
-    /// The root of the mean squared difference of linear values; none if it is no finite number.
+    /// The root mean square error of the linear values; `None` if it is not finite.
     pub rmse: Option<f64>,
     /// HDR-FLIP, as `wgray diff` measures it.
     pub flip: Option<f64>,
 }
 
 impl Apart {
-    /// Measures two pictures of one size.
+    /// Measures two images of one size.
     pub fn of(frame: u64, first: &Pixels, second: &Pixels) -> Apart {
         let squares = first.colors.iter().flatten().zip(second.colors.iter().flatten());
         let sum: f64 = squares.map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum();
@@ -155,7 +156,7 @@ mod tests {
             let again: Vec<u8> = read.pixels.colors.iter().flat_map(|color| view.rgb8(*color)).collect();
             assert_eq!(again, bytes, "{transform:?}");
         }
-        let error = Reference::decode("a.png".to_owned(), b"no picture".to_vec(), ViewSettings::default());
+        let error = Reference::decode("a.png".to_owned(), b"not an image".to_vec(), ViewSettings::default());
         assert!(error.unwrap_err().starts_with("a.png: "));
         let blank = image::in_memory(8193, 4096, &vec![0; 3 * 8193 * 4096]).unwrap();
         let error = Reference::decode("b.png".to_owned(), blank, ViewSettings::default());

@@ -1,4 +1,4 @@
-//! Writing files in one step, and the camera into the scene file: only the numbers that differ are touched.
+//! Atomic writes, and the text of the camera in a scene file.
 
 use std::fs;
 use std::io::Write;
@@ -12,35 +12,35 @@ use super::camera::{Entry, entries};
 use super::edit::edited;
 use crate::scene::{CameraDescription, Description, KeyPath, Segment};
 
-/// Nobody takes so long from the first byte of a file to the last.
+/// Maximum time that a program needs from the first byte of a file to the last.
 const SAVING: Duration = Duration::from_millis(100);
-/// So long somebody else's save is waited for.
+/// Maximum time to wait for a save of another program.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Replaces a file in one step: whoever reads it sees the old content or the new.
+/// Replaces a file atomically: a reader sees the old or the new content.
 pub fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
     written(path, content)?.persist(path)?;
     Ok(())
 }
 
-/// The same of a file that somebody else may change: it stays as it is, unless it is what it was thought to be.
+/// Like [`replace`], for a file that another program may change: fails unless the file has the known content.
 pub fn replace_known(path: &Path, known: &[u8], content: &[u8]) -> std::io::Result<()> {
     let file = written(path, content)?;
     if fs::read(path)? != known {
         return Err(std::io::Error::other(
-            "somebody else has changed it at the same moment; it stays as that is",
+            "another program changed it at the same time; nothing was written",
         ));
     }
     file.persist(path)?;
     Ok(())
 }
 
-/// Waits while somebody has changed a file so shortly ago that there may be more to come: that would go into the file that was
-/// replaced, and be lost.
+/// Waits while another program changed a file so recently that more may follow: that would go into the replaced file,
+/// and be lost.
 ///
 /// # Errors
 ///
-/// It goes on for too long.
+/// The file keeps changing.
 pub fn wait_settled(path: &Path) -> Result<(), String> {
     let start = Instant::now();
     loop {
@@ -50,7 +50,7 @@ pub fn wait_settled(path: &Path) -> Result<(), String> {
             Some(rest) if start.elapsed() < PATIENCE => sleep(rest.max(Duration::from_millis(1))),
             Some(_) => {
                 return Err(format!(
-                    "{}: is being saved by somebody else; nothing is written into it",
+                    "{}: another program is writing this file; nothing was written",
                     path.display()
                 ));
             }
@@ -59,7 +59,7 @@ pub fn wait_settled(path: &Path) -> Result<(), String> {
     }
 }
 
-/// A file beside another one, with its permissions, that is to take its place.
+/// Writes a temporary file next to another one, with its permissions, to take its place.
 fn written(path: &Path, content: &[u8]) -> std::io::Result<tempfile::NamedTempFile> {
     let folder = path
         .parent()
@@ -71,7 +71,7 @@ fn written(path: &Path, content: &[u8]) -> std::io::Result<tempfile::NamedTempFi
     #[cfg(unix)]
     if permissions.is_none() {
         use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o666)); // less what the user's mask takes
+        builder.permissions(fs::Permissions::from_mode(0o666)); // less the user's mask
     }
     let mut file = builder.tempfile_in(folder)?;
     file.write_all(content)?;
@@ -81,16 +81,16 @@ fn written(path: &Path, content: &[u8]) -> std::io::Result<tempfile::NamedTempFi
     Ok(file)
 }
 
-/// The text of a scene file with another camera. Values that are as they were are not touched.
+/// Returns the text of a scene file with another camera. Unchanged values are not touched.
 ///
 /// # Errors
 ///
-/// What to tell the user: the file is no scene that this camera fits.
+/// The message for the user: the file is not a scene that this camera fits.
 pub fn with_camera(text: &str, origin: &str, camera: &CameraDescription) -> Result<String, String> {
-    let mend = |error| format!("mend the file first: {error}");
+    let mend = |error| format!("fix the file first: {error}");
     let before = Description::parse_camera(text, origin).map_err(mend)?;
     if std::mem::discriminant(&before) != std::mem::discriminant(camera) {
-        return Err(format!("{origin}: the file has another type of camera by now"));
+        return Err(format!("{origin}: the type of the camera in the file has changed"));
     }
     let mut text = text.to_owned();
     for ((key, old), (_, new)) in entries(&before).into_iter().zip(entries(camera)) {
@@ -156,7 +156,7 @@ mod tests {
         assert!(
             with_camera("[image", "s.toml", &new)
                 .unwrap_err()
-                .starts_with("mend the file first: s.toml:1:")
+                .starts_with("fix the file first: s.toml:1:")
         );
     }
 
@@ -184,12 +184,12 @@ mod tests {
         let file = folder.path().join("s.toml");
         fs::write(&file, "theirs").unwrap();
         let error = replace_known(&file, b"before", b"ours").unwrap_err();
-        assert!(error.to_string().contains("somebody else"), "{error}");
+        assert!(error.to_string().contains("another program"), "{error}");
         assert_eq!(fs::read_to_string(&file).unwrap(), "theirs");
         replace_known(&file, b"theirs", b"ours").unwrap();
         assert_eq!(fs::read_to_string(&file).unwrap(), "ours");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-        // What was changed just now may not be whole; what goes on being changed is given up.
+        // A file that changed just now may not be complete; the wait for one that keeps changing ends.
         let changed = |ago: Duration| {
             let file = fs::File::options().write(true).open(&file).unwrap();
             file.set_modified(SystemTime::now() - ago).unwrap();
@@ -209,7 +209,7 @@ mod tests {
                     sleep(Duration::from_millis(1));
                 }
             });
-            // On a busy machine the file may rest for once.
+            // On a busy machine the file may rest once.
             let error = (0..10).find_map(|_| wait_settled(&file).err());
             is_done.store(true, Relaxed);
             error.unwrap()
@@ -223,7 +223,7 @@ mod tests {
         let unix = with_camera(SCENE, "s.toml", &new).unwrap();
         let dos = |text: &str| format!("\u{feff}{}", text.replace('\n', "\r\n"));
         assert_eq!(with_camera(&dos(SCENE), "s.toml", &new).unwrap(), dos(&unix));
-        // Even where both kinds are in one file.
+        // Also with both kinds in one file.
         let mixed = |text: &str| text.replacen("# degrees\n", "# degrees\r\n", 1);
         assert_eq!(with_camera(&mixed(SCENE), "s.toml", &new).unwrap(), mixed(&unix));
     }

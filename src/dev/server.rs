@@ -1,65 +1,63 @@
-//! The page and what it is told: a small server of its files, the picture as a file, and one WebSocket.
+//! The HTTP server of the page: its files, the image as a file, and the WebSocket of each viewer.
 
+use std::collections::VecDeque;
 use std::io;
 use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use axum::Router;
 use axum::body::Bytes;
-use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{DefaultBodyLimit, Path as UrlPath, Request, State};
 use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
+use hyper::service::{Service as _, service_fn};
 use hyper_util::rt::TokioIo;
 use hyper_util::service::TowerToHyperService;
-use serde::{Deserialize, Serialize};
 use tokio::sync::{Semaphore, watch};
-use tokio::time::MissedTickBehavior;
+use tokio::task::AbortHandle;
 
 use super::download::{exr_file, png_file};
 use super::guard::Guard;
 use super::messages::{self, Command};
-use super::object::{Listed, Object, Seen};
+use super::object::SceneView;
 use super::picture::Frame;
 use super::reference::Reference;
 use super::session::{Session, Viewers};
-use super::times::{Time, Times};
+use super::times::Times;
+use super::viewer;
 
-/// So many may look at once.
+/// Maximum number of concurrent viewers.
 const VIEWERS: usize = 16;
-/// So many requests are answered at once; others wait.
-const REQUESTS: usize = 64;
-/// A request that is not made and answered within this time is given up.
-const REQUEST: Duration = Duration::from_secs(10);
-/// The largest message of a viewer, in bytes: a command is far smaller.
-const LARGEST_MESSAGE: usize = 4096;
-/// The largest file to compare with, in bytes.
-const LARGEST_FILE: usize = 256 << 20;
-/// The longest name of one, in characters.
-const LONGEST_NAME: usize = 80;
-/// A viewer that takes nothing for so long is gone.
-const SEND: Duration = Duration::from_secs(30);
-/// So often a viewer is told where the time goes, while that changes.
-const TIMES: Duration = Duration::from_millis(500);
-/// So often a viewer is asked whether it is there; after three times without a word it is gone.
-const BEAT: Duration = Duration::from_secs(15);
+/// Maximum number of requests that are received or answered at once.
+const MAX_REQUESTS: usize = 64;
+/// Timeout for receiving and answering a request.
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(10);
+/// Maximum size of a viewer's message in bytes; a command is far smaller.
+const MAX_MESSAGE_BYTES: usize = 4096;
+/// Maximum size of a reference file in bytes.
+const MAX_FILE_BYTES: usize = 256 << 20;
+/// Maximum length of its name in characters.
+const MAX_NAME_LEN: usize = 80;
 
-/// A place to listen that is open.
+/// An open listening address.
 pub struct Listener {
     listener: TcpListener,
     guard: Guard,
 }
 
 impl Listener {
-    /// Opens a place such as `127.0.0.1:7878` or `localhost:0`; port 0 is any that is free.
+    /// Opens an address such as `127.0.0.1:7878` or `localhost:0`; port 0 selects a free one.
     ///
     /// # Errors
     ///
-    /// Places that do not exist, are not this machine's or are taken.
+    /// Addresses that do not exist, are not on this machine or are in use.
     pub fn open(place: &str) -> io::Result<Listener> {
         let named = |error: io::Error| io::Error::new(error.kind(), format!("{place}: {error}"));
         let addresses: Vec<SocketAddr> = place.to_socket_addrs().map_err(named)?.collect();
@@ -73,16 +71,16 @@ impl Listener {
         Ok(Listener { listener, guard })
     }
 
-    /// Where it is.
+    /// Returns the address.
     pub fn address(&self) -> io::Result<SocketAddr> {
         self.listener.local_addr()
     }
 
-    /// Shows a session to whoever comes, for ever.
+    /// Serves a session without end.
     ///
     /// # Errors
     ///
-    /// What the system does not allow.
+    /// Errors of the operating system.
     pub fn serve(self, session: &Session) -> io::Result<()> {
         let shared = Shared {
             guard: self.guard,
@@ -103,40 +101,65 @@ impl Listener {
     }
 }
 
-/// Answers requests, each on a connection of its own and in bounded time; a viewer's connection then lives on elsewhere.
+/// A connection on which no whole request head has arrived yet.
+struct Unread {
+    task: AbortHandle,
+    has_head: Arc<AtomicBool>,
+}
+
+/// Answers requests, each on its own connection and in bounded time. The WebSocket of a viewer is served by another task. If
+/// all connections are in use, a new one takes the place of the one that has waited longest for a request.
 async fn answer_all(listener: &tokio::net::TcpListener, routes: Router) -> io::Result<()> {
-    let requests = Arc::new(Semaphore::new(REQUESTS));
+    let requests = Arc::new(Semaphore::new(MAX_REQUESTS));
+    let mut unread: VecDeque<Unread> = VecDeque::new();
     loop {
-        let place = requests.clone().acquire_owned().await.map_err(io::Error::other)?;
         let Ok((stream, _)) = listener.accept().await else {
-            tokio::time::sleep(Duration::from_millis(50)).await; // too many files are open, or the peer has gone
+            tokio::time::sleep(Duration::from_millis(50)).await; // too many open files, or the client has gone
             continue;
         };
-        let service = TowerToHyperService::new(routes.clone());
-        tokio::spawn(async move {
+        unread.retain(|known| !known.task.is_finished() && !known.has_head.load(Ordering::Relaxed));
+        if requests.available_permits() == 0
+            && let Some(oldest) = unread.pop_front()
+        {
+            oldest.task.abort();
+        }
+        let place = requests.clone().acquire_owned().await.map_err(io::Error::other)?;
+        let (routes, has_head) = (
+            TowerToHyperService::new(routes.clone()),
+            Arc::new(AtomicBool::new(false)),
+        );
+        let is_read = Arc::clone(&has_head);
+        let service = service_fn(move |request: hyper::Request<Incoming>| {
+            is_read.store(true, Ordering::Relaxed);
+            routes.call(request)
+        });
+        let task = tokio::spawn(async move {
             let mut http = http1::Builder::new();
             let connection = http.keep_alive(false).serve_connection(TokioIo::new(stream), service);
-            // Whoever asked hears of a failure by the end of the connection.
-            let _answered = tokio::time::timeout(REQUEST, connection.with_upgrades()).await;
+            // The client learns of a failure by the end of the connection.
+            let _answered = tokio::time::timeout(REQUEST_TIMEOUT, connection.with_upgrades()).await;
             drop(place);
         });
+        let task = task.abort_handle();
+        unread.push_back(Unread { task, has_head });
     }
 }
 
+/// The resources of all requests.
 #[derive(Clone)]
-struct Shared {
+pub(super) struct Shared {
     guard: Guard,
-    state: watch::Receiver<Arc<messages::State>>,
-    frames: watch::Receiver<Option<Arc<Frame>>>,
-    times: Times,
-    seen: watch::Receiver<Option<Arc<Seen>>>,
-    send: Arc<dyn Fn(Command) -> Option<u64> + Send + Sync>,
+    pub(super) state: watch::Receiver<Arc<messages::State>>,
+    pub(super) frames: watch::Receiver<Option<Arc<Frame>>>,
+    pub(super) times: Times,
+    pub(super) seen: watch::Receiver<Option<Arc<SceneView>>>,
+    pub(super) send: Arc<dyn Fn(Command) -> Option<u64> + Send + Sync>,
     give: Arc<dyn Fn(Reference) -> bool + Send + Sync>,
     seats: Arc<Semaphore>,
     viewers: Viewers,
 }
 
-/// The page's modules.
+/// The modules of the page.
 const MODULES: [(&str, &str); 22] = [
     ("/camera.js", include_str!("page/camera.js")),
     ("/color.js", include_str!("page/color.js")),
@@ -178,18 +201,18 @@ fn routes(shared: Shared) -> Router {
         .route("/picture.exr", get(picture_exr))
         .route(
             "/reference/{name}",
-            post(reference).layer(DefaultBodyLimit::max(LARGEST_FILE)),
+            post(reference).layer(DefaultBodyLimit::max(MAX_FILE_BYTES)),
         )
         .route("/socket", get(socket))
         .layer(middleware::from_fn_with_state(shared.clone(), guarded))
         .with_state(shared)
 }
 
-/// The picture that is shown, as a file of a kind.
+/// Responds with the displayed image as a file.
 async fn picture(shared: Shared, kind: &'static str, make: fn(&Frame) -> io::Result<Vec<u8>>) -> Response {
     let frame = shared.frames.borrow().clone();
     let Some(frame) = frame.filter(|frame| frame.header.sent == frame.header.finest) else {
-        return (StatusCode::CONFLICT, "there is no whole picture yet").into_response();
+        return (StatusCode::CONFLICT, "the image is not complete yet").into_response();
     };
     match tokio::task::spawn_blocking(move || make(&frame)).await {
         Ok(Ok(file)) => ([(header::CONTENT_TYPE, kind)], file).into_response(),
@@ -206,11 +229,11 @@ async fn picture_exr(State(shared): State<Shared>) -> Response {
     picture(shared, "image/x-exr", exr_file).await
 }
 
-/// Takes a file to compare with. It comes from the viewer's machine: nothing of this one is read.
+/// Receives a reference file. It comes from the viewer's machine: no file of this machine is read.
 async fn reference(State(shared): State<Shared>, UrlPath(name): UrlPath<String>, body: Bytes) -> Response {
     let frame = shared.frames.borrow().clone();
     let view = frame.map(|frame| frame.look.view).unwrap_or_default();
-    let name: String = name.chars().filter(|c| !c.is_control()).take(LONGEST_NAME).collect();
+    let name: String = name.chars().filter(|c| !c.is_control()).take(MAX_NAME_LEN).collect();
     let work = move || Reference::decode(name, body.to_vec(), view);
     match tokio::task::spawn_blocking(work).await {
         Ok(Ok(reference)) => match (shared.give)(reference) {
@@ -222,11 +245,11 @@ async fn reference(State(shared): State<Shared>, UrlPath(name): UrlPath<String>,
     }
 }
 
-/// Refuses what comes from elsewhere, and tells the browser to load nothing from there.
+/// Refuses requests of other pages, and forbids the browser to load anything from elsewhere.
 async fn guarded(State(shared): State<Shared>, request: Request, next: Next) -> Response {
-    // What changes anything must come from the page itself.
+    // Requests that change anything must come from the page itself.
     let acts = request.uri().path() == "/socket" || request.method() != Method::GET;
-    let mut response = match shared.guard.check(request.headers(), acts) {
+    let mut response = match shared.guard.check(request.uri(), request.headers(), acts) {
         Ok(()) => next.run(request).await,
         Err(why) => (StatusCode::FORBIDDEN, why).into_response(),
     };
@@ -250,175 +273,12 @@ async fn socket(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Resp
         return (StatusCode::SERVICE_UNAVAILABLE, "too many viewers").into_response();
     };
     let upgrade = upgrade
-        .max_message_size(LARGEST_MESSAGE)
-        .max_frame_size(LARGEST_MESSAGE);
+        .max_message_size(MAX_MESSAGE_BYTES)
+        .max_frame_size(MAX_MESSAGE_BYTES);
     upgrade.on_upgrade(async move |socket| {
         let looking = shared.viewers.enter();
-        let _gone = view(socket, &shared).await; // how a viewer goes does not matter
+        let _gone = viewer::serve(socket, &shared).await; // the reason why a viewer leaves does not matter
         drop(looking);
         drop(seat);
     })
-}
-
-/// What a viewer may say.
-#[derive(Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum Ask {
-    /// What is known of a pixel?
-    Pixel([u32; 2]),
-    /// What is at a pixel?
-    Object([u32; 2]),
-    /// What is said of the object of this name?
-    Inspect(Inspect),
-    /// Which objects have this in their names?
-    Objects(String),
-    /// The viewer has displayed this frame and all before it.
-    Shown(u64),
-    #[serde(untagged)]
-    Command(Command),
-}
-
-/// An object by its name.
-#[derive(Deserialize)]
-struct Inspect {
-    name: String,
-    #[serde(default)]
-    material: Option<String>,
-}
-
-/// What a viewer is told, beside frames.
-#[derive(Serialize)]
-#[serde(rename_all = "snake_case")]
-enum Tell<'a> {
-    State(&'a messages::State),
-    Pixel {
-        x: u32,
-        y: u32,
-        values: Vec<(&'static str, String)>,
-    },
-    Object(Box<Object>),
-    Objects(Listed),
-    /// The number of a command that was given; the state says when it has been followed.
-    Asked(u64),
-    Refused(String),
-    /// Where the time goes.
-    Times(&'a [Time]),
-}
-
-/// Tells one viewer what there is to tell, as fast as it takes it: it gets the newest frame, not every frame.
-async fn view(mut socket: WebSocket, shared: &Shared) -> Option<()> {
-    let (mut state, mut frames) = (shared.state.clone(), shared.frames.clone());
-    state.mark_changed();
-    frames.mark_changed();
-    let mut beat = tokio::time::interval(BEAT);
-    let mut clock = tokio::time::interval(TIMES);
-    clock.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let mut times = Vec::new();
-    let mut heard = Instant::now();
-    loop {
-        let message = tokio::select! {
-            changed = state.changed() => {
-                changed.ok()?;
-                let state = state.borrow_and_update().clone();
-                text(&Tell::State(&state))?
-            }
-            changed = frames.changed() => {
-                changed.ok()?;
-                match frames.borrow_and_update().clone() {
-                    Some(frame) => Message::Binary(bytes(&frame)?.into()),
-                    None => continue,
-                }
-            }
-            message = socket.recv() => {
-                heard = Instant::now();
-                match message?.ok()? {
-                    Message::Text(asked) => match answer(&asked, shared).await {
-                        Some(answer) => text(&answer)?,
-                        None => continue,
-                    },
-                    Message::Binary(_) | Message::Close(_) => return None,
-                    Message::Ping(_) | Message::Pong(_) => continue,
-                }
-            }
-            _ = clock.tick() => {
-                let told = shared.times.told();
-                if told == times {
-                    continue;
-                }
-                times = told;
-                text(&Tell::Times(&times))?
-            }
-            _ = beat.tick() => {
-                if heard.elapsed() > 3 * BEAT {
-                    return None;
-                }
-                Message::Ping(Vec::new().into())
-            }
-        };
-        let is_frame = matches!(message, Message::Binary(_));
-        let start = Instant::now();
-        tokio::time::timeout(SEND, socket.send(message)).await.ok()?.ok()?;
-        if is_frame {
-            shared.times.part("send", start.elapsed());
-        }
-    }
-}
-
-async fn answer(asked: &str, shared: &Shared) -> Option<Tell<'static>> {
-    match serde_json::from_str(asked) {
-        Ok(Ask::Pixel([x, y])) => {
-            let frame = shared.frames.borrow().clone();
-            let values = frame.and_then(|frame| frame.pixel(x, y)).unwrap_or_default();
-            Some(Tell::Pixel { x, y, values })
-        }
-        Ok(Ask::Object(pixel)) => {
-            let nothing = move || Object::none("", Some(pixel));
-            let found = of_scene(shared, nothing, move |seen| seen.at(pixel)).await;
-            Some(Tell::Object(Box::new(found)))
-        }
-        Ok(Ask::Inspect(Inspect { name, material })) => {
-            let nothing = || Object::none(&name, None);
-            let wanted = name.clone();
-            let found = of_scene(shared, nothing, move |seen| seen.object(&wanted, material.as_deref())).await;
-            Some(Tell::Object(Box::new(found)))
-        }
-        Ok(Ask::Objects(part)) => {
-            let found = of_scene(shared, Listed::default, move |seen| seen.objects(&part)).await;
-            Some(Tell::Objects(found))
-        }
-        Ok(Ask::Shown(frame)) => {
-            let _ = frame; // frames are not counted yet
-            None
-        }
-        Ok(Ask::Command(command)) => {
-            let dropped = || Tell::Refused("busy: a command was dropped".to_string());
-            Some((shared.send)(command).map_or_else(dropped, Tell::Asked))
-        }
-        Err(error) => Some(Tell::Refused(format!("not understood: {error}"))),
-    }
-}
-
-/// What is found in the scene, on a thread of its own: it may be large. Or what is told where there is none.
-async fn of_scene<T: Send + 'static>(
-    shared: &Shared,
-    nothing: impl Fn() -> T,
-    find: impl FnOnce(&Seen) -> T + Send + 'static,
-) -> T {
-    let seen = shared.seen.borrow().clone();
-    let Some(seen) = seen else { return nothing() };
-    let found = tokio::task::spawn_blocking(move || find(&seen)).await;
-    found.unwrap_or_else(|_| nothing())
-}
-
-fn text(tell: &Tell) -> Option<Message> {
-    Some(Message::Text(serde_json::to_string(tell).ok()?.into()))
-}
-
-/// A frame: the length of its header as four bytes, little-endian, the header as JSON, and the pictures.
-fn bytes(frame: &Frame) -> Option<Vec<u8>> {
-    let header = serde_json::to_vec(&frame.header).ok()?;
-    let mut bytes = u32::try_from(header.len()).ok()?.to_le_bytes().to_vec();
-    bytes.extend(header);
-    frame.pictures.iter().for_each(|picture| bytes.extend(picture));
-    Some(bytes)
 }

@@ -1,4 +1,4 @@
-//! A session: the files of a scene, watched and rendered by a thread of their own.
+//! A session: watches the files of a scene, and renders them on its own thread.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -11,68 +11,68 @@ use tokio::sync::watch;
 
 use super::build::Builder;
 use super::messages::{Command, Event, Report, State};
-use super::object::Seen;
-use super::painter::{Painter, Told};
+use super::object::SceneView;
+use super::painter::{Painter, SessionChannels};
 use super::picture::Frame;
 use super::reference::Reference;
 use super::source::Sources;
 use super::times::Times;
 use super::watch::Watch;
 use crate::error::RenderError;
-use crate::gpu::{Choice, choose};
+use crate::gpu::{AdapterChoice, choose};
 
-/// What a session is told at its start.
+/// The settings of a session.
 pub struct Settings {
     /// The files.
     pub sources: Sources,
-    /// What renders.
-    pub device: Choice,
+    /// The device to render on.
+    pub device: AdapterChoice,
     /// A PNG file that is replaced after each reload.
     pub out: Option<PathBuf>,
-    /// Whether nothing is rendered while nobody looks ([`Session::viewers`]) and there is no `out`.
+    /// True to pause rendering while there are no viewers ([`Session::viewers`]) and no `out`.
     pub only_for_viewers: bool,
-    /// The form of links that open an editor; none for no such links.
+    /// The template of links to an editor; `None` for no links.
     pub editor: Option<String>,
-    /// Is told what happens, for the terminal.
+    /// Receives reports for the terminal.
     pub report: Box<dyn Fn(Report) + Send>,
 }
 
-/// So many events may wait for one call to end.
+/// Maximum number of events that wait for the end of a dispatch.
 const WAITING: usize = 256;
 
 /// A running session; it ends when this is dropped.
 pub struct Session {
     events: SyncSender<Event>,
-    /// How many commands were given.
+    /// Number of accepted commands.
     asked: Arc<Mutex<u64>>,
-    /// What is known.
+    /// The newest state.
     pub state: watch::Receiver<Arc<State>>,
-    /// The newest picture, once there is one. A slow reader misses some.
+    /// The newest image, once there is one. A slow receiver misses some.
     pub frames: watch::Receiver<Option<Arc<Frame>>>,
-    /// Where the time goes.
+    /// The timings.
     pub times: Times,
-    /// The scene and how it is looked at, once there is one.
-    pub seen: watch::Receiver<Option<Arc<Seen>>>,
+    /// The scene and the camera, once there are any.
+    pub seen: watch::Receiver<Option<Arc<SceneView>>>,
     viewers: Viewers,
     watch: Option<Watch>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// Counts those who look.
+/// Counts the viewers.
 #[derive(Clone)]
 pub struct Viewers {
     looking: Arc<AtomicUsize>,
     events: SyncSender<Event>,
 }
 
-/// Someone who looks, until this is dropped.
+/// A viewer, until this is dropped.
 pub struct Viewer(Viewers);
 
 impl Viewers {
-    /// One more looks.
+    /// Adds a viewer.
     pub fn enter(&self) -> Viewer {
         self.looking.fetch_add(1, Ordering::SeqCst);
-        let _ = self.events.try_send(Event::Viewers); // a full inbox wakes the painter too
+        let _ = self.events.try_send(Event::Viewers); // a full inbox wakes the painter as well
         Viewer(self.clone())
     }
 }
@@ -83,29 +83,30 @@ impl Drop for Viewer {
     }
 }
 
-/// Why there is no session.
+/// The reason why a session cannot start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
-    /// There is no scene file.
+    /// The scene file does not exist.
     #[error("{0}: cannot be read: {1}")]
     NoScene(PathBuf, std::io::Error),
-    /// No device.
+    /// There is no device.
     #[error(transparent)]
     Device(#[from] RenderError),
-    /// The system does not let files be watched.
+    /// The operating system does not allow watching files.
     #[error("files cannot be watched: {0}")]
     Watch(#[from] notify::Error),
-    /// The system gives no thread.
+    /// The operating system does not start a thread.
     #[error(transparent)]
     System(#[from] std::io::Error),
 }
 
 impl Session {
-    /// Opens the device, reads the files and starts to render. Errors in the files are told, and waited for to be mended.
+    /// Opens the device, reads the files and starts to render. Errors in the files are reported, and the session
+    /// waits for them to be fixed.
     ///
     /// # Errors
     ///
-    /// No device, a scene file that does not exist, and what the system does not allow.
+    /// No device, a scene file that does not exist, and errors of the operating system.
     pub fn start(settings: Settings) -> Result<Session, StartError> {
         let Settings {
             sources,
@@ -125,13 +126,13 @@ impl Session {
         let writes = Arc::default();
         let watch = Watch::start(sources.clone(), snapshot, Arc::clone(&writes), {
             let events = events.clone();
-            move |snapshot, noticed, count| events.send(Event::Files(Box::new(snapshot), noticed, count)).is_ok()
+            move |event| events.send(event).is_ok()
         })?;
         let times = Times::default();
         let builder = Builder::start(choice, times.clone(), {
             let events = events.clone();
             move |built| {
-                let _ = events.send(Event::Built(Box::new(built))); // after the session's end nobody wants it
+                let _ = events.send(Event::Built(Box::new(built))); // fails only after the end of the session
             }
         })?;
         let (state_sender, state) = watch::channel(Arc::default());
@@ -139,7 +140,7 @@ impl Session {
         let (scene_sender, seen) = watch::channel(None);
         let looking = Arc::new(AtomicUsize::new(0));
         let wanted_by = (only_for_viewers && out.is_none()).then(|| looking.clone());
-        let told = Told {
+        let told = SessionChannels {
             report,
             state: state_sender,
             frames: frame_sender,
@@ -168,26 +169,27 @@ impl Session {
         })
     }
 
-    /// Asks for something.
+    /// Sends a command.
     pub fn send(&self, command: Command) {
         let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
         *asked += 1;
-        let _ = self.events.send(Event::Command(command)); // the thread lives as long as this
+        let _ = self.events.send(Event::Command(command)); // the thread lives as long as the session
     }
 
-    /// A way to give pictures to compare with from other threads, without ever waiting: whether there is room for it.
+    /// Returns a function that gives reference images from other threads without blocking; it returns false if the
+    /// session is busy.
     pub fn references(&self) -> impl Fn(Reference) -> bool + Send + Sync + 'static {
         let events = self.events.clone();
         move |reference| events.try_send(Event::Reference(reference)).is_ok()
     }
 
-    /// Counts those who look.
+    /// Returns the counter of viewers.
     pub fn viewers(&self) -> Viewers {
         self.viewers.clone()
     }
 
-    /// A way to ask for things from other threads, without ever waiting: gives the number that [`State::heard`] reaches
-    /// when it is followed, or nothing if too much is asked for already.
+    /// Returns a function that sends commands from other threads without blocking. It returns the number that
+    /// [`State::heard`] reaches once the command is executed, or `None` if the session is busy.
     pub fn commands(&self) -> impl Fn(Command) -> Option<u64> + Send + Sync + 'static {
         let (events, asked) = (self.events.clone(), self.asked.clone());
         move |command| {
@@ -204,14 +206,14 @@ impl Session {
 impl Drop for Session {
     fn drop(&mut self) {
         self.watch = None;
-        let _ = self.events.send(Event::Stop); // the thread may have ended by itself
+        let _ = self.events.send(Event::Stop); // the thread may have ended already
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
     }
 }
 
-/// Takes what has come before any work is done, so that nothing waits for more than one call.
+/// Handles all pending events before any work, so that an event waits for one dispatch at most.
 fn run(mut painter: Painter, inbox: Receiver<Event>) {
     loop {
         let event = if painter.has_work() {
@@ -225,7 +227,7 @@ fn run(mut painter: Painter, inbox: Receiver<Event>) {
             None => painter.work(),
         }
     }
-    drop(inbox); // first: other threads may wait for room in it, and the painter for them
+    drop(inbox); // first, because other threads may wait for room in it, and the painter for them
 }
 
 #[cfg(test)]
@@ -260,7 +262,7 @@ mod tests {
     }
 
     fn finished(session: &Session, after: u64) -> (u64, Pixels) {
-        wait("a picture", || {
+        wait("an image", || {
             let frame = session.frames.borrow().clone()?;
             let header = &frame.header;
             match &frame.content {
@@ -289,7 +291,7 @@ mod tests {
                 overrides: Overrides::default(),
                 shaders: Some(path("shaders")),
             },
-            device: Choice::Auto,
+            device: AdapterChoice::Auto,
             out: None,
             only_for_viewers: false,
             editor: None,
@@ -298,7 +300,7 @@ mod tests {
         .unwrap();
         let (first, wanted) = finished(&session, 0);
 
-        // Lost while nothing happens: the next move finds it out, and is shown all the same.
+        // Lost while idle: the next move notices it, and is shown nevertheless.
         session.events.send(Event::Lose).unwrap();
         session.send(Command::Move(Move::Orbit(0.1, 0.0)));
         let (second, _) = finished(&session, first);
@@ -312,7 +314,7 @@ mod tests {
         });
         assert_eq!(lost, Some("device"), "it was lost indeed");
 
-        // Lost while a kernel is compiled, with shaders that are wrong: the last good ones go on.
+        // Lost while a kernel with wrong shaders is compiled: the last good ones are used.
         let good = Shaders::built_in().text("kernels/render.wgsl").to_string();
         session.events.send(Event::Lose).unwrap();
         fs::write(path("shaders/kernels/render.wgsl"), good.replace("= sum;", "= sun;")).unwrap();
@@ -327,7 +329,7 @@ mod tests {
         });
         session.send(Command::Move(Move::Orbit(0.1, 0.0)));
         session.send(Command::ResetCamera);
-        let (_, again) = wait("the picture", || {
+        let (_, again) = wait("the image", || {
             Some(finished(&session, third)).filter(|(_, pixels)| *pixels == wanted)
         });
         assert_eq!(again, wanted);
@@ -344,7 +346,7 @@ mod tests {
         };
         let settings = Settings {
             sources,
-            device: Choice::Auto,
+            device: AdapterChoice::Auto,
             out: None,
             only_for_viewers: false,
             editor: None,

@@ -1,4 +1,4 @@
-//! Marked constants of shaders as sliders: what the files say, and what the page says in place of it.
+//! Annotated constants of shaders as sliders: the values of the files, and the values that replace them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -13,55 +13,55 @@ use crate::gpu::marks::{Kind, Layer, Marks, Slider, Value, edited};
 use crate::gpu::{with_edits, without_values};
 use crate::scene::Integrator;
 
-/// A slider as the page shows it.
+/// A slider for the page.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SliderState {
-    /// Its file in the folder of shaders.
+    /// The file in the folder of shaders.
     pub file: String,
-    /// The whole path of that, for an editor; none for the shaders in the program.
+    /// The absolute path of the file, for an editor; `None` for built-in shaders.
     pub path: Option<String>,
-    /// The constant's name.
+    /// The name of the constant.
     pub name: String,
     /// Its line, counted from 1.
     pub line: usize,
-    /// What it is.
+    /// The kind of the constant.
     pub kind: Kind,
-    /// The least value of a number.
+    /// The minimum of a number.
     pub min: f64,
-    /// The largest.
+    /// The maximum.
     pub max: f64,
-    /// How far apart the values are, if the mark says so.
+    /// The interval between values, if the annotation has one.
     pub step: Option<f64>,
-    /// What is rendered.
+    /// The value that is rendered.
     pub value: Value,
-    /// What the file says.
+    /// The value in the file.
     pub file_value: Value,
-    /// Whether another value takes the compiler.
+    /// True if another value must be compiled in.
     pub recompiles: bool,
-    /// Whether the scene's kernels have it.
+    /// True if the scene's kernels contain the constant.
     pub used: bool,
 }
 
-/// A file, and a constant in it.
+/// The file and the name of a constant.
 type Key = (String, String);
 
 /// The sliders of a session.
 #[derive(Default)]
 pub struct Sliders {
-    /// The shaders as the files have them.
+    /// The shaders of the files.
     files: Option<Arc<Shaders>>,
     marks: Marks,
-    /// The values that stand in for those of the files.
+    /// The values that replace those of the files.
     moved: BTreeMap<Key, Value>,
-    /// What is compiled, which says nothing of the values that kernels read from a buffer.
+    /// The shaders to be compiled, whatever the values that kernels read from a buffer.
     given: Option<Arc<Shaders>>,
     /// The constants that the running kernel reads from a buffer, once there is one.
     live: Option<BTreeSet<Key>>,
-    /// The files as they were written last.
+    /// The files of the last write.
     written: Vec<Written>,
 }
 
-/// A file that sliders were written into.
+/// A file that slider values were written into.
 struct Written {
     path: PathBuf,
     before: String,
@@ -69,7 +69,7 @@ struct Written {
 }
 
 impl Written {
-    /// Puts one of its texts in place of the other.
+    /// Replaces one of its texts by the other.
     fn put(&self, text: &str) -> Result<(), String> {
         let told = |error| format!("{}: cannot be written: {error}", self.path.display());
         let other = if text == self.after { &self.before } else { &self.after };
@@ -82,7 +82,7 @@ fn key(slider: &Slider) -> Key {
 }
 
 impl Sliders {
-    /// Takes the shaders as they are in the files now. A number that was changed there is what counts.
+    /// Takes the current shaders of the files. A number that was edited there replaces the slider's value.
     pub fn read(&mut self, shaders: Arc<Shaders>) {
         let new = Marks::of(&shaders);
         let old: BTreeMap<Key, Value> = self
@@ -100,17 +100,17 @@ impl Sliders {
         self.files = Some(shaders);
     }
 
-    /// Whether shaders are others than those of the files that were read last.
-    pub fn differ_from(&self, shaders: &Arc<Shaders>) -> bool {
-        self.files.as_ref().is_some_and(|known| known != shaders)
+    /// Returns whether the code of shaders differs from that of the files that were read last.
+    pub fn differ_from(&self, shaders: &Shaders) -> bool {
+        self.files.as_ref().is_some_and(|known| !known.has_same_code(shaders))
     }
 
-    /// What is marked.
+    /// Returns the annotations.
     pub fn marks(&self) -> &Marks {
         &self.marks
     }
 
-    /// Takes what the running kernel reads from a buffer.
+    /// Takes the constants that the running kernel reads from a buffer.
     pub fn runs(&mut self, live: &[Slider]) {
         self.live = Some(live.iter().map(key).collect());
     }
@@ -119,8 +119,8 @@ impl Sliders {
         self.live.as_ref().is_some_and(|live| live.contains(&key(slider)))
     }
 
-    /// The shaders to be compiled: the same as before if nothing but what is read from a buffer has changed. The pointer is
-    /// then the same too, which later stages compare.
+    /// Returns the shaders to compile: the same pointer as before, which later stages compare, unless anything
+    /// changed that is not read from a buffer.
     pub fn shaders(&mut self) -> Option<Arc<Shaders>> {
         let files = self.files.as_ref()?;
         let moved = |slider: &Slider| self.moved.get(&key(slider)).filter(|_| !self.is_live(slider));
@@ -138,15 +138,14 @@ impl Sliders {
         self.given.clone()
     }
 
-    /// Gives a slider another value. Returns whether there is such a slider, and whether it has changed; an error says why
-    /// it cannot have the value.
+    /// Moves a slider. Returns whether its value changed, or why it is not allowed.
     pub fn slide(&mut self, file: &str, name: &str, value: Value) -> Result<bool, String> {
         let slider = self
             .marks
             .sliders
             .iter()
             .find(|slider| (slider.file.as_str(), slider.name.as_str()) == (file, name));
-        let slider = slider.ok_or_else(|| format!("{file}: no constant `{name}` is marked as a slider"))?;
+        let slider = slider.ok_or_else(|| format!("{file}: there is no slider `{name}`"))?;
         let value = slider
             .checked(value)
             .map_err(|rule| format!("{file}: {name}: {rule}"))?;
@@ -158,7 +157,7 @@ impl Sliders {
         Ok(before != value)
     }
 
-    /// Gives all the values of the files, or one of them. Returns whether any has changed.
+    /// Resets all sliders, or one. Returns whether any changed.
     pub fn reset(&mut self, one: Option<(&str, &str)>) -> bool {
         let before = self.moved.len();
         self.moved
@@ -170,7 +169,7 @@ impl Sliders {
         self.moved.get(&key(slider)).copied().unwrap_or(slider.value)
     }
 
-    /// The values of constants that a kernel reads from a buffer, in its order.
+    /// Returns the values of constants that a kernel reads from a buffer, in its order.
     pub fn values(&self, live: &[Slider]) -> Vec<[u32; 4]> {
         let value = |slider: &Slider| {
             let known = self.marks.sliders.iter().find(|known| key(known) == key(slider));
@@ -179,12 +178,12 @@ impl Sliders {
         live.iter().map(value).collect()
     }
 
-    /// The shaders as the files have them.
+    /// Returns the shaders of the files.
     pub fn files(&self) -> Option<&Shaders> {
         self.files.as_deref()
     }
 
-    /// The shaders as they are once all values are written.
+    /// Returns the shaders with all values written.
     pub fn as_written(&self) -> Option<Shaders> {
         let edits = |slider: &Slider, text: &str| {
             let value = self.moved.get(&key(slider));
@@ -193,23 +192,23 @@ impl Sliders {
         Some(with_edits(self.files.as_ref()?, &edits))
     }
 
-    /// Writes the values into the files of a folder: of each the number alone. Returns how many files were written.
+    /// Writes the values into the files of a folder, changing only the numbers. Returns the number of files.
     ///
     /// # Errors
     ///
-    /// What to tell the user. Files before the one that fails have been written.
+    /// The message for the user. Files before the one that fails have been written.
     pub fn write(&mut self, folder: &Path) -> Result<usize, String> {
         let files: BTreeSet<&String> = self.moved.keys().map(|(file, _)| file).collect();
         let mut new = Vec::new();
         for file in files {
             let path = folder.join(file);
             let failed = |error| format!("{}: {error}", path.display());
-            // A link stays one: what it leads to is replaced.
+            // Keeps a link, and replaces its target.
             let target = fs::canonicalize(&path).map_err(failed)?;
             let mut before = fs::read_to_string(&target).map_err(failed)?;
             let known = self.files.as_ref().map(|shaders| shaders.text(file));
             if known != Some(&without_mark(before.clone())) {
-                wait_settled(&target)?; // what is not known yet may not be whole
+                wait_settled(&target)?; // an unknown text may be half written
                 before = fs::read_to_string(&target).map_err(failed)?;
             }
             let plain = without_mark(before.clone());
@@ -217,7 +216,7 @@ impl Sliders {
             let mut edits = Vec::new();
             for ((_, name), value) in self.moved.iter().filter(|((known, _), _)| known == file) {
                 let slider = there.iter().find(|slider| slider.name == *name);
-                let slider = slider.ok_or_else(|| format!("{}: `{name}` is no slider any more", path.display()))?;
+                let slider = slider.ok_or_else(|| format!("{}: `{name}` is not a slider any more", path.display()))?;
                 edits.extend(slider.edits(&before, *value));
             }
             let after = edited(&before, edits);
@@ -235,11 +234,11 @@ impl Sliders {
         Ok(self.written.len())
     }
 
-    /// Gives the files the texts that they had before the last [`Sliders::write`]. Returns how many there were.
+    /// Restores the texts of the files before the last [`Sliders::write`]. Returns the number of files.
     ///
     /// # Errors
     ///
-    /// What to tell the user: a file has been changed since, or cannot be read or written.
+    /// The message for the user: a file has changed since, or cannot be read or written.
     pub fn take_back(&mut self) -> Result<usize, String> {
         let written = std::mem::take(&mut self.written);
         for file in &written {
@@ -247,7 +246,7 @@ impl Sliders {
             let now = fs::read(&file.path).map_err(|error| format!("{place}: {error}"))?;
             if now != file.after.as_bytes() {
                 return Err(format!(
-                    "{place}: has been changed since the sliders were written, and stays as it is"
+                    "{place}: has changed since the sliders were saved; nothing was undone"
                 ));
             }
         }
@@ -257,12 +256,12 @@ impl Sliders {
         Ok(written.len())
     }
 
-    /// Whether anything was written that can be taken back.
+    /// Returns whether the last write can be undone.
     pub fn can_take_back(&self) -> bool {
         !self.written.is_empty()
     }
 
-    /// What the page is told.
+    /// Returns the sliders for the page.
     pub fn told(&self, folder: Option<&Path>, integrator: Option<Integrator>) -> Vec<SliderState> {
         let short = |slider: &Slider, value: Value| match value {
             Value::Number(x) => Value::Number(slider.short(x)),
@@ -289,12 +288,12 @@ impl Sliders {
         self.marks.sliders.iter().map(told).collect()
     }
 
-    /// Whether any slider stands elsewhere than the file says.
+    /// Returns whether any slider differs from its file.
     pub fn are_moved(&self) -> bool {
         !self.moved.is_empty()
     }
 
-    /// The layers that an integrator's kernels can show.
+    /// Returns the layers that an integrator's kernels can show.
     pub fn layers(&self, integrator: Integrator) -> impl Iterator<Item = &Layer> {
         let shown = move |layer: &&Layer| {
             KERNELS
@@ -316,7 +315,7 @@ mod tests {
 
     const TEXT: &str = "const a: f32 = 0.5; // slider 0..1\nconst n: u32 = 3u; // slider 1..9";
 
-    /// The sliders of a text, of which a kernel reads `a` from a buffer.
+    /// Returns the sliders of a text, of which a kernel reads `a` from a buffer.
     fn sliders(text: &str) -> Sliders {
         let mut sliders = Sliders::default();
         sliders.read(shaders(text));
@@ -371,7 +370,7 @@ mod tests {
             .map(|slider| (slider.name.as_str(), slider.recompiles, slider.used))
             .collect();
         assert_eq!(recompile, [("a", false, true), ("n", true, true)]);
-        // Before a kernel is known a slider may be either.
+        // Before there is a kernel a slider may be either.
         sliders.live = None;
         sliders.slide("phong.wgsl", "a", Value::Number(0.125)).unwrap();
         assert!(
@@ -422,7 +421,7 @@ mod tests {
         assert_eq!(fs::read_to_string(&file).unwrap(), text);
         assert!(!sliders.can_take_back());
         assert_eq!(sliders.write(folder.path()), Ok(1));
-        // Somebody else's save stays.
+        // The save of another program is kept.
         fs::write(&file, text.replace("mine", "theirs")).unwrap();
         assert_eq!(sliders.write(folder.path()), Ok(1));
         let both = text.replace("mine", "theirs").replace("0.5", "0.1").replace("3u", "4u");

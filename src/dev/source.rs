@@ -1,4 +1,4 @@
-//! The files that a session renders: read as they are now, whatever happened to them.
+//! The files of a session, read in their current state.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -16,38 +16,38 @@ use crate::scene::{
     read_bytes, read_text,
 };
 
-/// Where the files are.
+/// The locations of the files.
 #[derive(Clone, Debug)]
 pub struct Sources {
     /// The scene file.
     pub scene: PathBuf,
-    /// Values that stand in for those of the scene file.
+    /// Values that override those of the scene file.
     pub overrides: Overrides,
-    /// The folder of the shaders; without one the shaders in the program are used.
+    /// The folder of the shaders; `None` for the built-in ones.
     pub shaders: Option<PathBuf>,
 }
 
-/// A scene that has been read and packed.
+/// A scene that has been loaded and packed.
 #[derive(Debug)]
 pub struct Loaded {
-    /// The scene file's text; empty if it is none.
+    /// The text of the scene file; empty for a binary file.
     pub text: String,
-    /// What it describes, with the values of options in their places.
+    /// The description, with the values of overriding options.
     pub description: Description,
-    /// The camera as the file describes it.
+    /// The camera of the file.
     pub camera: CameraDescription,
     /// The scene.
     pub scene: Scene,
-    /// What the backends read.
+    /// The packed scene, as the backends read it.
     pub packed: Packed,
-    /// Where the parts of the text are, once anybody has asked.
+    /// The locations of the parts of the text, once they are needed.
     places: OnceLock<Places>,
 }
 
 impl Loaded {
-    /// A scene that was read from a text, and packed.
+    /// Packs a scene that was read from a text.
     pub fn new(text: String, scene: Scene, description: Description) -> Loaded {
-        let packed = pack(&scene).without_layers(); // views that show them have kernels of their own
+        let packed = pack(&scene).without_layers(); // views of layers have their own kernels
         Loaded {
             text,
             camera: description.camera.clone(),
@@ -58,25 +58,25 @@ impl Loaded {
         }
     }
 
-    /// The same, where the parts of the text are known.
+    /// Adds the known locations of the parts of the text.
     #[must_use]
     pub(crate) fn with_places(mut self, places: Option<Places>) -> Loaded {
         self.places = places.map_or_else(OnceLock::new, OnceLock::from);
         self
     }
 
-    /// The pieces of the text. A large one is looked through once.
+    /// Returns the pieces of the text. A large text is scanned only once.
     pub(crate) fn pieces(&self) -> Pieces<'_> {
         Pieces::known(&self.text, self.places.get_or_init(|| Places::of(&self.text)))
     }
 }
 
-/// What a kernel is compiled for: its constants, the integrator, whether sampling is adaptive, and the layer that takes the
-/// place of light.
+/// The constants of a kernel: its constants, the integrator, whether sampling is adaptive, and the layer that
+/// replaces color.
 pub type Constants = (Specialization, Integrator, bool, Option<LayerName>);
 
-/// What a scene's kernel is compiled for, to show a view, and a layer of the shaders in place of light. Such a layer's samples are
-/// not adaptive: what they say of light's errors is nothing.
+/// Returns what a scene's kernel is compiled for, to show a view, and a layer of the shaders instead of color. The
+/// samples of such a layer are not adaptive: its variance says nothing about that of color.
 pub fn constants(packed: &Packed, view: View, layer: Option<LayerName>) -> Constants {
     let adaptive = packed.adaptive && layer.is_none();
     let integrator = packed.integrator;
@@ -90,8 +90,8 @@ pub fn constants(packed: &Packed, view: View, layer: Option<LayerName>) -> Const
     (specialization, integrator, adaptive, layer)
 }
 
-/// What a kernel shows when a view is asked for: light, if it takes another one. A kernel that has a layer in place of light shows
-/// nothing else.
+/// Returns what a kernel shows when a view is selected: color, if the view needs another kernel. A kernel with a
+/// layer of the shaders shows nothing else.
 pub fn shown(constants: &Constants, view: View) -> View {
     let (specialization, integrator, adaptive, layer) = constants;
     match (layer, view) {
@@ -105,7 +105,7 @@ pub fn shown(constants: &Constants, view: View) -> View {
     }
 }
 
-/// Whether two kernels differ at most in what views they are for.
+/// Returns whether two kernels differ in their views only.
 pub fn are_of_one_scene(a: &Constants, b: &Constants) -> bool {
     let of_scene = |(specialization, integrator, ..): &Constants| {
         let layers = 0;
@@ -120,27 +120,28 @@ pub fn are_of_one_scene(a: &Constants, b: &Constants) -> bool {
     of_scene(a) == of_scene(b)
 }
 
-/// What the files say at one moment.
+/// The state of all files at one moment.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    /// The scene, or what is wrong with it.
+    /// The scene or its errors.
     pub scene: Result<Arc<Loaded>, Diagnostic>,
-    /// The shaders, or what is wrong with them.
+    /// The shaders or their errors.
     pub shaders: Result<Arc<Shaders>, Box<Diagnostic>>,
-    /// How long it took to read the files, and to pack the scene.
+    /// Time spent on reading the files, and on packing the scene.
     pub took: [Duration; 2],
-    /// The scene file and the files that the scene uses, and their state: what decides whether to read again.
-    pub files: Vec<(PathBuf, Stamp)>,
+    /// The scene file and all files that the scene uses, with their states, which decide whether to read again.
+    pub files: Vec<(PathBuf, FileStamp)>,
 }
 
-/// What tells two states of a file apart: a scene file's content; of large files, models among them, length and time of change.
+/// The state of a file for comparison: the content of a scene file; length and modification time of files that may be
+/// large, such as models.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Stamp {
-    /// It cannot be read.
+pub enum FileStamp {
+    /// The file cannot be read.
     Absent,
-    /// The bytes of a text.
+    /// The content of a text file.
     Content(Vec<u8>),
-    /// Length and time of change.
+    /// Length and modification time.
     Changed(u64, Option<SystemTime>),
 }
 
@@ -157,13 +158,13 @@ impl Sources {
         ))
     }
 
-    /// Reads everything.
+    /// Reads all files.
     pub fn read(&self) -> Snapshot {
         self.read_scene(self.read_shaders())
     }
 
-    /// Reads what has changed since a snapshot; `None` if nothing has.
-    pub fn reread(&self, last: &Snapshot) -> Option<Snapshot> {
+    /// Reads what has changed since a snapshot; `None` if nothing has. Calls `begin` before it reads a scene.
+    pub fn reread(&self, last: &Snapshot, begin: impl FnOnce()) -> Option<Snapshot> {
         let start = Instant::now();
         let shaders = match (self.read_shaders(), &last.shaders) {
             (Ok(new), Ok(old)) if new == *old => Ok(old.clone()), // the same pointer, which later stages compare
@@ -183,9 +184,10 @@ impl Sources {
                 ..last.clone()
             }),
             (false, _) => {
+                begin();
                 let mut new = self.read_scene(shaders);
                 if new.files.len() == 1 {
-                    // It may be half a scene: what the last whole one named stays watched.
+                    // The scene may be half written: the files of the last complete one are still watched.
                     new.files.extend(
                         last.files
                             .iter()
@@ -210,7 +212,7 @@ impl Sources {
 
     fn read_scene(&self, shaders: Result<Arc<Shaders>, Box<Diagnostic>>) -> Snapshot {
         let start = Instant::now();
-        // The stamps are taken first: a file that changes while it is read is read again.
+        // States are taken first: a file that changes while it is read is read again.
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
         let mut named = BTreeSet::new();
         let (mut text, origin) = (String::new(), self.scene.display().to_string());
@@ -224,7 +226,7 @@ impl Sources {
                 draft.check(&mut named)
             }),
         };
-        // What the files themselves name is known now.
+        // The files that the files themselves name are known now.
         for path in named {
             if files.iter().all(|(known, _)| *known != path) {
                 let stamp = self.stamp(&path);
@@ -249,19 +251,21 @@ impl Sources {
         }
     }
 
-    /// The files that a scene names.
+    /// Returns the files that a scene names.
     fn assets(&self, described: &Description) -> impl Iterator<Item = PathBuf> {
         described.files(self.scene.parent().unwrap_or(Path::new("")))
     }
 
-    fn stamp(&self, path: &Path) -> Stamp {
+    fn stamp(&self, path: &Path) -> FileStamp {
         if path == self.scene && !is_gltf(path) {
-            return read_bytes(path).map_or(Stamp::Absent, Stamp::Content);
+            return read_bytes(path).map_or(FileStamp::Absent, FileStamp::Content);
         }
-        fs::metadata(path).map_or(Stamp::Absent, |data| Stamp::Changed(data.len(), data.modified().ok()))
+        fs::metadata(path).map_or(FileStamp::Absent, |data| {
+            FileStamp::Changed(data.len(), data.modified().ok())
+        })
     }
 
-    /// The shader files' paths.
+    /// Returns the paths of the shader files.
     pub fn shader_files(&self) -> impl Iterator<Item = PathBuf> {
         let folder = self.shaders.iter();
         folder.flat_map(|folder| compose::built_in().map(move |(name, _)| folder.join(name)))

@@ -1,4 +1,4 @@
-//! Where the time goes: how long each kernel's calls and each part of a frame took last.
+//! Timings of each kernel and of each stage of a frame.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,14 +8,14 @@ use serde::Serialize;
 
 use crate::gpu::Call;
 
-/// So many of the last times of each kind are kept for their median.
+/// Number of the last times of each kind that the median is taken over.
 const KEPT: usize = 33;
-/// The time of which shares are told.
+/// The period that shares refer to.
 const WINDOW: Duration = Duration::from_secs(1);
-/// At most so many ends are kept for a share: as many as can end within that time.
+/// Maximum number of measurements for a share: as many as can end within that time.
 const MOST: usize = 2048;
 
-/// The parts of a frame, in their order.
+/// The stages of a frame, in order.
 pub const PARTS: [&str; 9] = [
     "read files",
     "pack",
@@ -28,47 +28,47 @@ pub const PARTS: [&str; 9] = [
     "send",
 ];
 
-/// Times that several threads note; a clone is another handle to them.
+/// Timings that several threads record; a clone is another handle.
 #[derive(Clone, Debug, Default)]
-pub struct Times(Arc<Mutex<Vec<Kept>>>);
+pub struct Times(Arc<Mutex<Vec<TimeRecord>>>);
 
-/// What is told of a kernel or a part.
+/// The timing of a kernel or a stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Time {
-    /// The kernel's entry point, or the part.
+    /// The entry point of the kernel, or the stage.
     pub name: &'static str,
-    /// Whether it is a kernel.
+    /// True for a kernel.
     pub kernel: bool,
-    /// How many there were.
+    /// Number of measurements.
     pub count: u64,
-    /// Seconds of the last one.
+    /// Seconds of the last measurement.
     pub last: f64,
-    /// The median of the last ones.
+    /// The median of the last measurements.
     pub median: f64,
-    /// How much of the last second, from 0 to 1; more where several threads do the same.
+    /// The share of the last second, from 0 to 1; more if several threads do the same.
     pub share: f64,
-    /// Samples of pixels of a kernel's last call.
+    /// Samples of a kernel's last dispatch.
     pub samples: u64,
-    /// Whether the device has told the times; else they are from the call to the news of its end.
+    /// True if the device measured the times; otherwise they include the notification of the host.
     pub by_device: bool,
 }
 
 #[derive(Debug)]
-struct Kept {
+struct TimeRecord {
     time: Time,
     last: VecDeque<Duration>,
-    /// When the last ones ended, and how long they took.
+    /// End and duration of the last measurements.
     ended: VecDeque<(Instant, Duration)>,
 }
 
 impl Times {
-    /// A part of a frame took so long, and has just ended.
+    /// Records a stage that has just ended.
     pub fn part(&self, name: &'static str, took: Duration) {
         debug_assert!(PARTS.contains(&name));
         self.note(name, took, None);
     }
 
-    /// Does a part of a frame.
+    /// Runs and records a stage.
     pub fn of<T>(&self, name: &'static str, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();
         let done = work();
@@ -76,7 +76,7 @@ impl Times {
         done
     }
 
-    /// A kernel's call has just ended.
+    /// Records a dispatch that has just ended.
     pub fn call(&self, call: &Call) {
         self.note(call.kernel, call.took, Some(call));
     }
@@ -87,7 +87,7 @@ impl Times {
             .iter()
             .position(|kept| (kept.time.name, kept.time.kernel) == (name, call.is_some()));
         let at = known.unwrap_or_else(|| {
-            all.push(Kept::new(name, call.is_some()));
+            all.push(TimeRecord::new(name, call.is_some()));
             all.len() - 1
         });
         let kept = &mut all[at];
@@ -109,7 +109,7 @@ impl Times {
         }
     }
 
-    /// What is known now: kernels first, then the parts in their order.
+    /// Returns the timings: kernels first, then the stages in order.
     pub fn told(&self) -> Vec<Time> {
         let now = Instant::now();
         let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -120,9 +120,9 @@ impl Times {
     }
 }
 
-impl Kept {
-    fn new(name: &'static str, kernel: bool) -> Kept {
-        Kept {
+impl TimeRecord {
+    fn new(name: &'static str, kernel: bool) -> TimeRecord {
+        TimeRecord {
             time: Time {
                 name,
                 kernel,
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn of_the_last_second_counts_what_lies_in_it() {
         let now = Instant::now() + Duration::from_secs(5);
-        let mut kept = Kept::new("send", false);
+        let mut kept = TimeRecord::new("send", false);
         for (ago, took) in [(3000, 500), (800, 500), (100, 50), (0, 20)] {
             kept.ended
                 .push_back((now - Duration::from_millis(ago), Duration::from_millis(took)));

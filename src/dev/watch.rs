@@ -1,5 +1,5 @@
-//! Watching the files of a session. An event only means "look again": what then counts is what the files say, so no
-//! order or kind of events can lead astray. Folders are watched, not files, because editors save by rename.
+//! Watches the files of a session. An event only means "look again": the content of the files decides, whatever the
+//! order and kind of events. Folders are watched instead of files, because editors save by rename.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,31 +11,33 @@ use std::time::{Duration, Instant};
 use notify::event::{AccessKind, AccessMode, EventKind, ModifyKind};
 use notify::{RecommendedWatcher, RecursiveMode, Watcher as _};
 
-use super::source::{Loaded, Snapshot, Sources, Stamp};
+use super::messages::Event;
+use super::source::{FileStamp, Loaded, Snapshot, Sources};
 
-/// Files are read once nothing has happened to them for so long: an editor's save is several events.
+/// Files are read after this time without a change: an editor's save is several events.
 const QUIET: Duration = Duration::from_millis(20);
-/// Files are read after so long, even if something still happens to them.
+/// Files are read after this time at the latest.
 const PATIENCE: Duration = Duration::from_millis(150);
 
-/// A scene that is wrong is told of once nothing has happened to the files for so long: it may be half of one.
+/// An error in a scene is reported once nothing has happened to the files for this time: the scene may be half
+/// written.
 const DOUBT: Duration = Duration::from_millis(100);
-/// Or after so long, even if something still happens.
+/// Maximum delay of an error while files keep changing.
 const DOUBTS: Duration = Duration::from_secs(1);
 
-/// What a session has written into the scene file itself: the watcher need not read that again.
+/// The changes of the scene file by this session, which the watcher need not read again.
 #[derive(Default)]
 pub struct Writes {
-    /// How many there were.
+    /// Number of changes.
     pub count: u64,
-    /// What the scene is since the last one, and the files that it is made of, until the watcher has taken it over.
-    pub known: Option<Known>,
+    /// The scene after the last change, and the files that it is made of, until the watcher has taken them over.
+    pub known: Option<KnownScene>,
 }
 
 /// A scene, and the state of its files.
-pub type Known = (Arc<Loaded>, Vec<(PathBuf, Stamp)>);
+pub type KnownScene = (Arc<Loaded>, Vec<(PathBuf, FileStamp)>);
 
-/// What wakes the watcher.
+/// The reason to read the files again.
 enum Wake {
     /// The content of a file may have changed.
     Content,
@@ -50,33 +52,33 @@ impl Wake {
             Ok(EventKind::Access(AccessKind::Close(AccessMode::Write)) | EventKind::Modify(ModifyKind::Data(_))) => {
                 Some(Wake::Content)
             }
-            Ok(EventKind::Access(_)) => None, // files are read all the time, by us too
+            Ok(EventKind::Access(_)) => None, // files are read all the time, also by this program
             Ok(_) => Some(Wake::Names),
-            Err(_) => Some(Wake::Names), // it may hide anything
+            Err(_) => Some(Wake::Names), // it may hide any change
         }
     }
 }
 
-/// A running watch; it ends when this is dropped.
+/// A running watch, which ends when this is dropped.
 pub struct Watch {
     stop: std::sync::mpsc::Sender<Wake>,
     thread: Option<std::thread::JoinHandle<()>>,
 }
 
 impl Watch {
-    /// Watches the files of `sources`, and gives `changed` every new state of them with the time at which a change was
-    /// noticed, and the count of `writes` before it was read, until it returns false. `first` is the state that is known.
+    /// Watches the files of `sources`, and reports [`Event::Reading`] and [`Event::Files`] until `report` returns false.
+    /// `first` is the known state.
     pub fn start(
         sources: Sources,
         first: Snapshot,
         writes: Arc<Mutex<Writes>>,
-        changed: impl FnMut(Snapshot, Instant, u64) -> bool + Send + 'static,
+        report: impl FnMut(Event) -> bool + Send + 'static,
     ) -> notify::Result<Watch> {
         let (sender, receiver) = channel();
         let stop = sender.clone();
         let watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
             if let Some(wake) = Wake::from(&event) {
-                let _ = sender.send(wake); // nobody listens once the watch has ended
+                let _ = sender.send(wake); // fails only after the end of the watch
             }
         })?;
         let mut folders = Folders {
@@ -86,7 +88,7 @@ impl Watch {
         folders.follow(&sources, &first);
         let thread = std::thread::Builder::new()
             .name("watch".to_string())
-            .spawn(move || run(&receiver, &mut folders, &sources, first, &writes, changed))
+            .spawn(move || run(&receiver, &mut folders, &sources, first, &writes, report))
             .map_err(notify::Error::io)?;
         Ok(Watch {
             stop,
@@ -97,7 +99,7 @@ impl Watch {
 
 impl Drop for Watch {
     fn drop(&mut self) {
-        let _ = self.stop.send(Wake::Stop); // it may have ended by itself
+        let _ = self.stop.send(Wake::Stop); // it may have ended already
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -110,9 +112,10 @@ fn run(
     sources: &Sources,
     mut last: Snapshot,
     writes: &Mutex<Writes>,
-    mut changed: impl FnMut(Snapshot, Instant, u64) -> bool,
+    mut report: impl FnMut(Event) -> bool,
 ) {
-    let mut again = None; // what woke us in doubt, and when the first change was noticed
+    let mut reads = false; // true after a report of reading, until its end is reported
+    let mut again = None; // the event during a possibly incomplete save, and the time of its first change
     loop {
         let Some((wake, noticed)) = again.take().or_else(|| Some((wakes.recv().ok()?, Instant::now()))) else {
             return;
@@ -133,7 +136,7 @@ fn run(
             next = wakes.recv_timeout(QUIET);
         }
         if names {
-            folders.forget(); // a folder made anew under an old name is another one
+            folders.forget(); // a folder may have been replaced by a new one of the same name
         }
         folders.follow(sources, &last);
         let count = {
@@ -143,7 +146,10 @@ fn run(
             }
             writes.count
         };
-        if let Some(new) = sources.reread(&last) {
+        let begin = || {
+            reads = reads || report(Event::Reading(true));
+        };
+        if let Some(new) = sources.reread(&last, begin) {
             let is_doubtful = new.scene.is_err() && new.scene.as_ref().err() != last.scene.as_ref().err();
             if is_doubtful
                 && noticed.elapsed() < DOUBTS
@@ -152,30 +158,33 @@ fn run(
                 again = Some((wake, noticed));
                 continue;
             }
-            // The scene may use other files now. They are stamped already: a change since then wakes us or shows here.
+            // The scene may use other files now. Their states are known: a change since then is noticed.
             folders.follow(sources, &new);
             last = new.clone();
-            if !changed(new, noticed, count) {
+            reads = false;
+            if !report(Event::Files(Box::new(new), noticed, count)) {
                 return;
             }
+        } else if std::mem::take(&mut reads) && !report(Event::Reading(false)) {
+            return;
         }
     }
 }
 
-/// The folders that are watched.
+/// The watched folders.
 struct Folders {
     watcher: RecommendedWatcher,
     watched: BTreeMap<PathBuf, RecursiveMode>,
 }
 
 impl Folders {
-    /// Watches what must be watched now.
+    /// Updates the watched folders.
     fn follow(&mut self, sources: &Sources, snapshot: &Snapshot) {
         let wanted = wanted(sources, snapshot);
         self.watched.retain(|path, mode| {
             let keep = wanted.get(path) == Some(mode);
             if !keep {
-                let _ = self.watcher.unwatch(path); // it may have gone with its folder
+                let _ = self.watcher.unwatch(path); // it may be gone with its folder
             }
             keep
         });
@@ -183,7 +192,7 @@ impl Folders {
             if self.watched.contains_key(&path) {
                 continue;
             }
-            // One that vanishes just now is an event of its parent.
+            // A folder that vanishes at this moment causes an event in its parent.
             match self.watcher.watch(&path, mode) {
                 Ok(()) => drop(self.watched.insert(path, mode)),
                 Err(error) => tracing::warn!("{} cannot be watched: {error}", path.display()),
@@ -193,20 +202,20 @@ impl Folders {
 
     fn forget(&mut self) {
         for path in std::mem::take(&mut self.watched).into_keys() {
-            let _ = self.watcher.unwatch(&path); // it may have gone
+            let _ = self.watcher.unwatch(&path); // it may be gone
         }
     }
 }
 
-/// The folders to watch, by their real names: that of the shaders with all below it, those of all files, and of what
-/// links lead to. Of the scene's folder nothing below is watched: it may be a home folder.
+/// Returns the folders to watch, by canonical path: the shaders' folder with everything below it, the folders of all
+/// files, and those of link targets. Nothing below the scene's folder is watched, because that may be a home folder.
 fn wanted(sources: &Sources, snapshot: &Snapshot) -> BTreeMap<PathBuf, RecursiveMode> {
     let files = snapshot
         .files
         .iter()
         .map(|(path, _)| path.clone())
         .chain(sources.shader_files());
-    // The shaders' folder may itself be renamed: its parent says so.
+    // The shaders' folder may be renamed, which its parent notices.
     let paths = files.chain(sources.shaders.clone());
     let paths = paths
         .flat_map(|path| [fs::canonicalize(&path).ok(), Some(path)])
@@ -226,7 +235,7 @@ fn wanted(sources: &Sources, snapshot: &Snapshot) -> BTreeMap<PathBuf, Recursive
     folders
 }
 
-/// The nearest folder above a path that there is.
+/// Returns the nearest existing folder above a path.
 fn existing_parent(mut path: PathBuf) -> Option<PathBuf> {
     while path.pop() {
         let folder = if path.as_os_str().is_empty() {

@@ -35,7 +35,7 @@ pub fn check_at(source: &Source) -> Result<Checked, (ShaderError, Option<usize>)
         return Err((ShaderError::at(source, span, rule), start(span)));
     }
     let module = naga::front::wgsl::parse_str(&source.text).map_err(|error| {
-        let (span, message) = wording::parse_message(&error);
+        let (span, message) = wording::parse_message(&error, source);
         (ShaderError::at(source, span, message), start(span))
     })?;
     let info = validate(&module).map_err(|error| {

@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::{fs, io, path::Path};
 
 use super::bake::{tables, tree_tables};
+use super::functions::is_same_code;
 use crate::pack::{self, Specialization};
 use crate::scene::Integrator;
 use crate::waiting;
@@ -211,6 +212,11 @@ impl Shaders {
         })
     }
 
+    /// Returns whether other shaders have the same code, and differ in comments and white space at most.
+    pub fn has_same_code(&self, other: &Shaders) -> bool {
+        self.files().all(|(name, text)| is_same_code(text, other.text(name)))
+    }
+
     /// All files: names and texts.
     pub fn files(&self) -> impl Iterator<Item = (&str, &str)> {
         self.files.iter().map(|(name, text)| (name.as_str(), text.as_str()))
@@ -356,6 +362,15 @@ impl Source {
     /// Where a file starts.
     pub fn start_of(&self, file: &str) -> Option<usize> {
         self.parts.iter().find(|part| part.file == file).map(|part| part.start)
+    }
+
+    /// Returns file, line and column of a byte of the text.
+    pub fn place(&self, offset: usize) -> Option<String> {
+        let (file, text, offset) = self.locate(offset)?;
+        let before = &text[..offset];
+        let start = before.rfind('\n').map_or(0, |at| at + 1);
+        let (line, column) = (before.matches('\n').count() + 1, before[start..].chars().count() + 1);
+        Some(format!("{file}:{line}:{column}"))
     }
 
     /// The file that a byte of the text came from, its own text, and the byte's offset in it.

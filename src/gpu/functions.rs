@@ -1,4 +1,4 @@
-//! Where the functions of a WGSL text are, found without a parser: the text may be wrong.
+//! Locations of the functions in a WGSL text, found without a parser because the text may be wrong.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use std::ops::Range;
 pub struct FunctionText<'a> {
     /// Its name.
     pub name: &'a str,
-    /// Where `fn` is.
+    /// The offset of `fn`.
     pub start: usize,
     /// The type that it returns, as it is written; empty if it returns nothing.
     pub result: &'a str,
@@ -68,7 +68,26 @@ pub fn without_comments(text: &str) -> String {
     String::from_utf8(plain).unwrap_or_default() // whole characters were replaced
 }
 
-/// Where a word is next, with no letter or digit beside it.
+/// Returns whether two texts have the same code. Comments with annotations of the development mode count as code.
+pub fn is_same_code(a: &str, b: &str) -> bool {
+    const ANNOTATIONS: [&str; 4] = ["slider", "switch", "color", "layer"];
+    // WGSL nests block comments, and ends line comments at more characters than `\n`.
+    let is_simple =
+        |text: &str| !text.contains(['\u{b}', '\u{c}', '\u{85}', '\u{2028}', '\u{2029}']) && !text.contains("/*");
+    let annotated = |text: &str| -> Vec<String> {
+        let lines = text.lines().filter(|line| line.contains("//"));
+        let lines = lines.filter(|line| ANNOTATIONS.iter().any(|word| line.contains(word)));
+        lines.map(|line| line.trim().to_owned()).collect()
+    };
+    let code = |text: &str| without_comments(&text.replace('\r', "\n"));
+    a == b
+        || (is_simple(a)
+            && is_simple(b)
+            && annotated(a) == annotated(b)
+            && code(a).split_whitespace().eq(code(b).split_whitespace()))
+}
+
+/// Finds the next occurrence of a word, with no letter or digit beside it.
 fn next_word(text: &str, from: usize, word: &str) -> Option<usize> {
     let part_of_name = |c: char| c.is_alphanumeric() || c == '_';
     text[from..]
@@ -94,6 +113,31 @@ fn closing(text: &str, open: usize) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn comments_are_not_code_except_annotations() {
+        let text = "const a: f32 = 0.5; // slider 0..1\nfn f() -> f32 { return a; } // one\n";
+        for same in [
+            text.to_owned(),
+            format!("// a line\n\n{text}"),
+            text.replace("one", "another"),
+            text.replace("{ return", "{\n    return"),
+            text.replace('\n', "\r\n"),
+        ] {
+            assert!(is_same_code(text, &same), "{same}");
+        }
+        for other in [
+            text.replace("0..1", "0..2"),
+            text.replace("// slider 0..1", ""),
+            text.replace("0.5", "0.25"),
+            text.replace("fn f", "// fn f"),
+            text.replace("one", "one\u{2028}fn g() {}"),
+            format!("/* /* */ // */ fn g() {{}}\n{text}"),
+            text.replace("return a", "returna"),
+        ] {
+            assert!(!is_same_code(text, &other), "{other}");
+        }
+    }
 
     #[test]
     fn functions_are_found_whatever_is_in_comments() {

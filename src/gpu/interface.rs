@@ -125,7 +125,7 @@ impl Sides<'_> {
                     None => format!("({x}, {y})"),
                 };
                 let message = format!(
-                    "the workgroup size of `{name}` is {is}; it must be ({}, {}), by which the program counts the workgroups",
+                    "the workgroup size of `{name}` is {is}; it must be ({}, {}), because the program counts workgroups by it",
                     size[0], size[1]
                 );
                 (span.or_else(|| place(name)), message)
@@ -285,7 +285,7 @@ impl Layouts<'_> {
                 }
                 if let Some(more) = members.get(known.len()) {
                     let name = more.name.as_deref().unwrap_or_default();
-                    return Some(format!("`{path}.{name}` is not there"));
+                    return Some(format!("`{path}.{name}` does not exist in what the program binds"));
                 }
                 (span != known_span).then(|| format!("`{path}` has {span} bytes and must have {known_span}"))
             }

@@ -15,18 +15,18 @@ use crate::scene::Integrator;
 const BINDING: usize = 3;
 const _: () = assert!(BINDING == GROUPS[CALL].len());
 
-/// What the constants' values are called in a kernel.
+/// The name of the buffer of slider values in a kernel.
 const VALUES: &str = "values_of_sliders";
-/// How a kernel adds a sample's light, where a layer takes the place of it, and what it then adds.
+/// The statement by which a kernel adds the radiance of a sample, which a layer replaces, and the replacement.
 const ADDED: &str = "sum +=";
 const HELD: &str = "held_in_place_of_light";
 
-/// What is not as the files say, in kernels that are made of them.
+/// The changes that kernels need for sliders and layers.
 #[derive(Clone, Debug, Default)]
 pub struct Live {
     /// The constants that are read from a buffer, in its order.
     sliders: Vec<Slider>,
-    /// What is rendered in place of light.
+    /// The layer that replaces color.
     layer: Option<Layer>,
 }
 
@@ -55,7 +55,7 @@ impl Live {
         }
         let each = all.into_iter().filter(|slider| works(std::slice::from_ref(slider)));
         let each: Vec<Slider> = each.collect();
-        // Two that work alone may not do so together: what can be told then is the truth.
+        // Two edits that work alone may fail together: then no edit is made.
         with(if works(&each) { each } else { Vec::new() })
     }
 
@@ -64,7 +64,7 @@ impl Live {
         &self.sliders
     }
 
-    /// What is rendered in place of light.
+    /// Returns the layer that replaces color.
     pub fn layer(&self) -> Option<&Layer> {
         self.layer.as_ref()
     }
@@ -152,7 +152,8 @@ fn added_light(text: &str, body: &Range<usize>) -> Option<Range<usize>> {
     places.next().is_none().then_some(start..end)
 }
 
-/// What is added in place of a sample's light: what the layer holds at its end, with the sample's weight.
+/// Returns the expression that replaces the radiance of a sample: the final value of the layer, with the weight of
+/// the sample.
 fn in_place_of_light(layer: &Layer) -> String {
     let Layer { name, ty, numbers, .. } = layer;
     let color = match numbers {
@@ -167,7 +168,7 @@ fn in_place_of_light(layer: &Layer) -> String {
     )
 }
 
-/// What takes the place of parts of a text.
+/// Replacements of parts of a text.
 pub type Edits = Vec<(Range<usize>, String)>;
 
 /// Shaders with edits of constants' numbers.

@@ -10,9 +10,9 @@ use super::functions::without_comments;
 use crate::error::ShaderError;
 
 /// The longest name of a layer, in bytes.
-pub const LONGEST_NAME: usize = 48;
+pub const MAX_NAME_LEN: usize = 48;
 
-/// What is marked in shaders.
+/// The annotations in shaders.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Marks {
     /// Constants that become sliders.
@@ -32,15 +32,15 @@ pub struct Slider {
     pub name: String,
     /// Its line, counted from 1.
     pub line: usize,
-    /// What it is.
+    /// The kind of the constant.
     pub kind: Kind,
     /// The least value, for numbers.
     pub min: f64,
     /// The largest.
     pub max: f64,
-    /// How far apart the values are, if that is said.
+    /// The interval between values, if it is given.
     pub step: Option<f64>,
-    /// What the file says.
+    /// The value in the file.
     pub value: Value,
     /// The whole declaration in the file, from its keyword to its semicolon.
     pub(super) declaration: Range<usize>,
@@ -50,7 +50,7 @@ pub struct Slider {
     literals: Vec<Range<usize>>,
 }
 
-/// What a slider's constant is.
+/// The kind of a slider's constant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
@@ -66,7 +66,7 @@ pub enum Kind {
     Color,
 }
 
-/// What a slider says.
+/// The value of a slider.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Value {
@@ -87,14 +87,14 @@ pub struct Layer {
     pub name: String,
     /// Its type as it is written.
     pub(super) ty: String,
-    /// How many numbers it has.
+    /// Number of components.
     pub numbers: usize,
     /// Its name in the file.
     pub(super) at: Range<usize>,
 }
 
 impl Slider {
-    /// A value as the constant can have it: rounded to its type, within its range. `None` if it is of another kind.
+    /// Returns a value rounded to the type and clamped to the range; `None` if it is of another kind.
     pub fn rounded(&self, value: Value) -> Option<Value> {
         let within = |x: f64| x.clamp(self.min, self.max);
         match (self.kind, value) {
@@ -108,7 +108,7 @@ impl Slider {
         }
     }
 
-    /// A value that is asked for, as a constant of its type has it.
+    /// Checks a requested value, and returns it as the constant stores it.
     ///
     /// # Errors
     ///
@@ -121,7 +121,7 @@ impl Slider {
             (Value::Number(x), _) if is_whole && x.fract() != 0.0 => {
                 Err(format!("{} must be a whole number", plain(x)))
             }
-            // What is asked for has fewer digits than the ends have.
+            // A requested value has fewer digits than the ends of the range.
             (Value::Number(x), Value::Number(y))
                 if (x - y).abs() > 1e-6 * y.abs().max(f64::from(f32::MIN_POSITIVE)) =>
             {
@@ -147,7 +147,7 @@ impl Slider {
         }
     }
 
-    /// A number of 32 bits in as few digits as tell it apart from others.
+    /// Returns a 32-bit number with the fewest digits that identify it.
     pub fn short(&self, x: f64) -> f64 {
         match self.kind {
             Kind::I32 | Kind::U32 => x,
@@ -174,7 +174,7 @@ impl Slider {
         }
     }
 
-    /// A number as WGSL has it.
+    /// Formats a number for WGSL.
     fn written(&self, x: f64) -> String {
         match self.kind {
             Kind::I32 | Kind::U32 => format!("{x:.0}"),
@@ -189,7 +189,7 @@ impl Slider {
 }
 
 impl Marks {
-    /// What is marked in all files.
+    /// Returns the annotations of all files.
     pub fn of(shaders: &Shaders) -> Marks {
         let mut marks = Marks::default();
         for (file, text) in shaders.files() {
@@ -198,7 +198,7 @@ impl Marks {
         marks
     }
 
-    /// What is marked in a file.
+    /// Returns the annotations of a file.
     pub fn of_file(file: &str, text: &str) -> Marks {
         let mut marks = Marks::default();
         marks.read(file, text);
@@ -259,7 +259,7 @@ struct Line<'a> {
     /// Counted from 1.
     number: usize,
     code: &'a str,
-    /// Where the code starts in the file.
+    /// The offset of the code in the file.
     at: usize,
 }
 
@@ -280,13 +280,13 @@ fn declared(code: &str) -> Option<Declared<'_>> {
         }
         None => (body, None),
     };
-    let (left, ty) = head.split_once(':').unwrap_or((head, ""));
-    let (keyword, name) = left.trim().rsplit_once(|c: char| c.is_whitespace() || c == '>')?;
-    let keyword_end = left.trim().len() - name.len();
+    let (before, ty) = head.split_once(':').unwrap_or((head, ""));
+    let (keyword, name) = before.trim().rsplit_once(|c: char| c.is_whitespace() || c == '>')?;
+    let keyword_end = before.trim().len() - name.len();
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
     (!name.is_empty() && name.chars().all(is_name)).then_some(Declared {
         keyword: if keyword.contains('<') {
-            left.trim()[..keyword_end].trim()
+            before.trim()[..keyword_end].trim()
         } else {
             keyword.trim()
         },
@@ -311,7 +311,7 @@ impl Line<'_> {
             return Err(RULE.to_string());
         };
         let Some((place, written)) = value.filter(|_| !ty.is_empty()) else {
-            return Err(format!("`{name}` must have its type and its value: {RULE}"));
+            return Err(format!("`{name}` must have a type and a value: {RULE}"));
         };
         let kind = match packed_type(ty).as_str() {
             "f32" => Kind::F32,
@@ -323,7 +323,7 @@ impl Line<'_> {
         };
         let place = self.at + place;
         let whole = || std::iter::once(place..place + written.len()).collect();
-        let wrong = || format!("`{name}`: `{written}` must be a number by itself, or true or false: {RULE}");
+        let wrong = || format!("`{name}`: `{written}` must be a number literal, true or false: {RULE}");
         let (value, literals) = match kind {
             Kind::Bool => {
                 let on = written.parse().map_err(|_| wrong())?;
@@ -339,20 +339,20 @@ impl Line<'_> {
         match (kind, range) {
             (Kind::Bool, None | Some("")) | (Kind::Color, None) => {}
             (Kind::Bool | Kind::Color, _) => return Err(format!("`{name}` has no range: {RULE}")),
-            (_, None) => return Err(format!("`{name}` is no colour, nor a switch: {RULE}")),
-            (_, Some(told)) => {
+            (_, None) => return Err(format!("`{name}` is neither a color nor a switch: {RULE}")),
+            (_, Some(written)) => {
                 let rule = || {
                     let whole = if kind == Kind::F32 { "" } else { " whole" };
                     format!(
-                        "`{name}`: `slider {told}` must be `slider LOW..HIGH` or `slider LOW..HIGH step STEP`, with{whole} \
+                        "`{name}`: `slider {written}` must be `slider LOW..HIGH` or `slider LOW..HIGH step STEP`, with{whole} \
                          numbers, LOW below HIGH, and STEP above 0"
                     )
                 };
-                let (range, stepped) = told.split_once("step").unwrap_or((told, ""));
+                let (range, stepped) = written.split_once("step").unwrap_or((written, ""));
                 let (low, high) = range.split_once("..").ok_or_else(rule)?;
                 let limit = |text: &str| number(text.trim(), kind).ok_or_else(rule);
                 (min, max) = (limit(low)?, limit(high)?);
-                if told.contains("step") {
+                if written.contains("step") {
                     step = limit(stepped)?;
                 }
                 if !(min < max) || step <= 0.0 {
@@ -390,12 +390,12 @@ impl Line<'_> {
         };
         if value.is_some() {
             return Err(format!(
-                "`{name}` is 0 before each sample, and has no value of its own: {RULE}"
+                "`{name}` is set to 0 before each sample and must not have an initial value: {RULE}"
             ));
         }
-        if name.len() > LONGEST_NAME {
+        if name.len() > MAX_NAME_LEN {
             return Err(format!(
-                "`{name}`: a layer's name must have {LONGEST_NAME} bytes at most"
+                "`{name}`: a layer's name must have {MAX_NAME_LEN} bytes at most"
             ));
         }
         let numbers = match packed_type(ty).as_str() {
@@ -416,7 +416,7 @@ impl Line<'_> {
     }
 }
 
-/// A number as WGSL writes it, of a type; `None` if it is none.
+/// Parses a WGSL number of a type; `None` for anything else.
 fn number(written: &str, kind: Kind) -> Option<f64> {
     let digits = written.strip_prefix('-').unwrap_or(written);
     if !digits.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
@@ -551,7 +551,7 @@ mod tests {
                 Value::Color([0.5; 3]),
             ]
         );
-        // What is written is what is read again, and nothing else of the text changes.
+        // Written values are read back, and the rest of the text stays.
         let new = [
             Value::Number(0.25),
             Value::Number(f64::from(1e-9f32)),
@@ -604,7 +604,7 @@ mod tests {
         for (line, wanted) in [
             ("let a = 1.0; // slider 0..1", "must be a line"),
             ("const a = 1.0; // slider 0..1", "must have its type"),
-            ("override a: f32; // slider 0..1", "must have its type and its value"),
+            ("override a: f32; // slider 0..1", "must have a type and a value"),
             ("const a: vec2f = vec2f(1.0); // slider 0..1", "`vec2f`"),
             ("const a: f32 = B * 2.0; // slider 0..1", "`B * 2.0` must be a number"),
             ("const a: f32 = inf; // slider 0..1", "`inf` must be a number"),

@@ -29,7 +29,9 @@ mod wording;
 pub use bake::bake;
 pub use compile::{Checked, check};
 pub use controls::FloatControls;
-pub use device::{Choice, Device, HOW_TO_GET_VULKAN, Info, adapters, choose, choose_among, preferred};
+pub use device::{
+    Choice, Choice as AdapterChoice, Device, HOW_TO_GET_VULKAN, Info, adapters, choose, choose_among, preferred,
+};
 pub use foresee::{Foreseen, foresee};
 pub use live::{Live, with_edits, without_values};
 pub use renderer::{Call, Gpu, Options};

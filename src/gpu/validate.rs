@@ -12,10 +12,10 @@ use super::rounding::Rounding;
 use crate::error::{ShaderError, ShaderErrors};
 use crate::pack::Packed;
 
-/// So many mistakes of a kernel are looked for.
+/// Maximum number of errors that are searched in a kernel.
 const MOST: usize = 16;
 
-/// How the kernels that are checked know the scene.
+/// The representation of the scene in the checked kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Forms {
     /// In buffers.
@@ -48,11 +48,21 @@ pub fn check_kernels(packed: &Packed, shaders: &Shaders, forms: Forms) -> Result
             errors.push(error);
         }
     }
+    // A mistake in a declaration also breaks the code that the program generates from it: that follows from the cause.
+    if errors.iter().any(|error| is_in_file(error, shaders)) {
+        errors.retain(|error| is_in_file(error, shaders));
+    }
     if errors.is_empty() {
         Ok(())
     } else {
         Err(ShaderErrors(errors))
     }
+}
+
+/// Returns whether an error is at a place in a shader file.
+fn is_in_file(error: &ShaderError, shaders: &Shaders) -> bool {
+    let file = error.place.split(':').next();
+    shaders.files().any(|(name, _)| Some(name) == file)
 }
 
 fn mistakes(kernel: &Kernel, source: Source, packed: &Packed) -> Vec<ShaderError> {
@@ -69,8 +79,9 @@ fn mistakes(kernel: &Kernel, source: Source, packed: &Packed) -> Vec<ShaderError
     errors
 }
 
-/// naga stops at the first mistake. A function that has one gets an empty body, and the search goes on: to whoever calls
-/// it it is the same. What is left at the end is a kernel that naga accepts, unless a mistake is in no function's body.
+/// Finds the errors in all functions, although naga stops at the first error: a function with an error gets an empty
+/// body, which does not matter to its callers. The rest is a kernel that naga accepts, unless an error is outside all
+/// bodies.
 fn mistakes_of_functions(mut source: Source) -> (Vec<ShaderError>, Option<(Source, Checked)>) {
     let mut errors: Vec<ShaderError> = Vec::new();
     loop {
@@ -124,7 +135,8 @@ mod tests {
         shapes = [{ type = 'sphere', material = 'm', center = [0, 0, 0], radius = 1 }]
     ";
 
-    /// What is said of the built-in shaders with parts of files replaced; an empty part is the file's end.
+    /// Returns the messages for the built-in shaders with parts of files replaced; an empty part is the end of the
+    /// file.
     fn said(edits: &[(&str, &str, &str)]) -> Vec<String> {
         let mut shaders = Shaders::built_in();
         for (name, old, new) in edits {
@@ -285,6 +297,25 @@ mod tests {
     }
 
     #[test]
+    fn errors_in_generated_code_are_left_out_where_a_file_has_the_cause() {
+        let said = said(&[("bindings.wgsl", "records: array<vec4u>", "records: array<vec2u>")]);
+        assert!(
+            said.iter()
+                .any(|line| line.starts_with("bindings.wgsl:") && line.contains("laid out")),
+            "{said:#?}"
+        );
+        assert!(said.iter().all(|line| !line.starts_with('(')), "{said:#?}");
+    }
+
+    #[test]
+    fn a_second_definition_of_a_name_is_reported_with_the_place_of_the_first() {
+        says(
+            &[("phong.wgsl", "", "const steps: i32 = 3;")],
+            &["node.wgsl:5:4: redefinition of `steps`; the other definition is at phong.wgsl:"],
+        );
+    }
+
+    #[test]
     fn constants_of_a_shader_must_have_values() {
         says(
             &[("math.wgsl", "", "override MINE: f32;")],
@@ -307,7 +338,7 @@ mod tests {
         );
     }
 
-    /// Whatever naga calls things by, a person is not told numbers of what is in its tables.
+    /// Messages never contain naga's internal indices.
     #[test]
     fn messages_name_what_is_in_the_source() {
         let with = |body: &str| {
@@ -321,14 +352,17 @@ mod tests {
             ("if n { }", "the condition `n` of type `u32` must be `bool`"),
             (
                 "let x = b + vec2f();",
-                "`b` of type `vec3<f32>` and `vec2f()` of type `vec2<f32>` do not go together",
+                "`b` of type `vec3<f32>` and `vec2f()` of type `vec2<f32>` are incompatible",
             ),
             ("let x = !a;", "`a` of type `f32` cannot be the operand"),
             (
                 "let x = wronged(a, a, n); }\nfn wronged(a: f32, b: vec3f, n: u32) -> f32 { return a;",
                 "`wronged`: argument 2, `a` of type `f32`, must be `vec3<f32>`",
             ),
-            ("return a;", "`a` of type `f32` is returned where nothing is declared"),
+            (
+                "return a;",
+                "`a` of type `f32` is returned, but no return type is declared",
+            ),
             (
                 "var x = film;",
                 "`x`: type `array<vec4<f32>>` cannot be that of a variable",
@@ -343,7 +377,7 @@ mod tests {
             ("primitives[0].level = a;", "`primitives[0].level`"),
             ("break;", "outside of a `loop`"),
             ("let x = all(b);", "`b`"),
-            ("let x = b == camera;", "`camera` of type `Camera` do not go together"),
+            ("let x = b == camera;", "`camera` of type `Camera` are incompatible"),
             ("let x = camera == camera;", "Incompatible operands"),
         ] {
             let said = with(body);

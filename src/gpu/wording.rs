@@ -1,4 +1,4 @@
-//! What naga says of a kernel, in the words of its source: naga names types, values and functions by their numbers.
+//! Messages of naga, rewritten with the names of the source: naga refers to types, values and functions by index.
 
 use std::error::Error;
 
@@ -12,11 +12,12 @@ use naga::valid::{
 };
 use naga::{Expression, Function, Handle, Module, Span, Type, TypeInner, WithSpan};
 
+use super::compose::Source;
 use super::functions::functions;
 
 /// The message of an error in a module that was parsed from `text`.
 pub fn message(module: &Module, text: &str, error: &ValidationError) -> String {
-    let words = Words { module, text };
+    let words = Naming { module, text };
     match error {
         ValidationError::Function { handle, name, source } => {
             format!("in `{name}`: {}", words.inside(&module.functions[*handle], source))
@@ -42,7 +43,7 @@ pub fn message(module: &Module, text: &str, error: &ValidationError) -> String {
             source: GlobalVariableError::MissingTypeFlags { .. },
         } => {
             let ty = words.name(module.global_variables[*handle].ty);
-            format!("`{name}`: type `{ty}` cannot be that of a variable in this address space")
+            format!("`{name}`: type `{ty}` is not allowed for a variable in this address space")
         }
         ValidationError::GlobalVariable { name, source, .. } => {
             format!("`{name}`: {}", named(&chain(source), |i| words.nth_type(i)))
@@ -61,22 +62,29 @@ pub fn message(module: &Module, text: &str, error: &ValidationError) -> String {
     }
 }
 
-/// Where the text is wrong, and what naga's parser says.
-pub fn parse_message(error: &ParseError) -> (Option<Span>, String) {
+/// Returns the location and the message of a parse error.
+pub fn parse_message(error: &ParseError, source: &Source) -> (Option<Span>, String) {
     let labels: Vec<(Span, &str)> = error.labels().collect();
-    // Of two places the one that has the wrong value, not the one that says what is right.
+    // Prefers the location with the wrong value, not the one that gives the reason.
     let has_type = |(_, label): &&(Span, &str)| label.starts_with("this expression has type");
     let chosen = labels.iter().find(has_type).or(labels.first());
     let said = without_debug(error.message());
     let label = chosen.map(|(_, label)| *label).unwrap_or_default();
-    let message = match label.is_empty() || label == "see msg" || said.contains(label) {
+    let mut message = match label.is_empty() || label == "see msg" || said.contains(label) {
         true => said,
         false => format!("{said} ({label})"),
     };
+    // A name that is defined twice: the other definition may be in any file.
+    let other = labels
+        .iter()
+        .find(|(_, label)| label.starts_with("previous definition"));
+    if let Some(place) = other.and_then(|(span, _)| source.place(span.to_range()?.start)) {
+        message += &format!("; the other definition is at {place}");
+    }
     (chosen.map(|(span, _)| *span), message)
 }
 
-/// Where a module is invalid.
+/// Returns the location of a validation error.
 pub fn place(text: &str, error: &WithSpan<ValidationError>) -> Option<Span> {
     let span = error.spans().map(|(span, _)| *span).last();
     span.or_else(|| match error.as_inner() {
@@ -131,19 +139,19 @@ fn named(message: &str, name: impl Fn(usize) -> Option<String>) -> String {
             continue;
         };
         out.push_str(&rest[..start]);
-        out.push_str(&name(i).unwrap_or_else(|| "what is there".to_string()));
+        out.push_str(&name(i).unwrap_or_else(|| "a value".to_string()));
         rest = &rest[start + number.len() + 2..];
     }
     out + rest
 }
 
-struct Words<'a> {
+struct Naming<'a> {
     module: &'a Module,
     text: &'a str,
 }
 
-impl Words<'_> {
-    /// What is wrong inside of a function.
+impl Naming<'_> {
+    /// Returns the message of an error in a function.
     fn inside(&self, function: &Function, error: &FunctionError) -> String {
         let value = |handle: Handle<Expression>| self.value(function, handle);
         let typed =
@@ -162,16 +170,13 @@ impl Words<'_> {
                 (Some(value), Some(ty)) => {
                     format!("{} is returned where `{}` is declared", typed(*value), self.name(*ty))
                 }
-                (Some(value), None) => format!("{} is returned where nothing is declared", typed(*value)),
-                (None, Some(ty)) => format!(
-                    "not every way to the end returns the `{}` that is declared",
-                    self.name(*ty)
-                ),
+                (Some(value), None) => format!("{} is returned, but no return type is declared", typed(*value)),
+                (None, Some(ty)) => format!("not every path returns a `{}`, as declared", self.name(*ty)),
                 (None, None) => chain(error),
             },
             FunctionError::InvalidIfType(handle) => format!("the condition {} must be `bool`", typed(*handle)),
             FunctionError::InvalidSwitchType(handle) => {
-                format!("what `switch` chooses by, {}, must be a whole number", typed(*handle))
+                format!("the selector of `switch`, {}, must be an integer", typed(*handle))
             }
             FunctionError::LocalVariable { name, source, .. } => match source {
                 LocalVariableError::InvalidType(ty) => {
@@ -204,7 +209,7 @@ impl Words<'_> {
             FunctionError::Expression { handle, source } => {
                 let types = match source {
                     ExpressionError::InvalidBinaryOperandTypes { lhs_expr, rhs_expr, .. } => Some(format!(
-                        "{} and {} do not go together",
+                        "{} and {} are incompatible",
                         typed(*lhs_expr),
                         typed(*rhs_expr)
                     )),

@@ -264,7 +264,7 @@ fn wrong_arguments_are_told_with_the_way_out() {
     }
     place.quietly(&["render", "small.toml", "--device", "1"]);
     let dev = place.run(&["dev", "small.toml", "--no-page", "--device", "CPU"]);
-    assert!(dev.stderr.contains("cpu runs no shaders"), "{}", dev.stderr);
+    assert!(dev.stderr.contains("cpu cannot run shaders"), "{}", dev.stderr);
 }
 
 #[test]

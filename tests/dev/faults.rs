@@ -1,4 +1,4 @@
-//! Pixels that are no light are counted, and marked in what is shown alone.
+//! Invalid pixels are counted, and marked in the displayed image only.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use wgray::dev::{Against, Command, Frame, View};
 
 use super::running::{Files, KERNEL, Running, SCENE};
 
-/// The pixel that a picture shows, from a PNG file.
+/// Returns the pixel of a PNG file.
 fn pixel(png: &[u8], x: u32, y: u32) -> [u8; 3] {
     image::load_from_memory(png).unwrap().into_rgb8().get_pixel(x, y).0
 }
@@ -47,7 +47,7 @@ fn faults_of_a_shader_are_counted_and_marked() {
         (picture.get_pixel(1, 3).0 == [0, 255, 0]).then_some(())
     });
     running.session.send(Command::Marks(false));
-    running.wait("a picture without marks", |running| {
+    running.wait("an image without marks", |running| {
         with_faults(running).filter(|frame| pixel(&frame.pictures[0], 0, 3) != magenta)
     });
     running.session.send(Command::Marks(true));

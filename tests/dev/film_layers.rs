@@ -15,7 +15,7 @@ const MEANS: [(View, Layer); 5] = [
     (View::ShadingNormal, Layer::Normal),
 ];
 
-/// The scene with light that goes from surface to surface, and surroundings that shine.
+/// Returns the scene with global illumination and an environment that emits light.
 fn path() -> String {
     SCENE.replace(
         "[render]",
@@ -30,7 +30,7 @@ fn adaptive() -> String {
     )
 }
 
-/// The finished picture of a layer, and its frame.
+/// Returns the finished image of a layer, and its frame.
 #[track_caller]
 fn wait_layer(running: &Running, view: View) -> (FilmLayer, Arc<Frame>) {
     running.wait("the layer", |running| {
@@ -74,7 +74,7 @@ fn layers_are_those_that_render_gives_and_light_is_their_sum() {
             assert_eq!(
                 frame.header.histogram.is_some(),
                 found.is_light(),
-                "albedo and normals are no light"
+                "albedo and normals are not radiance"
             );
             seen.push(found.values.colors);
             // One kernel has them all.
@@ -87,7 +87,7 @@ fn layers_are_those_that_render_gives_and_light_is_their_sum() {
             let sum = [0, 1, 2].map(|c| direct[c] + indirect[c] + emission[c]);
             assert!(close(*color, sum), "pixel {i}: {color:?} {sum:?}");
         }
-        // Light again: its kernel is still there, and so is its picture.
+        // Color again: its kernel and its image are still available.
         running.session.send(Command::View(View::Color));
         running.wait("light", |running| {
             let frame = running.frame()?;
@@ -198,11 +198,11 @@ fn what_a_scene_does_not_have_is_refused_and_an_edit_changes_that() {
     assert_eq!(
         running.state().compile_seconds,
         compiled,
-        "its values are no part of the kernel"
+        "its values are not compiled in"
     );
     files.edit(KERNEL, RADIANCE, "path_value(simple)");
     running.wait_problem();
-    assert!(shows(&running, &green).is_some(), "the last picture stays");
+    assert!(shows(&running, &green).is_some(), "the last image stays");
     files.write_shaders();
     running.wait_well();
     // Without paths there is no such light.

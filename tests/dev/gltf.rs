@@ -1,4 +1,4 @@
-//! glTF files in the development mode: shown, and shown anew as they are saved.
+//! glTF files in the development mode: shown, and shown again whenever they are saved.
 
 use std::fs;
 use std::path::Path;
@@ -34,10 +34,10 @@ fn start(folder: &Path, name: &str) -> Running {
     Running::start(sources, None)
 }
 
-/// Waits for a whole picture in whose middle, on the large box, this channel is the strongest.
+/// Waits for a complete image in whose center, on the large box, this channel is the strongest.
 fn wait_for(running: &Running, strongest: [f64; 3]) {
     let wanted = strongest.map(|value| value > 0.5);
-    running.wait("the picture of the file", |running| {
+    running.wait("the image of the file", |running| {
         let frame = running.frame().filter(|frame| frame.header.done)?;
         let pixels = match &frame.content {
             wgray::dev::Content::Color(pixels) => &pixels.colors,
@@ -63,7 +63,7 @@ fn a_model_is_shown_anew_when_it_is_saved() {
     model(BLUE).write_glb(folder.path(), "new~");
     fs::rename(folder.path().join("new~"), folder.path().join("box.glb")).unwrap();
     wait_for(&running, BLUE);
-    // Half of it is told, and the rest follows.
+    // Half of it is reported as an error until the rest follows.
     let whole = model(RED).glb();
     fs::write(folder.path().join("box.glb"), &whole[..whole.len() / 2]).unwrap();
     assert!(running.wait_problem().message.contains("box.glb: "));
@@ -79,7 +79,7 @@ fn what_a_model_names_is_watched_too() {
     wait_for(&running, RED);
     model(GREEN).write_gltf(folder.path(), "box");
     wait_for(&running, GREEN);
-    // The buffer alone: without it there is an error, and with it the picture.
+    // The buffer alone: an error without it, and the image with it.
     let buffer = folder.path().join("box.bin");
     let bytes = fs::read(&buffer).unwrap();
     fs::remove_file(&buffer).unwrap();
@@ -109,7 +109,7 @@ fn the_camera_moves_and_is_not_saved_into_a_model() {
     running.session.send(Command::SaveCamera);
     running.wait("why not", |running| {
         let told = format!("{:?}", running.state());
-        told.contains("a camera cannot be saved: glTF files are read-only here")
+        told.contains("cannot save the camera: glTF files are read-only here")
             .then_some(())
     });
     assert_eq!(fs::read(folder.path().join("box.glb")).unwrap(), before);

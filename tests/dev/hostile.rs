@@ -1,93 +1,10 @@
 //! Messages of viewers that mean no good: each is refused in words, and the scene file stays.
 
-use std::io::{Read as _, Write as _};
-use std::net::{SocketAddr, TcpStream};
-
 use serde_json::{Value, json};
 use wgray::dev::{Command, Set};
 
-use super::running::{Files, LONGEST, SCENE, serve};
-
-/// A viewer's connection.
-struct Viewer(TcpStream);
-
-impl Viewer {
-    fn new(address: SocketAddr) -> Viewer {
-        let mut stream = TcpStream::connect(address).unwrap();
-        stream.set_read_timeout(Some(LONGEST)).unwrap();
-        let request = format!(
-            "GET /socket HTTP/1.1\r\nHost: {address}\r\nOrigin: http://{address}\r\nConnection: Upgrade\r\n\
-             Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
-        );
-        stream.write_all(request.as_bytes()).unwrap();
-        let mut head = Vec::new();
-        while !head.ends_with(b"\r\n\r\n") {
-            let mut byte = [0];
-            stream.read_exact(&mut byte).unwrap();
-            head.push(byte[0]);
-        }
-        assert!(head.starts_with(b"HTTP/1.1 101"));
-        Viewer(stream)
-    }
-
-    /// Sends bytes as a message of text, masked with zeros.
-    fn say(&mut self, text: &[u8]) -> std::io::Result<()> {
-        let mut bytes = vec![0x81, 0x80 | 127];
-        bytes.extend((text.len() as u64).to_be_bytes());
-        bytes.extend([0; 4]);
-        bytes.extend(text);
-        self.0.write_all(&bytes)
-    }
-
-    /// The next message of text; none when the connection has ended.
-    fn hear(&mut self) -> Option<Value> {
-        loop {
-            let mut head = [0; 2];
-            self.0.read_exact(&mut head).ok()?;
-            let length = match head[1] {
-                126 => {
-                    let mut length = [0; 2];
-                    self.0.read_exact(&mut length).ok()?;
-                    u64::from(u16::from_be_bytes(length))
-                }
-                127 => {
-                    let mut length = [0; 8];
-                    self.0.read_exact(&mut length).ok()?;
-                    u64::from_be_bytes(length)
-                }
-                short => u64::from(short),
-            };
-            let mut body = vec![0; length as usize];
-            self.0.read_exact(&mut body).ok()?;
-            match head[0] & 0xf {
-                1 => return Some(serde_json::from_slice(&body).unwrap()),
-                8 => return None,
-                _ => {}
-            }
-        }
-    }
-
-    /// What is said against a message: at once, or by the state that has heard it.
-    #[track_caller]
-    fn refused(&mut self, text: &str) -> String {
-        self.say(text.as_bytes()).unwrap();
-        let mut number = None;
-        loop {
-            let told = self.hear().unwrap();
-            if let Some(refused) = told.get("refused") {
-                return refused.as_str().unwrap().to_owned();
-            }
-            number = told.get("asked").and_then(Value::as_u64).or(number);
-            let notice = &told["state"]["notice"];
-            if number.is_some() && notice["command"].as_u64() == number {
-                assert_eq!(notice["bad"], json!(true), "{text}: {notice}");
-                return notice["text"].as_str().unwrap().to_owned();
-            }
-            let heard = told["state"]["heard"].as_u64();
-            assert!(number.is_none() || heard < number, "{text} was followed");
-        }
-    }
-}
+use super::running::{Files, SCENE, serve};
+use super::viewer::Viewer;
 
 fn set(path: &str, value: &Value) -> String {
     json!({ "set": { "path": path, "value": value } }).to_string()
@@ -104,11 +21,11 @@ fn what_is_no_value_is_refused_and_the_file_stays() {
     let radius = |value: &str| format!("{{\"set\":{{\"path\":\"shapes[0].radius\",\"value\":{value}}}}}");
     let nested = |count: usize| radius(&format!("{}1{}", "[".repeat(count), "]".repeat(count)));
     let number = "must be a number";
-    let nothing = "is nothing that can be changed";
+    let nothing = "cannot be changed";
     let path = "must be a path, such as shapes[2].radius";
     let unknown = "not understood: ";
     let mut messages = vec![
-        // values of other types, and numbers that are none
+        // values of other types, and values that are not numbers
         (radius("{}"), number),
         (radius("{\"a\":1}"), number),
         (radius("[0.5]"), number),
@@ -194,7 +111,7 @@ fn what_is_no_value_is_refused_and_the_file_stays() {
         ("\u{0}".to_owned(), unknown),
         ("[".repeat(4000), unknown),
     ];
-    // Where the key is absent, too.
+    // Also for an absent key.
     messages.push((set("render.shadow_epsilon", &json!("0.01")), number));
     let mut wrong = Vec::new();
     for (message, told) in messages {
@@ -214,7 +131,7 @@ fn what_is_no_value_is_refused_and_the_file_stays() {
     });
     session.wait_rendered(&files);
 
-    // What is no text, and what is far too long, ends its own connection and no more.
+    // Messages that are not text, or far too long, end only their own connection.
     for message in [&b"\xff\xfe{"[..], set(&"a".repeat(1 << 20), &json!(1)).as_bytes()] {
         let mut other = Viewer::new(address);
         let _ = other.say(message); // it may be cut off while it speaks

@@ -1,4 +1,4 @@
-//! Kernels that are not used now are checked too, and what a driver cuts short is told.
+//! Unused kernels are checked too, and kernels that a driver truncates are reported.
 
 use wgray::dev::{Command, Move, View};
 
@@ -26,7 +26,7 @@ fn mistakes_in_kernels_that_are_not_used_are_told_at_once() {
     files.edit(FIRST_HITS, "fn first_hits", "fn hits_first");
     files.edit(ADAPTIVE, "= moments;", "= moments.xyz;");
     files.edit(KERNEL, "@workgroup_size(8, 8)", "@workgroup_size(4, 4)");
-    let told = running.wait("all problems", |running| {
+    let message = running.wait("all problems", |running| {
         Some(problems(running)).filter(|all| all.len() == 3)
     });
     for (file, words) in [
@@ -36,12 +36,14 @@ fn mistakes_in_kernels_that_are_not_used_are_told_at_once() {
     ] {
         let path = files.path(file).display().to_string();
         assert!(
-            told.iter().any(|told| told.starts_with(&path) && told.contains(words)),
-            "{file}: {told:?}"
+            message
+                .iter()
+                .any(|message| message.starts_with(&path) && message.contains(words)),
+            "{file}: {message:?}"
         );
     }
     assert_eq!(running.colors(), good);
-    // The session goes on with the last good shaders, that kernel's among them.
+    // The session continues with the last good shaders, including that kernel.
     let revision = running.revision();
     running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
     running.wait_done(revision);
@@ -86,16 +88,16 @@ fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
         let pairs = colors.iter().flatten().zip(good.colors.iter().flatten());
         pairs.into_iter().all(|(new, old)| *new == old * 0.5)
     };
-    let cut = running.wait("a problem or the whole picture", |running| {
-        let told = problems(running)
+    let cut = running.wait("a problem or the complete image", |running| {
+        let message = problems(running)
             .iter()
-            .any(|told| told.contains("ends long loops early"));
+            .any(|message| message.contains("ends long loops early"));
         let whole = running.frame().is_some_and(|frame| frame.header.done) && halved(running);
-        (told || whole).then_some(told)
+        (message || whole).then_some(message)
     });
     if cut {
         assert_eq!(running.state().problems[0].kind, "shader");
-        assert_eq!(running.colors(), good, "the last good picture stays");
+        assert_eq!(running.colors(), good, "the last good image stays");
         let revision = running.revision();
         running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
         running.wait_done(revision);
@@ -108,16 +110,16 @@ fn a_loop_that_the_driver_cuts_short_is_told_or_rendered_whole() {
     );
     running.wait_rendered(&files);
 
-    // In a kernel of another view: that view is told, the picture is there.
+    // In a kernel of another view: only that view reports the error.
     long_loop(&files, FIRST_HITS, "let pixel = work.origin");
     running.wait_well();
     running.session.send(Command::View(View::Normal));
     running.wait("a problem or the normals", |running| {
-        let told = problems(running)
+        let message = problems(running)
             .iter()
-            .any(|told| told.contains("ends long loops early"));
+            .any(|message| message.contains("ends long loops early"));
         let frame = running.frame()?;
-        (told || frame.header.view == View::Normal && frame.header.done).then_some(())
+        (message || frame.header.view == View::Normal && frame.header.done).then_some(())
     });
     running.session.send(Command::View(View::Color));
     running.wait_rendered(&files);

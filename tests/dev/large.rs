@@ -1,4 +1,4 @@
-//! Pictures that are too large to be shown are shown smaller.
+//! Images that are too large to display are shown smaller.
 
 use wgray::dev::{Command, View};
 
@@ -24,7 +24,7 @@ fn a_picture_that_is_too_large_is_shown_smaller() {
         assert!(frame.pixel(size.0 - 1, size.1 - 1).is_some() && frame.pixel(size.0, 0).is_none());
         let colors = running.colors();
         assert_eq!([colors.width, colors.height], header.finest);
-        // It is the picture of that size.
+        // The image of that size.
         if size == (3000, 3000) {
             let [width, height] = header.finest;
             let smaller = cheap.replace("width = 40", &format!("width = {width}"));

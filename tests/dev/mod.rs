@@ -1,5 +1,5 @@
-//! The development mode without a browser: whatever happens to the files, the picture is the one that `render` makes of
-//! what they say last, or the last good one with the error beside it.
+//! The development mode without a browser: whatever happens to the files, it shows the image that `render` makes of
+//! their last state, or the last good one with the error.
 
 mod faults;
 mod film_layers;
@@ -16,5 +16,7 @@ mod running;
 mod server;
 mod shader_layers;
 mod shader_sliders;
+mod slow_viewer;
+mod viewer;
 mod views;
 mod writing;

@@ -1,20 +1,20 @@
-//! Nothing is rendered while nobody looks.
+//! Rendering pauses without viewers.
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use wgray::dev::{Session, Settings};
-use wgray::gpu::Choice;
+use wgray::dev::{Command, Preview, Report, Session, Settings};
+use wgray::gpu::AdapterChoice;
 
 use super::responsive::heavy;
-use super::running::{Files, Running, SETTLED};
+use super::running::{Files, Running, SCENE, SETTLED};
 
 #[test]
 fn rendering_rests_while_nobody_looks() {
     let files = Files::new(&heavy());
     let settings = Settings {
         sources: files.sources(),
-        device: Choice::Auto,
+        device: AdapterChoice::Auto,
         out: None,
         only_for_viewers: true,
         editor: None,
@@ -25,9 +25,9 @@ fn rendering_rests_while_nobody_looks() {
     };
     running.wait("a kernel", |running| running.state().compile_seconds);
     std::thread::sleep(SETTLED);
-    assert!(running.frame().is_none(), "nobody looks");
+    assert!(running.frame().is_none(), "no viewer");
     let viewer = running.session.viewers().enter();
-    running.wait("a first picture", |running| running.frame());
+    running.wait("a first image", |running| running.frame());
     let other = running.session.viewers().enter();
     drop(viewer);
     let last = running.frame().unwrap();
@@ -44,4 +44,46 @@ fn rendering_rests_while_nobody_looks() {
     running.wait("more of it", |running| {
         (!Arc::ptr_eq(&running.frame()?, &last)).then_some(())
     });
+}
+
+#[test]
+fn the_time_to_an_image_contains_the_time_to_compile() {
+    let files = Files::new(SCENE);
+    let (sender, reports) = std::sync::mpsc::channel();
+    let settings = Settings {
+        sources: files.sources(),
+        device: AdapterChoice::Auto,
+        out: None,
+        only_for_viewers: true,
+        editor: None,
+        report: Box::new(move |report| drop(sender.send(report))),
+    };
+    let running = Running {
+        session: Session::start(settings).unwrap(),
+    };
+    // A viewer that comes once all is compiled has not waited for it.
+    running.wait("a kernel", |running| running.state().compile_seconds);
+    std::thread::sleep(SETTLED);
+    let _viewer = running.session.viewers().enter();
+    running.wait_rendered(&files);
+    files.tint(0.5);
+    running.wait_rendered(&files);
+    // A preview that the viewer chooses is not reported as an image that is too large.
+    running.session.send(Command::Preview(Preview::try_from(2).unwrap()));
+    running.wait("a preview", |running| {
+        (running.frame()?.header.finest == [20, 15]).then_some(())
+    });
+    drop(running);
+    let mut images = 0;
+    for report in reports {
+        assert!(!matches!(report, Report::Smaller(..)), "{report:?}");
+        if let Report::Reloaded { seconds, compiled } = report {
+            assert!(
+                compiled.is_none_or(|compiled| compiled <= seconds),
+                "{compiled:?} of {seconds}"
+            );
+            images += 1;
+        }
+    }
+    assert_eq!(images, 2);
 }

@@ -1,9 +1,9 @@
-//! What is clicked, where meshes are placed, bring materials of their own, or come out of glTF files.
+//! Picking of objects in placed meshes, in meshes with their own materials, and in glTF files.
 
 use std::fs;
 
 use serde_json::json;
-use wgray::dev::{Command, Object, Seen, Set, Sources};
+use wgray::dev::{Command, Object, SceneView, Set, Sources};
 use wgray::scene::Overrides;
 
 use super::running::{Files, Running};
@@ -43,7 +43,7 @@ f 5 6 7 8
 const MTL: &str = "newmtl bark\nKd 0.4 0.2 0.1\nnewmtl leaf\nKd 0.1 0.5 0.1\n";
 
 /// The scene, once there is one.
-fn seen(running: &Running) -> std::sync::Arc<Seen> {
+fn seen(running: &Running) -> std::sync::Arc<SceneView> {
     running.wait("a scene", |running| running.session.seen.borrow().clone())
 }
 
@@ -176,10 +176,7 @@ materials = {{ leaf = 'leaf' }}
     assert_eq!(trunk.groups[0].line, line(&text, "# a tree"));
     assert_eq!(groups(&trunk), ["shapes[0]", "materials.leaf"]);
     let note = trunk.note.unwrap();
-    assert!(
-        note.contains("bark") && note.ends_with("comes from another file"),
-        "{note}"
-    );
+    assert!(note.contains("bark") && note.ends_with("is in another file"), "{note}");
     let crown = scene.at(RIGHT);
     assert_eq!(
         (crown.name.as_str(), crown.material.as_deref()),
@@ -189,7 +186,7 @@ materials = {{ leaf = 'leaf' }}
         (groups(&crown), &crown.note),
         (vec!["shapes[0]", "materials.leaf"], &None)
     );
-    // Which of the scene's materials a part has is chosen among those that there are, and no file's own value can be set.
+    // A part gets one of the scene's materials, and values of other files cannot be set.
     for (path, value, told) in [
         (
             "shapes[0].materials.leaf",
@@ -201,11 +198,7 @@ materials = {{ leaf = 'leaf' }}
             json!("other.obj"),
             "names and files are changed in the scene file itself",
         ),
-        (
-            "materials.bark.color",
-            json!([1, 1, 1]),
-            "is nothing that can be changed",
-        ),
+        ("materials.bark.color", json!([1, 1, 1]), "cannot be changed"),
     ] {
         let said = set(&running, path, value).unwrap();
         assert!(said.contains(told), "{path}: {said}");
@@ -284,7 +277,7 @@ translate = [1, 0, -0.2]
     assert_eq!(clicked.groups[0].line, line(&text, "# the model"));
     assert_eq!(
         clicked.note.as_deref(),
-        Some("it is of this glTF file, whose materials wgray convert writes into a scene")
+        Some("part of this glTF file, which is read-only here. Run `wgray convert` for an editable scene.")
     );
     assert_eq!(set(&running, "shapes[1].translate", json!([1, 0, 0.7])), None);
     running.wait_rendered(&files);

@@ -16,7 +16,7 @@ fn the_first_picture_is_what_render_makes() {
     let frame = running.frame().unwrap();
     assert_eq!((frame.header.samples, frame.header.total), (4, 4));
     let colors = running.colors().colors;
-    assert!(colors.iter().any(|color| *color != colors[0]), "a picture of something");
+    assert!(colors.iter().any(|color| *color != colors[0]), "the image is not empty");
     let (x, y) = (20, 20);
     let [r, g, b] = colors[y * 40 + x];
     let told = frame.pixel(x as u32, y as u32).unwrap();
@@ -153,7 +153,7 @@ fn a_broken_shader_is_told_and_the_picture_stays() {
     assert!(excerpt.contains("= sun;") && excerpt.contains("^^^"), "{excerpt}");
     std::thread::sleep(SETTLED);
     assert_eq!((running.colors(), running.revision()), (good, revision));
-    // What does not need the broken shaders goes on.
+    // Everything that does not need the broken shaders still works.
     running.session.send(Command::Move(Move::Orbit(0.3, 0.0)));
     running.wait_done(revision);
     running.session.send(Command::ResetCamera);
@@ -189,7 +189,7 @@ fn a_shader_that_is_wrong_in_its_types_is_told_too() {
     let problem = running.wait_problem();
     assert!(
         problem.place.unwrap().contains("camera.wgsl:"),
-        "there is no picture, but the error is told"
+        "no image, but an error"
     );
     assert!(running.frame().is_none());
     files.edit(
@@ -320,13 +320,13 @@ fn deleted_files_are_told_and_seen_again() {
 
 #[test]
 fn an_edited_texture_is_seen() {
-    let textured = SCENE.replacen("color = [0.8, 0.1, 0.1]", "color = { texture = 'picture' }", 1)
-        + "\n[textures.picture]\ntype = 'image'\nfile = 'textures/picture.png'\n";
+    let textured = SCENE.replacen("color = [0.8, 0.1, 0.1]", "color = { texture = 'wood' }", 1)
+        + "\n[textures.wood]\ntype = 'image'\nfile = 'textures/wood.png'\n";
     let files = Files::new(&textured);
     let paint = |color: [u8; 3]| {
         fs::create_dir_all(files.path("textures")).unwrap();
         image::RgbImage::from_pixel(4, 4, image::Rgb(color))
-            .save(files.path("textures/picture.png"))
+            .save(files.path("textures/wood.png"))
             .unwrap();
     };
     paint([200, 30, 30]);
@@ -337,13 +337,13 @@ fn an_edited_texture_is_seen() {
     running.wait_rendered(&files);
     assert_ne!(running.colors(), red);
     fs::remove_dir_all(files.path("textures")).unwrap();
-    assert!(running.wait_problem().message.contains("textures/picture.png"));
+    assert!(running.wait_problem().message.contains("textures/wood.png"));
     paint([30, 200, 30]);
     running.wait_rendered(&files);
-    fs::write(files.path("textures/picture.png"), "no picture").unwrap();
-    assert!(running.wait_problem().message.contains("textures/picture.png"));
+    fs::write(files.path("textures/wood.png"), "not an image").unwrap();
+    assert!(running.wait_problem().message.contains("textures/wood.png"));
     paint([200, 30, 30]);
-    running.wait("the first picture again", |running| {
+    running.wait("the first image again", |running| {
         (running.colors() == red).then_some(())
     });
 }
@@ -368,4 +368,78 @@ fn a_pipe_or_a_device_in_the_scenes_place_is_told_and_left() {
     fs::remove_file(&path).unwrap();
     files.write("scene.toml", SCENE);
     running.wait_rendered(&files);
+}
+
+#[test]
+fn a_finished_kernel_is_shown_while_a_newer_save_waits_for_the_compiler() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let compile = Duration::from_secs_f64(running.state().compile_seconds.unwrap());
+    let revision = running.revision();
+    let start = Instant::now();
+    let mut saves = 0;
+    while running.revision() == revision {
+        assert!(
+            start.elapsed() < 10 * compile,
+            "{saves} saves in {:?}, no image",
+            start.elapsed()
+        );
+        saves += 1;
+        files.tint(1.0 / f64::from(saves + 1));
+        std::thread::sleep((compile / 3).max(Duration::from_millis(60)));
+    }
+    assert!(saves > 1);
+    // In the end the newest save is shown.
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn a_comment_in_a_shader_is_not_compiled_and_later_errors_have_the_right_line() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let (revision, before) = (running.revision(), running.state());
+    files.write(KERNEL, &format!("// one\n// two\n{}", files.read(KERNEL)));
+    running.wait("the save", |running| {
+        (running.state().scenes > before.scenes).then_some(())
+    });
+    std::thread::sleep(SETTLED);
+    let after = running.state();
+    assert_eq!(
+        (running.revision(), after.compile_seconds),
+        (revision, before.compile_seconds)
+    );
+    assert!(!after.compiling);
+    files.edit(KERNEL, "= sum;", "= sun;");
+    let text = files.read(KERNEL);
+    let line = text.lines().position(|line| line.contains("= sun;")).unwrap() + 1;
+    assert_eq!(running.wait_problem().line, Some(line));
+    // The same below a comment: the error moves along.
+    files.write(KERNEL, &format!("// zero\n{text}"));
+    running.wait("the error at its new line", |running| {
+        (running.state().problems.first()?.line == Some(line + 1)).then_some(())
+    });
+    files.write(KERNEL, &text.replace("sun;", "sum;"));
+    running.wait_rendered(&files);
+}
+
+#[test]
+fn reading_a_changed_scene_is_reported_until_it_is_read() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let half = &SCENE[..SCENE.find("radius").unwrap() + 3];
+    files.write("scene.toml", half);
+    running.wait("reading", |running| running.state().reading.then_some(()));
+    running.wait_problem();
+    assert!(!running.state().reading);
+    files.write("scene.toml", SCENE);
+    running.wait_rendered(&files);
+    running.wait("the end", |running| (!running.state().reading).then_some(()));
+    // The file as it was: it is read, or not, and that ends as well.
+    files.write("scene.toml", half);
+    running.wait("reading", |running| running.state().reading.then_some(()));
+    files.write("scene.toml", SCENE);
+    running.wait("the end", |running| (!running.state().reading).then_some(()));
 }

@@ -1,4 +1,4 @@
-//! Nobody waits for a picture that takes minutes.
+//! Saves and moves do not wait for an image that takes minutes.
 
 use std::time::{Duration, Instant};
 
@@ -6,7 +6,7 @@ use wgray::dev::{Command, Move};
 
 use super::running::{Files, LONGEST, SCENE};
 
-/// A scene so heavy that nobody waits for all of it.
+/// Returns a scene that takes minutes to render.
 pub fn heavy() -> String {
     let large = SCENE
         .replace("width = 40", "width = 1200")
@@ -18,7 +18,7 @@ pub fn heavy() -> String {
 fn a_save_or_a_move_does_not_wait_for_the_picture() {
     let files = Files::new(&heavy());
     let running = files.start();
-    let frame = running.wait("a first picture", |running| running.frame());
+    let frame = running.wait("a first image", |running| running.frame());
     assert!(
         !frame.header.done && frame.header.sent[0] < 1200,
         "it is coarse: {:?}",
@@ -34,12 +34,12 @@ fn a_save_or_a_move_does_not_wait_for_the_picture() {
         } else {
             running.session.send(Command::Move(Move::Orbit(0.1, 0.0)));
         }
-        running.wait("the next picture", |running| {
+        running.wait("the next image", |running| {
             (running.revision() > revision).then_some(())
         });
         worst = worst.max(start.elapsed());
     }
-    // The whole picture takes minutes; the goal is 0.3 s on an idle machine.
+    // The complete image takes minutes; the goal is 0.3 s on an idle machine.
     assert!(worst < Duration::from_secs(5), "{worst:?}");
     assert!(!running.frame().unwrap().header.done);
 }
@@ -48,12 +48,12 @@ fn a_save_or_a_move_does_not_wait_for_the_picture() {
 fn a_camera_that_never_rests_is_shown_all_the_same() {
     let files = Files::new(&heavy());
     let running = files.start();
-    running.wait("a first picture", |running| running.frame());
+    running.wait("a first image", |running| running.frame());
     let revision = running.revision();
     let start = Instant::now();
     let mut seen = 0;
     while seen < 5 {
-        assert!(start.elapsed() < LONGEST, "{seen} pictures");
+        assert!(start.elapsed() < LONGEST, "{seen} images");
         running.session.send(Command::Move(Move::Orbit(0.01, 0.0)));
         std::thread::sleep(Duration::from_millis(4));
         seen = running.revision() - revision;

@@ -10,7 +10,7 @@ use tempfile::TempDir;
 use wgray::dev::{Content, Diagnostic, Frame, Listener, Session, Settings, Sources, State};
 use wgray::film::{Film, Region, mean};
 use wgray::gpu::compose::{Shaders, built_in};
-use wgray::gpu::{Choice, Gpu, Options, choose};
+use wgray::gpu::{AdapterChoice, Gpu, Options, choose};
 use wgray::image::Pixels;
 use wgray::job::{self, Cut};
 use wgray::pack::{Packed, pack};
@@ -63,9 +63,9 @@ normal = [0, 0, 1]
 tangent = [1, 0, 0]
 ";
 
-/// A shader whose picture depends on every line.
+/// A shader whose image depends on every line.
 pub const KERNEL: &str = "shaders/kernels/render.wgsl";
-/// What it adds up.
+/// The expression that it sums.
 pub const RADIANCE: &str = "path_value(path)";
 
 /// A scene and shaders in a folder of their own.
@@ -104,7 +104,7 @@ impl Files {
         fs::write(self.path(name), text).unwrap();
     }
 
-    /// As most editors save: another file takes the name.
+    /// Saves like most editors: another file takes the name.
     pub fn save_by_rename(&self, name: &str, text: &str) {
         self.write("new~", text);
         fs::rename(self.path("new~"), self.path(name)).unwrap();
@@ -116,7 +116,7 @@ impl Files {
         self.write(name, &text.replacen(old, new, 1));
     }
 
-    /// Saves a kernel that multiplies the picture.
+    /// Saves a kernel that scales the image.
     pub fn tint(&self, factor: f64) {
         let kernel = Shaders::built_in().text("kernels/render.wgsl").to_string();
         assert!(kernel.contains(RADIANCE));
@@ -142,7 +142,7 @@ impl Files {
         pack(&Scene::load(self.path("scene.toml")).unwrap())
     }
 
-    /// What `render` makes of the files.
+    /// Returns what `render` makes of the files.
     pub fn rendered(&self) -> Pixels {
         let packed = self.packed();
         let (width, height) = (packed.camera.width, packed.camera.height);
@@ -152,7 +152,7 @@ impl Files {
 
     /// A value of each pixel of the film that `render` makes of a scene.
     pub fn rendered_as<T>(&self, packed: &Packed, value: &dyn Fn(&Film, usize) -> T) -> Vec<T> {
-        let device = choose(&Choice::Auto).unwrap();
+        let device = choose(&AdapterChoice::Auto).unwrap();
         let shaders = Shaders::read(&self.path("shaders")).unwrap();
         let options = Options {
             baked: false,
@@ -194,8 +194,8 @@ impl Running {
     pub fn start(sources: Sources, out: Option<PathBuf>) -> Running {
         let settings = Settings {
             sources,
-            device: Choice::Auto,
-            only_for_viewers: out.is_some(), // a file needs the picture as a viewer does
+            device: AdapterChoice::Auto,
+            only_for_viewers: out.is_some(), // a file needs the image like a viewer
             out,
             editor: None,
             report: Box::new(|_| ()),
@@ -229,21 +229,21 @@ impl Running {
         );
     }
 
-    /// Waits until a picture with all samples is shown that is later than a revision.
+    /// Waits until an image with all samples is shown that is newer than a revision.
     #[track_caller]
     pub fn wait_done(&self, after: u64) -> Arc<Frame> {
-        self.wait("a finished picture", |running| {
+        self.wait("a finished image", |running| {
             running
                 .frame()
                 .filter(|frame| frame.header.done && frame.header.revision > after)
         })
     }
 
-    /// Waits until the picture is the one that `render` makes of the files.
+    /// Waits until the image is the one that `render` makes of the files.
     #[track_caller]
     pub fn wait_rendered(&self, files: &Files) {
         let wanted = files.rendered();
-        self.wait("the picture that render makes", |running| {
+        self.wait("the image that render makes", |running| {
             let frame = running.frame()?;
             matches!(&frame.content, Content::Color(pixels) if frame.header.done && *pixels == wanted).then_some(())
         });

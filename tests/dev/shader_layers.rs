@@ -14,7 +14,7 @@ fn layer(name: &str) -> View {
     View::Layer(LayerName::new(name).unwrap())
 }
 
-/// The finished picture of a layer, and its frame.
+/// Returns the finished image of a layer, and its frame.
 #[track_caller]
 fn wait_layer(running: &Running, name: &str) -> (Pixels, Arc<Frame>) {
     running.wait("the layer", |running| {
@@ -86,9 +86,9 @@ fn a_layer_is_the_mean_of_what_it_held() {
         assert_eq!(
             (faults.nan, faults.infinite, faults.negative),
             (0, 0, 0),
-            "below zero is no fault"
+            "negative values are valid"
         );
-        // Back to light: that kernel is still there, and so is its picture.
+        // Back to color: its kernel and its image are still available.
         let compiled = running.state().compile_seconds;
         running.session.send(Command::View(View::Color));
         running.wait("light", |running| {
@@ -145,7 +145,7 @@ fn layers_follow_edits_and_those_that_are_not_there_are_told() {
     running.wait_rendered(&files);
     running.session.send(Command::View(layer("seen")));
     let (_, frame) = wait_layer(&running, "seen");
-    assert_eq!(frame.header.faults[0].1.infinite, 1200, "what is no number is counted");
+    assert_eq!(frame.header.faults[0].1.infinite, 1200, "infinite values are counted");
     files.edit(PIXEL, "bitcast<f32>(0x7f800000u + (sample >> 8u));", "0.25;");
     running.wait("a quarter", |running| {
         let frame = running.frame().filter(|frame| frame.header.done)?;

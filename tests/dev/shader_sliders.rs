@@ -39,16 +39,16 @@ fn slider(running: &Running, name: &str) -> SliderState {
     found.unwrap_or_else(|| panic!("{name}: {state:?}")).clone()
 }
 
-/// Waits until a finished picture is this one.
+/// Waits until a finished image is this one.
 #[track_caller]
 fn wait_for(running: &Running, wanted: &Pixels) {
-    running.wait("the picture of the sliders", |running| {
+    running.wait("the image of the sliders", |running| {
         let frame = running.frame()?;
         matches!(&frame.content, Content::Color(pixels) if frame.header.done && pixels == wanted).then_some(())
     });
 }
 
-/// What `render` makes of the files with edits of the kernel.
+/// Returns what `render` makes of the files with edits of the kernel.
 fn rendered(files: &Files, edits: &[(&str, &str)]) -> Pixels {
     let text = files.read(KERNEL);
     let other = Files::new(&files.read("scene.toml"));
@@ -204,22 +204,19 @@ fn a_value_that_would_not_compile_is_not_written() {
     running.session.send(Command::WriteSliders);
     let notice = running.wait("a notice", |running| running.state().notice.clone());
     assert!(
-        notice.bad && notice.text.contains("with these values the shaders would be wrong"),
+        notice.bad && notice.text.contains("with these values the shaders would not compile"),
         "{}",
         notice.text
     );
     assert!(notice.text.contains("kernels/render.wgsl:"), "{}", notice.text);
     assert_eq!(files.read(KERNEL), text);
-    // Where they are wrong already it is not the values' fault.
+    // If the shaders are wrong already, the values are not blamed.
     files.write(KERNEL, &text.replace("min(1.0 / c, 1.0)", "min(1.0 / d, 1.0)"));
     running.wait_problem();
     running.session.send(Command::WriteSliders);
     running.wait("another notice", |running| {
         let notice = running.state().notice.clone()?;
-        notice
-            .text
-            .contains("the shaders are wrong by themselves")
-            .then_some(())
+        notice.text.contains("the shaders do not compile").then_some(())
     });
     files.write(KERNEL, &text);
     running.wait_well();
@@ -262,7 +259,7 @@ fn a_mark_that_says_nothing_is_told_and_the_picture_stays() {
     files.edit(KERNEL, "const tint =", "const tint: f32 =");
     running.wait_rendered(&files);
     assert_eq!(slider(&running, "tint").value, Value::Number(0.5));
-    // What there is not cannot be moved.
+    // A slider that does not exist cannot be moved.
     slide(&running, "other", Value::Number(0.5));
     let notice = running.wait("a notice", |running| running.state().notice.clone());
     assert!(notice.bad && notice.text.contains("`other`"), "{}", notice.text);

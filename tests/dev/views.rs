@@ -1,4 +1,4 @@
-//! The camera, the views of a picture, the comparison with the CPU, and the file that the picture goes to.
+//! The camera, the views of an image, the comparison with the CPU, and the output file.
 
 use std::fs;
 
@@ -29,10 +29,10 @@ fn the_camera_moves_and_is_saved_without_a_flicker() {
         (frame.header.done && frame.header.view == View::Color).then_some(frame.header.revision)
     };
     std::thread::sleep(SETTLED);
-    running.wait("a finished picture", settled);
+    running.wait("a finished image", settled);
     let state = running.state();
     assert!(state.camera_moved);
-    // The text is that of a scene file: put into one it gives the picture that is shown.
+    // The text is that of a scene file: in a scene file it gives the displayed image.
     let from_text = {
         let (start, end) = (SCENE.find("[camera]").unwrap(), SCENE.find("[render]").unwrap());
         Files::new(&format!("{}{}\n{}", &SCENE[..start], state.camera, &SCENE[end..]))
@@ -200,7 +200,7 @@ fn the_file_of_out_is_the_finished_picture() {
             (picture.dimensions() == (40, 30) && *picture.as_raw() == wanted).then_some(())
         });
     }
-    // A picture that is written beside the scene does not wake the session, nor is anything left behind.
+    // An image that is written next to the scene does not wake the session, and no temporary file is left.
     let mut names: Vec<_> = fs::read_dir(files.folder.path())
         .unwrap()
         .map(|entry| entry.unwrap().file_name())

@@ -24,7 +24,7 @@ fn follow(running: &Running, command: Command) {
     });
 }
 
-/// What was said against the last command.
+/// Returns the error of the last command.
 #[track_caller]
 fn refused(running: &Running) -> String {
     let state = running.state();
@@ -101,14 +101,14 @@ fn a_number_of_a_list_leaves_the_others_alone() {
     let center = |numbers: &str| start.replace("[0,  0, # here\n 0.5]", numbers);
     assert_eq!(files.read("scene.toml"), center("[0.25,  0, # here\n 1]"));
     running.wait_rendered(&files);
-    // Of a list that is not there the others are its defaults.
+    // In an absent list the other values are the defaults.
     set(&running, "camera.up[0]", json!(0.5), None);
     assert!(files.read("scene.toml").contains("fov = 40\nup = [0.5, 0, 1]\n"));
     let text = files.read("scene.toml");
     for (path, value, told) in [
-        ("shapes[0].center[3]", json!(1), "is nothing that can be changed"),
-        ("shapes[0].center[0][0]", json!(1), "is nothing that can be changed"),
-        ("shapes[0].radius[0]", json!(1), "is nothing that can be changed"),
+        ("shapes[0].center[3]", json!(1), "cannot be changed"),
+        ("shapes[0].center[0][0]", json!(1), "cannot be changed"),
+        ("shapes[0].radius[0]", json!(1), "cannot be changed"),
         ("shapes[0].center[0]", json!(null), "must be a list of 3 numbers"),
         ("shapes[0].center[0]", json!("a"), "must be a list of 3 numbers"),
         ("shapes[0].center[0]", json!(1e300), "shapes[0].center: "),
@@ -117,7 +117,7 @@ fn a_number_of_a_list_leaves_the_others_alone() {
         assert!(refused(&running).contains(told), "{path}: {}", refused(&running));
     }
     assert_eq!(files.read("scene.toml"), text);
-    // What is right then takes the complaint away.
+    // A valid value withdraws the error.
     set(&running, "shapes[0].center[0]", json!(0), None);
     let notice = running.state().notice.clone().unwrap();
     assert!(!notice.bad && notice.text.is_empty(), "{notice:?}");
@@ -188,7 +188,8 @@ fn a_value_that_breaks_a_rule_is_refused_and_the_file_stays() {
             "shapes[0].radius: -1 must be finite and greater than 0",
         ),
         ("shapes[0].radius", json!("large"), "\"large\" must be a number"),
-        ("shapes[0].radius", Value::Null, "must be there"),
+        ("shapes[0].radius", Value::Null, "is required"),
+        ("camera.look_at", Value::Null, "is required"),
         ("shapes[1].normal", json!([1, 0, 0]), "must not be parallel"),
         ("shapes[1].normal", json!([1, 0]), "must be a list of 3 numbers"),
         (
@@ -199,15 +200,11 @@ fn a_value_that_breaks_a_rule_is_refused_and_the_file_stays() {
         ("render.pixel_samples.count", json!(5), "must be a square number"),
         ("render.pixel_samples.count", json!(2.5), "must be a whole number"),
         ("image.width", json!(70_000), "must be from 1 to 65536"),
-        ("shapes[0].type", json!("disk"), "is nothing that can be changed"),
-        (
-            "textures.new.file",
-            json!("other.png"),
-            "is nothing that can be changed",
-        ),
-        ("shapes[9].radius", json!(1), "is nothing that can be changed"),
-        ("shapes", json!([]), "is nothing that can be changed"),
-        ("shapes[0]", json!({}), "is nothing that can be changed"),
+        ("shapes[0].type", json!("disk"), "cannot be changed"),
+        ("textures.new.file", json!("other.png"), "cannot be changed"),
+        ("shapes[9].radius", json!(1), "cannot be changed"),
+        ("shapes", json!([]), "cannot be changed"),
+        ("shapes[0]", json!({}), "cannot be changed"),
         ("shapes[0", json!(1), "must be"),
         ("", json!(1), "must be"),
     ] {
@@ -217,11 +214,11 @@ fn a_value_that_breaks_a_rule_is_refused_and_the_file_stays() {
         assert_eq!(files.read("scene.toml"), SCENE, "{path}");
     }
     assert_eq!(running.state().undo, None);
-    // A file that is broken is mended by hand.
+    // A broken file must be fixed by hand.
     files.edit("scene.toml", "radius = 0.5", "radius = ");
     let broken = files.read("scene.toml");
     set(&running, "camera.fov", json!(50), None);
-    assert!(refused(&running).starts_with("mend the file first: "));
+    assert!(refused(&running).starts_with("fix the file first: "));
     assert_eq!(files.read("scene.toml"), broken);
     files.write("scene.toml", SCENE);
     set(&running, "camera.fov", json!(50), None);
@@ -242,7 +239,11 @@ fn what_somebody_else_has_changed_is_not_taken_back() {
         running.state().undo.is_none().then_some(())
     });
     assert_eq!(files.read("scene.toml"), theirs);
-    // What they wrote is the ground of the next change.
+    running.wait("the change", |running| running.state().undo_blocked.clone());
+    follow(&running, Command::UndoWrite);
+    let refused = refused(&running);
+    assert!(refused.contains("changed by another program"), "{refused}");
+    // The next change builds on theirs.
     set(&running, "camera.fov", json!(55), None);
     assert_eq!(files.read("scene.toml"), theirs.replace("fov = 50", "fov = 55"));
     follow(&running, Command::UndoWrite);
@@ -267,12 +268,12 @@ fn what_an_option_stands_in_for_stays() {
         (
             "shapes[0].radius",
             json!(0.25),
-            "shapes[0].radius: --define shapes[0].radius=0.75 stands in for what the file says",
+            "shapes[0].radius: --define shapes[0].radius=0.75 overrides the value of the file",
         ),
         (
             "image.width",
             json!(20),
-            "image.width: --size stands in for what the file says",
+            "image.width: --size overrides the value of the file",
         ),
     ] {
         set(&running, path, value, None);

@@ -99,7 +99,7 @@ test("drags move the camera, and saving writes what the page shows", async () =>
   }
   const seen = await shown(page);
   await page.click("#save");
-  await page.locator("#notice", { hasText: "camera saved into scene.toml" }).waitFor();
+  await page.locator("#notice", { hasText: "Camera saved to scene.toml" }).waitFor();
   await page.locator("#save:disabled").waitFor();
   same(await decoded(page, studio.render()), seen);
   const saved = studio.read("scene.toml");
@@ -418,7 +418,7 @@ test("an image that is too large is shown smaller with a message", async () => {
     assert.equal(await text(page, "#size"), size.replace("x", " × "));
     const whole = await page.locator("#smaller").isHidden(); // a device with enough memory shows all of it
     if (!whole || size !== "3000x3000") assert.match(await text(page, "#smaller"), smaller);
-    if (!whole) assert.match(studio.said, /too many to be shown: every picture here is \d+ x \d+/);
+    if (!whole) assert.match(studio.said, /too large to display; showing \d+ x \d+/);
     await page.click("#zoom-one");
     await settled(page);
     const colors = await page.evaluate(() => {

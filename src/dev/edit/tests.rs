@@ -12,7 +12,7 @@ fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
 /// Each with the layout of its table, the change, and the text that comes of it. Every text of them is edited with the line ends of
 /// DOS and a byte-order mark too.
 const CHANGES: [(&str, &str, &str, &str); 36] = [
-    // values that are there
+    // existing values
     (
         "[camera] # c\nfov=45   # degrees\n",
         "camera.fov",
@@ -211,7 +211,7 @@ fn only_the_bytes_of_a_value_change() {
         assert_eq!(set(text, path, value).as_deref(), Ok(wanted), "{text}{path}");
         let of_dos = set(&dos(text), path, value).unwrap();
         assert_eq!(of_dos, dos(wanted), "{path}");
-        // What was set is there: to set it again changes nothing.
+        // Setting the same value again changes nothing.
         assert_eq!(set(wanted, path, value).as_deref(), Ok(wanted));
     }
 }
@@ -231,7 +231,7 @@ fn what_has_no_place_is_refused() {
             "[m]\na = [1, 2]\n",
             "m.a[1]",
             "none",
-            "is taken out in the scene file itself",
+            "can only be removed in the scene file",
         ),
         ("[m\n", "m.a", "1", "m.a: "),
     ] {

@@ -8,12 +8,12 @@ use crate::pack::pack;
 use crate::scene::{Draft, Overrides, Scene};
 
 /// A scene as it is looked at.
-fn seen(text: &str, name: &Path, overrides: Overrides) -> Seen {
+fn seen(text: &str, name: &Path, overrides: Overrides) -> SceneView {
     let origin = name.display().to_string();
     let draft = Draft::read(text, &origin, crate::scene::folder_of(name), &overrides).unwrap();
     let (scene, description) = draft.check(&mut Default::default()).unwrap();
     let loaded = Loaded::new(text.to_owned(), scene, description);
-    Seen {
+    SceneView {
         camera: loaded.packed.camera,
         loaded: Arc::new(loaded),
         sources: Sources {
@@ -94,7 +94,7 @@ fn another(field: &Field) -> Json {
 }
 
 /// Sets every field of every object to its own value and to another one; gives how many.
-fn set_all(seen: &Seen) -> usize {
+fn set_all(seen: &SceneView) -> usize {
     let text = seen.loaded.text.clone();
     let whole = table(&text);
     let names = seen.names();
@@ -113,20 +113,20 @@ fn set_all(seen: &Seen) -> usize {
                 )
         );
         for field in &group.fields {
-            let told = format!("{}: {}", seen.sources.scene.display(), field.path);
+            let case = format!("{}: {}", seen.sources.scene.display(), field.path);
             let path: KeyPath = field.path.parse().unwrap();
-            assert_eq!(seen.field(&path).as_ref(), Some(field), "{told}");
+            assert_eq!(seen.field(&path).as_ref(), Some(field), "{case}");
             if let Some(own) = field.value.as_ref().filter(|_| field.fixed.is_none()) {
                 let value = field.value_of(own, &names).unwrap();
-                assert_eq!(edited(&text, &path, Some(&value)).unwrap(), text, "{told}");
+                assert_eq!(edited(&text, &path, Some(&value)).unwrap(), text, "{case}");
             }
             if field.fixed.is_some() {
                 continue;
             }
             let value = field.value_of(&another(field), &names).unwrap();
-            let after = edited(&text, &path, Some(&value)).unwrap_or_else(|error| panic!("{told}: {error}"));
+            let after = edited(&text, &path, Some(&value)).unwrap_or_else(|error| panic!("{case}: {error}"));
             let wanted = with(&plain(&whole), &path, &plain(&value));
-            assert_eq!(plain(&table(&after)), wanted, "{told}");
+            assert_eq!(plain(&table(&after)), wanted, "{case}");
             Description::parse(&after, "s.toml").unwrap_or_else(|error| panic!("{error}"));
             // An absent key goes out again, and with it every byte.
             if field.value.is_none()
@@ -135,7 +135,7 @@ fn set_all(seen: &Seen) -> usize {
                     path.0[0..1].iter().map(|_| "render").collect::<String>()
                 ))
             {
-                assert_eq!(edited(&after, &path, None).as_deref(), Ok(text.as_str()), "{told}");
+                assert_eq!(edited(&after, &path, None).as_deref(), Ok(text.as_str()), "{case}");
             }
             count += 1;
         }
@@ -196,7 +196,7 @@ tangent = [1, 0, 0]
 color = [4, 4, 4]
 ";
 
-fn small() -> Seen {
+fn small() -> SceneView {
     seen(SCENE, Path::new("s.toml"), Overrides::default())
 }
 
@@ -235,7 +235,7 @@ fn counts_of_cells_are_squares() {
 #[test]
 fn other_layouts_can_be_set_too() {
     assert!(set_all(&small()) > 60);
-    // The control of the comparisons: another value, and another place, are told apart.
+    // The control of the comparisons: another value and another place differ.
     let whole = plain(&table(SCENE));
     let path: KeyPath = "shapes[0].radius".parse().unwrap();
     assert_ne!(with(&whole, &path, &Value::from(0.25)), whole);
@@ -270,7 +270,7 @@ fn what_is_hit_is_named_with_its_lines_and_what_it_names() {
             .slider
             .is_some_and(|slider| slider.logarithmic && slider.from < 0.5 && slider.to > 0.5)
     );
-    let fields = |seen: &Seen, name: &str| seen.object(name, None).groups[0].fields.clone();
+    let fields = |seen: &SceneView, name: &str| seen.object(name, None).groups[0].fields.clone();
     let shininess = fields(&seen, "materials.red")
         .into_iter()
         .find(|field| field.name == "shininess")
@@ -280,8 +280,8 @@ fn what_is_hit_is_named_with_its_lines_and_what_it_names() {
     assert_eq!(seen.at([29, 10]).name, "lights[0]");
     let sky = seen.at([0, 0]);
     assert_eq!((sky.name.as_str(), sky.note.is_some()), ("render", true));
-    for (object, told) in [
-        (seen.at([40, 0]), "is not in the picture"),
+    for (object, case) in [
+        (seen.at([40, 0]), "is outside the image"),
         (seen.object("shapes[2]", None), "shapes[2] is not in the scene"),
         (seen.object("environment", None), "environment is not in the scene"),
         (seen.object("shapes", None), "shapes is not in the scene"),
@@ -289,7 +289,7 @@ fn what_is_hit_is_named_with_its_lines_and_what_it_names() {
         (seen.object("", None), "is not in the scene"),
     ] {
         assert!(
-            object.groups.is_empty() && object.gone.as_ref().is_some_and(|why| why.contains(told)),
+            object.groups.is_empty() && object.gone.as_ref().is_some_and(|why| why.contains(case)),
             "{object:?}"
         );
     }
@@ -299,7 +299,7 @@ fn what_is_hit_is_named_with_its_lines_and_what_it_names() {
 fn what_is_hit_is_what_the_first_hits_say() {
     let seen = small();
     let moved = Scene::parse(&SCENE.replace("[0, -4, 0.5]", "[1, -4, 2]"), "s.toml").unwrap();
-    let looked = Seen {
+    let looked = SceneView {
         camera: pack(&moved).camera,
         ..seen.clone()
     };
@@ -380,7 +380,7 @@ fn objects_are_found_by_a_part_of_their_names() {
     assert_eq!(seen.objects("").objects.len(), 9);
     let many = SCENE.to_owned() + &"[[shapes]]\ntype='sphere'\nmaterial='red'\ncenter=[9,9,9]\nradius=1\n".repeat(200);
     let listed = self::seen(&many, Path::new("s.toml"), Overrides::default()).objects("sphere");
-    assert_eq!((listed.objects.len(), listed.more), (MOST_LISTED, 201 - MOST_LISTED));
+    assert_eq!((listed.objects.len(), listed.more), (MAX_LISTED, 201 - MAX_LISTED));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What those who look ask for: the camera and the view.
+//! Execution of commands for the camera, the view and the limits.
 
 use std::num::NonZeroU32;
 use std::time::Instant;
@@ -41,7 +41,7 @@ impl Painter {
                 self.marks = marks;
                 self.show();
             }
-            Command::Look(choice) => match choice.checked() {
+            Command::DisplaySettings(choice) => match choice.checked() {
                 Ok(look) => {
                     self.look = look;
                     self.show();
@@ -50,7 +50,7 @@ impl Painter {
             },
             Command::Pause(paused) => self.paused = paused,
             Command::Restart => {
-                self.camera_waits = true; // it is begun again from where the camera is
+                self.camera_waits = true; // starts again from the current camera
                 if let Some(running) = &mut self.running {
                     running.halted = false;
                 }
@@ -67,7 +67,7 @@ impl Painter {
         }
     }
 
-    /// Renders more or less of the picture from now on.
+    /// Changes the limits of rendering.
     fn limit(&mut self, limits: Limits) {
         if limits == self.limits {
             return;
@@ -98,14 +98,14 @@ impl Painter {
         });
     }
 
-    /// A value was taken, which is seen: what was wrong with one before is no news any more.
+    /// Withdraws the notice of an earlier error: a value was accepted.
     pub(super) fn taken(&mut self) {
         if self.state.notice.as_ref().is_some_and(|notice| notice.bad) {
             self.notice(&Ok(()), String::new());
         }
     }
 
-    /// The camera that is looked through, for a scene.
+    /// Returns the current camera for a scene.
     pub(super) fn packed_camera(&self, loaded: &Loaded) -> Camera {
         let (own, origin) = (loaded.packed.camera, loaded.packed.origin);
         let camera = self.camera.as_ref().and_then(|camera| camera.validate().ok());
@@ -114,13 +114,13 @@ impl Painter {
         })
     }
 
-    /// What a scene's kernel is compiled for, to show what is asked for.
+    /// Returns the constants that a scene's kernel is compiled for, to show the selected view.
     pub(super) fn constants(&self, loaded: &Loaded) -> Constants {
         let layer = self.layer().and_then(|layer| LayerName::new(&layer.name));
         constants(&loaded.packed, self.view, layer)
     }
 
-    /// A scene with the camera that is looked through, sampled as what is asked for needs it.
+    /// Returns a scene with the current camera, sampled as the selected view needs it.
     pub(super) fn packed(&self, loaded: &Loaded) -> Packed {
         let (specialization, _, adaptive, _) = self.constants(loaded);
         Packed {

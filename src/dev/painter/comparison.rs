@@ -1,4 +1,4 @@
-//! What the picture is compared with, and how far the two are apart.
+//! Comparison of the image with another one, and the difference between them.
 
 use std::sync::Arc;
 
@@ -8,21 +8,21 @@ use crate::dev::picture::{Against, Content, Frame, View};
 use crate::dev::reference::{Apart, Reference};
 use crate::image::Pixels;
 
-/// The pictures to compare with.
+/// The images to compare with.
 #[derive(Default)]
 pub struct Comparison {
-    /// The last whole one before the last saved change.
+    /// The last complete image before the last saved change.
     pub before: Option<Reference>,
-    /// One that was kept or given.
+    /// An image that was set or given as the reference.
     pub reference: Option<Reference>,
-    /// The last measure.
+    /// The last difference.
     apart: Option<Apart>,
-    /// Whether a measure is under way.
+    /// True while a difference is measured.
     measuring: bool,
 }
 
 impl Comparison {
-    /// Whether there is a picture before the last change, and the reference's name.
+    /// Returns whether there is an image before the last change, and the name of the reference.
     pub fn comparable(&self) -> (bool, Option<String>) {
         let name = self.reference.as_ref().map(|reference| reference.name.clone());
         (self.before.is_some(), name)
@@ -38,7 +38,7 @@ impl Comparison {
 }
 
 impl Painter {
-    /// The picture on the screen, if it is a whole one of light, and has the newest of all changes.
+    /// Returns the displayed image if it is a complete color image and shows the newest change.
     fn whole_picture(&self) -> Option<Pixels> {
         let frame = self.frame_sender.borrow().clone()?;
         let header = &frame.header;
@@ -49,7 +49,7 @@ impl Painter {
         }
     }
 
-    /// Files were saved: what is on the screen is the picture before.
+    /// Keeps the displayed image as the one before a change.
     pub(super) fn keep_before(&mut self) {
         if let Some(pixels) = self.whole_picture() {
             self.comparison.before = Some(Reference {
@@ -59,20 +59,17 @@ impl Painter {
         }
     }
 
-    /// Keeps the picture to compare others with.
+    /// Sets the displayed image as the reference.
     pub(super) fn keep(&mut self) {
         match self.whole_picture() {
             Some(pixels) => {
                 self.take_reference(Reference {
-                    name: "kept picture".to_string(),
+                    name: "kept image".to_string(),
                     pixels: Arc::new(pixels),
                 });
-                self.notice(&Ok(()), "the picture is kept to compare others with".to_string());
+                self.notice(&Ok(()), "Image set as the reference".to_string());
             }
-            None => self.notice(
-                &Err("there is no whole picture of light to keep yet".to_string()),
-                String::new(),
-            ),
+            None => self.notice(&Err("No complete color image yet".to_string()), String::new()),
         }
     }
 
@@ -84,7 +81,7 @@ impl Painter {
         }
     }
 
-    /// Puts what is compared with beside a picture; the names of both.
+    /// Returns the content with the image it is compared with, and the names of both.
     pub(super) fn beside(&self, content: Content, whole: [u32; 2]) -> (Content, Option<[String; 2]>) {
         let View::Compare(against) = self.view else {
             return (content, None);
@@ -100,7 +97,7 @@ impl Painter {
         }
     }
 
-    /// Measures a finished comparison on a thread of its own: it takes longer than a picture.
+    /// Measures a finished comparison on a separate thread, because it takes longer than a frame.
     pub(super) fn measure(&mut self, frame: &Arc<Frame>) {
         if frame.header.done && !self.comparison.measuring && matches!(frame.content, Content::Compare(..)) {
             self.comparison.measuring = true;
@@ -108,7 +105,7 @@ impl Painter {
             let work = move || {
                 if let Content::Compare(first, second) = &frame.content {
                     let apart = Apart::of(frame.header.number, first, second);
-                    let _ = events.send(Event::Measured(apart)); // after the session's end nobody wants it
+                    let _ = events.send(Event::Measured(apart)); // fails only after the end of the session
                 }
             };
             let started = std::thread::Builder::new().name("measure".to_string()).spawn(work);
@@ -119,26 +116,26 @@ impl Painter {
     pub(super) fn take_measured(&mut self, apart: Apart) {
         self.comparison.measuring = false;
         self.comparison.apart = Some(apart);
-        // Meanwhile there may be another picture.
+        // Another image may have been shown meanwhile.
         let newest = self.frame_sender.borrow().clone();
         if let Some(frame) = newest.filter(|frame| frame.header.number != apart.frame) {
             self.measure(&frame);
         }
     }
 
-    /// The measure of what is on the screen.
+    /// Returns the difference of the displayed images.
     pub(super) fn apart(&self) -> Option<Apart> {
         self.comparison.apart.filter(|apart| apart.frame == self.frames)
     }
 
-    /// What keeps the picture that is compared with from being shown, if anything does.
+    /// Returns why a comparison cannot be shown, if it cannot.
     pub(super) fn no_comparison(&self) -> Option<String> {
         let View::Compare(against) = self.view else { return None };
         let whole = self.running.as_ref()?.canvas.finest_size();
         let missing = match against {
             Against::Cpu => return None,
-            Against::Before => "no change has been saved since the camera stands here",
-            Against::Reference => "there is no reference yet: keep a picture, or open a file",
+            Against::Before => "No change has been saved since the camera moved",
+            Against::Reference => "No reference yet. Set the image as the reference, or open a file.",
         };
         match self.comparison.with(against) {
             None => Some(missing.to_string()),
@@ -146,7 +143,7 @@ impl Painter {
                 let Pixels { width, height, .. } = *other.pixels;
                 let [w, h] = whole;
                 Some(format!(
-                    "{}: is {width} x {height}; the picture is {w} x {h}",
+                    "{} is {width} × {height}, but the image is {w} × {h}",
                     other.name
                 ))
             }

@@ -1,4 +1,4 @@
-//! What comes of a kernel: it is run, or refused, cut short or lost, and another takes its place.
+//! The life of a kernel: it is run, refused, truncated by the driver or lost, and replaced.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -14,16 +14,8 @@ use crate::gpu::compose::Shaders;
 
 impl Painter {
     pub(super) fn take_built(&mut self, built: Built) {
-        let pending = match self.pending.take() {
-            Some(pending) if pending.id == built.id => pending,
-            other => {
-                self.pending = other; // the result is late: files were saved while it was made
-                let _ = guarded(|| {
-                    drop(built.result);
-                    Ok(())
-                });
-                return;
-            }
+        let Some(pending) = self.pending.take_if(|pending| pending.id == built.id) else {
+            return self.take_overtaken(built);
         };
         if let Some(errors) = &built.refused {
             let shaders = pending.shaders.clone();
@@ -34,11 +26,11 @@ impl Painter {
             Some(Ok((gpu, shaders))) => {
                 self.state.compile_seconds = Some(built.took.as_secs_f64());
                 self.compiled = self.state.compile_seconds;
-                self.run(*gpu, shaders, pending.constants);
+                self.run(*gpu, shaders, pending.constants, built.noticed);
             }
             None => {
                 self.since = None;
-                self.settle((Instant::now(), true)); // the scene may have changed meanwhile: the running kernel shows that
+                self.settle((Instant::now(), true)); // the scene may have changed meanwhile, which the running kernel can show
             }
             Some(Err(error @ (RenderError::CutShort { .. } | RenderError::Shader(_)))) => {
                 let tried = match built.refused {
@@ -51,7 +43,7 @@ impl Painter {
                 let (view, running) = (self.seen(), &mut self.running);
                 let lives = |running: &mut Running| guarded(|| running.canvas.content(view)).is_ok();
                 if running.as_mut().is_some_and(lives) {
-                    // The driver refuses what naga does not; the device is well.
+                    // The driver refuses the kernel although naga accepts it; the device still works.
                     self.refuse((pending.shaders, pending.constants), Vec::new());
                     self.problems.device = Some((&error).into());
                     self.since = None;
@@ -63,8 +55,28 @@ impl Painter {
         }
     }
 
-    /// Starts to render with a kernel.
-    fn run(&mut self, mut gpu: Gpu, shaders: Arc<Shaders>, constants: Constants) {
+    /// Takes a kernel that was compiled while a newer one was asked for. It is newer than what is on screen, and is shown until
+    /// the newer one is compiled, if it fits the scene.
+    fn take_overtaken(&mut self, built: Built) {
+        let constants = self.loaded.as_ref().map(|loaded| self.constants(loaded));
+        let is_useful = self.pending.is_some() && built.id >= self.oldest && constants == Some(built.constants);
+        match built.result {
+            Some(Ok((gpu, shaders))) if is_useful && built.refused.is_none() => {
+                self.state.compile_seconds = Some(built.took.as_secs_f64());
+                self.compiled = self.state.compile_seconds;
+                self.run(*gpu, shaders, built.constants, built.noticed);
+            }
+            result => {
+                let _ = guarded(|| {
+                    drop(result);
+                    Ok(())
+                });
+            }
+        }
+    }
+
+    /// Starts to render with a kernel, which shows a change that was noticed at a time.
+    fn run(&mut self, mut gpu: Gpu, shaders: Arc<Shaders>, constants: Constants, noticed: Instant) {
         let Some(loaded) = self.loaded.clone() else { return };
         let info = &gpu.device().info;
         self.state.device = format!("{}, {}", info.name, info.driver);
@@ -89,7 +101,7 @@ impl Painter {
                     sliders,
                 });
                 self.problems.device = None;
-                self.begun((Instant::now(), true));
+                self.begun((noticed, true));
                 // It may be known only now that a slider's value must be compiled in.
                 if self.take_shaders() {
                     self.settle((Instant::now(), true));
@@ -99,13 +111,13 @@ impl Painter {
         }
     }
 
-    /// Remembers that shaders are wrong for a scene like this, so that they are not tried again.
+    /// Remembers that shaders have errors for a scene like this, so that they are not compiled again.
     fn refuse(&mut self, shaders: (Arc<Shaders>, Constants), problems: Vec<Diagnostic>) {
         self.refused.push(shaders);
         self.problems.shader = problems;
     }
 
-    /// What a driver does not render whole is not tried again, until the scene or the shaders are others.
+    /// Refuses shaders that the driver truncates, until the scene or the shaders change.
     fn refuse_cut(&mut self, shaders: (Arc<Shaders>, Constants), error: &RenderError) {
         let problem = self.of_render(error);
         self.cut = Some(shaders.clone());
@@ -114,7 +126,7 @@ impl Painter {
         self.settle((Instant::now(), true));
     }
 
-    /// A picture that the kernel cannot make, with what can be done.
+    /// Returns the diagnostic of an image that the kernel cannot render, with advice.
     fn of_render(&self, error: &RenderError) -> Diagnostic {
         match error {
             RenderError::Shader(error) => match &self.shaders {
@@ -127,7 +139,7 @@ impl Painter {
                     .as_ref()
                     .is_some_and(|shaders| **shaders != Shaders::built_in());
                 let way_out = match edited {
-                    true => "; shorten the loops, and end each kernel with `sign(local)` for every pixel",
+                    true => "; shorten the loops, and call `sign(local)` for every pixel at the end of each kernel",
                     false => "",
                 };
                 Diagnostic::plain(if edited { "shader" } else { "scene" }, format!("{error}{way_out}"))
@@ -135,13 +147,13 @@ impl Painter {
         }
     }
 
-    /// A shader's error, with the path by which the user knows the file.
+    /// Returns the diagnostic of a shader's error, with the user's path of the file.
     fn of_shader(&self, error: &ShaderError, shaders: &Shaders) -> Diagnostic {
         Diagnostic::shader(error, shaders, self.sources.shaders.as_deref())
     }
 
-    /// The device refused something, or is lost: another one is opened, a few times. Not so if it cuts the kernel short:
-    /// then the last good shaders go on, or where there are none others the picture rests.
+    /// Handles an error of the device: opens it again, a few times. If the driver truncates the kernel, the last good
+    /// shaders are used instead, or rendering halts if there are no others.
     pub(super) fn fail(&mut self, error: &RenderError) {
         if let (RenderError::CutShort { .. } | RenderError::Shader(_), Some(running)) = (error, &mut self.running) {
             if self.good.as_ref().is_some_and(|good| *good != running.shaders) {
@@ -159,21 +171,22 @@ impl Painter {
         self.problems.device = Some(error.into());
         self.device = None;
         self.pending = None;
-        self.refused.clear(); // another device may take them
+        self.oldest = self.requests + 1;
+        self.refused.clear(); // another device may accept them
         self.failures += 1;
         if let Some((loaded, shaders)) = self.wanted().filter(|_| self.failures <= ATTEMPTS) {
-            self.request(&loaded, shaders);
+            self.request(&loaded, shaders, Instant::now());
         }
         self.tell();
     }
 
-    /// Gives up the running kernel.
+    /// Drops the running kernel.
     pub(super) fn stop_running(&mut self) {
         drop_contained(self.running.take());
     }
 
-    /// Another kernel comes. Of those that differ from it by layers alone one is kept, that of light if it is there: whoever looks at
-    /// a layer will look at that again.
+    /// Keeps one of the kernels that differ from the new one by their layers only, preferably the one of color, which viewers
+    /// return to from a layer.
     fn park(&mut self, shaders: &Arc<Shaders>, constants: &Constants) {
         let is_sibling = |known: &Running| {
             let same_scene = are_of_one_scene(&known.constants, constants);
@@ -188,7 +201,7 @@ impl Painter {
     }
 }
 
-/// What a lost device holds may not be given back without a panic.
+/// Drops a kernel. With a lost device this may panic.
 fn drop_contained(running: Option<Running>) {
     let _ = guarded(|| {
         drop(running);

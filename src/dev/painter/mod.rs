@@ -1,4 +1,4 @@
-//! What a session does with what happens: decides what is rendered, compiled, shown and told.
+//! The painter: decides on each event what to compile, render, show and report.
 
 mod commands;
 mod comparison;
@@ -19,104 +19,106 @@ use tokio::sync::watch;
 
 use self::comparison::Comparison;
 use self::show::Problems;
-use self::walk::Walk;
+use self::walk::CameraHistory;
 use super::build::{Builder, Request, guarded};
 use super::camera::merged;
 use super::canvas::{Canvas, Limits};
 use super::diagnostic::Diagnostic;
 use super::history::History;
-use super::look::Choice;
+use super::look::DisplayOverrides;
 use super::messages::{Event, Report, State};
-use super::object::Seen;
+use super::object::SceneView;
 use super::picture::{Frame, View};
 use super::sliders::Sliders;
-use super::source::{Constants, Loaded, Snapshot, Sources, Stamp};
+use super::source::{Constants, FileStamp, Loaded, Snapshot, Sources};
 use super::times::Times;
 use super::watch::Writes;
 use crate::gpu::Device;
 use crate::gpu::compose::Shaders;
 use crate::scene::CameraDescription;
 
-/// Pictures of more samples are shown no more often than this, and a tenth of the time is spent on them at most.
+/// Minimum time between frames of a refining image, of which at most a tenth is spent on them.
 const BETWEEN_FRAMES: Duration = Duration::from_millis(100);
-/// So often a device is opened anew without any picture in between.
+/// Maximum number of attempts to open a device without an image in between.
 const ATTEMPTS: u32 = 3;
-/// The factor of differences at first.
+/// The initial gain of differences.
 const GAIN: f32 = 256.0;
 
-/// The state of a session.
+/// The painter of a session.
 pub struct Painter {
     sources: Sources,
     builder: Builder,
     out: Option<PathBuf>,
-    /// How many look, if nothing is rendered while nobody does.
+    /// Number of viewers; `None` renders without viewers.
     looking: Option<Arc<AtomicUsize>>,
-    /// The picture that the file was last written for.
+    /// The revision that the output file was last written for.
     written: Option<u64>,
     report: Box<dyn Fn(Report) + Send>,
     state_sender: watch::Sender<Arc<State>>,
     frame_sender: watch::Sender<Option<Arc<Frame>>>,
-    seen_sender: watch::Sender<Option<Arc<Seen>>>,
+    seen_sender: watch::Sender<Option<Arc<SceneView>>>,
     state: State,
 
-    /// The last scene that was right.
+    /// The last valid scene.
     loaded: Option<Arc<Loaded>>,
-    /// The newest shaders that could be read, with the values of sliders that are compiled in.
+    /// The newest readable shaders, with the slider values that are compiled in.
     shaders: Option<Arc<Shaders>>,
-    /// The last shaders that made a picture.
+    /// The last shaders that rendered an image.
     good: Option<Arc<Shaders>>,
     /// Shaders that were refused for these constants.
     refused: Vec<(Arc<Shaders>, Constants)>,
-    /// The last that were refused because the driver cut them short: in another scene it may not.
+    /// The last shaders that were refused because the driver truncates them: in another scene it may not.
     cut: Option<(Arc<Shaders>, Constants)>,
     device: Option<Device>,
     running: Option<Running>,
-    /// The kernel of light where the running one is for layers; else the one for layers that ran before, if any.
+    /// The kernel of color while one for a layer runs; otherwise the last kernel for a layer, if any.
     parked: Option<Running>,
     pending: Option<Pending>,
     requests: u64,
+    /// The first request whose kernel may still be shown.
+    oldest: u64,
     failures: u32,
     problems: Problems,
 
-    /// The camera, where it is not the file's.
+    /// The camera, if it differs from the file's.
     camera: Option<CameraDescription>,
     sliders: Sliders,
-    /// Whether the camera or a slider moved since the picture was begun.
+    /// True if the camera or a slider moved since the current image was started.
     camera_waits: bool,
-    /// What was written into the scene file, while it can be taken back.
+    /// The changes of the scene file that can be undone.
     history: History,
-    /// What the watcher is told of that.
+    /// The same for the watcher.
     writes: Arc<Mutex<Writes>>,
-    /// The files that the scene is made of.
-    files: Vec<(PathBuf, Stamp)>,
+    /// The files of the scene.
+    files: Vec<(PathBuf, FileStamp)>,
     view: View,
     times: Times,
     gain: f32,
     marks: bool,
-    look: Choice,
+    look: DisplayOverrides,
     limits: Limits,
-    /// Whether nothing but first pictures is rendered.
+    /// True if rendering pauses after the first image of a change.
     paused: bool,
-    walk: Walk,
+    walk: CameraHistory,
     comparison: Comparison,
-    /// What happens elsewhere on behalf of this.
+    /// The inbox of the session, for results of other threads.
     events: SyncSender<Event>,
-    /// The sizes that were told last, asked for and shown, of a picture that is too large.
+    /// The last reported sizes of an image that is too large: the size of the image, and the size that is shown.
     smaller: Option<([u32; 2], [u32; 2])>,
 
-    /// Counts the commands that were followed.
+    /// Number of executed commands.
     heard: u64,
-    /// Counts the frames.
+    /// Number of frames.
     frames: u64,
-    /// Counts the pictures.
+    /// Number of images.
     revision: u64,
-    /// When the change was noticed that the picture does not show yet, and whether a file was saved.
+    /// When the change was noticed that the image does not show yet, and whether it was a save.
     since: Option<(Instant, bool)>,
-    /// Seconds from the last change to the first picture of it.
+    /// Seconds from the last change to its first image.
     latency: Option<f64>,
-    /// What compiling took, if the next frame needed it.
+    /// Seconds spent on compiling for the next frame.
     compiled: Option<f64>,
-    /// When the first picture of a saved file was shown, until it is finished.
+    /// When the first image after a save was shown, until the image is finished.
     first_frame: Option<Instant>,
     last_frame: Instant,
     frame_cost: Duration,
@@ -124,11 +126,11 @@ pub struct Painter {
 
 struct Running {
     canvas: Canvas,
-    /// Whether the driver cuts it short: it rests until something changes.
+    /// True if the driver truncates the kernel: it halts until something changes.
     halted: bool,
     shaders: Arc<Shaders>,
     constants: Constants,
-    /// The values of its sliders.
+    /// The values of the kernel's sliders.
     sliders: Vec<[u32; 4]>,
 }
 
@@ -138,35 +140,35 @@ struct Pending {
     constants: Constants,
 }
 
-/// Who is told what happens.
-pub struct Told {
+/// The receivers of what a session reports.
+pub struct SessionChannels {
     /// The terminal.
     pub report: Box<dyn Fn(Report) + Send>,
-    /// Those who are told the state.
+    /// The receivers of the state.
     pub state: watch::Sender<Arc<State>>,
-    /// Those who are sent the picture.
+    /// The receivers of the images.
     pub frames: watch::Sender<Option<Arc<Frame>>>,
-    /// Where the time goes.
+    /// The timings.
     pub times: Times,
-    /// The form of links that open an editor.
+    /// The template of links to an editor.
     pub editor: Option<String>,
-    /// Those who ask about the scene.
-    pub seen: watch::Sender<Option<Arc<Seen>>>,
-    /// The session's own inbox.
+    /// The receivers of the scene, for questions.
+    pub seen: watch::Sender<Option<Arc<SceneView>>>,
+    /// The inbox of the session.
     pub events: SyncSender<Event>,
 }
 
 impl Painter {
-    /// A session that knows no files yet.
+    /// Returns a painter without a scene.
     pub fn new(
         sources: Sources,
         device: Device,
         builder: Builder,
         (out, looking): (Option<PathBuf>, Option<Arc<AtomicUsize>>),
         writes: Arc<Mutex<Writes>>,
-        told: Told,
+        told: SessionChannels,
     ) -> Painter {
-        let Told {
+        let SessionChannels {
             report,
             state: state_sender,
             frames: frame_sender,
@@ -205,6 +207,7 @@ impl Painter {
             parked: None,
             pending: None,
             requests: 0,
+            oldest: 0,
             failures: 0,
             problems: Problems::default(),
             camera: None,
@@ -217,10 +220,10 @@ impl Painter {
             times,
             gain: GAIN,
             marks: true,
-            look: Choice::default(),
+            look: DisplayOverrides::default(),
             limits: Limits::default(),
             paused: false,
-            walk: Walk::default(),
+            walk: CameraHistory::default(),
             comparison: Comparison::default(),
             events,
             smaller: None,
@@ -236,7 +239,7 @@ impl Painter {
         }
     }
 
-    /// Takes something that happened.
+    /// Handles an event.
     pub fn take(&mut self, event: Event) {
         match event {
             Event::Files(snapshot, noticed, writes) => self.take_files(*snapshot, noticed, writes),
@@ -248,9 +251,13 @@ impl Painter {
             Event::Reference(reference) => self.take_reference(reference),
             Event::Measured(apart) => self.take_measured(apart),
             Event::Viewers => {
-                // Nobody has waited for the picture until now.
-                self.since = self.since.map(|(_, saved)| (Instant::now(), saved));
+                // No viewer has waited for the image until now; nor for the compiler, if it has finished.
+                if self.pending.is_none() {
+                    self.since = self.since.map(|(_, saved)| (Instant::now(), saved));
+                    self.compiled = None;
+                }
             }
+            Event::Reading(reading) => self.state.reading = reading,
             #[cfg(test)]
             Event::Lose => self.device.iter().for_each(Device::destroy),
             Event::Stop => {}
@@ -259,15 +266,16 @@ impl Painter {
     }
 
     fn take_files(&mut self, snapshot: Snapshot, noticed: Instant, writes: u64) {
+        self.state.reading = false;
         for (part, took) in ["read files", "pack"].into_iter().zip(snapshot.took) {
             if !took.is_zero() {
                 self.times.part(part, took);
             }
         }
-        // What was read before this session wrote the file last is no news of the scene.
+        // A snapshot from before the last write of this session says nothing new about the scene.
         let is_new = writes == self.writes.lock().unwrap_or_else(PoisonError::into_inner).count;
         let known = self.loaded.as_ref().map(|loaded| loaded.text.as_bytes());
-        if let (true, Some((_, Stamp::Content(content)))) = (is_new, snapshot.files.first())
+        if let (true, Some((_, FileStamp::Content(content)))) = (is_new, snapshot.files.first())
             && known != Some(content)
         {
             self.forget_writes();
@@ -290,13 +298,13 @@ impl Painter {
         self.show_files(noticed, shown_otherwise);
     }
 
-    /// Takes a scene, or what is wrong with it. Gives whether what is rendered of it is shown otherwise.
+    /// Takes a scene or its errors. Returns whether the same rendering must be displayed differently.
     fn take_scene(&mut self, scene: Result<Arc<Loaded>, Diagnostic>) -> bool {
         let mut shown_otherwise = false;
         match scene {
             Ok(loaded) => {
                 self.problems.scene = None;
-                // Whoever changes the file's camera wants to see it.
+                // An edit of the file's camera shows on screen.
                 if let (Some(camera), Some(old)) = (&self.camera, &self.loaded) {
                     self.camera = merged(camera, &old.camera, &loaded.camera);
                 }
@@ -319,13 +327,13 @@ impl Painter {
         shown_otherwise
     }
 
-    /// Sees to it that what the files say now is shown.
+    /// Shows the current state of the files.
     fn show_files(&mut self, noticed: Instant, shown_otherwise: bool) {
         self.failures = 0;
         self.keep_view();
         self.settle((noticed, true));
         self.upload_sliders((noticed, true));
-        // What is rendered may be the same; if it is not, its first picture comes by itself.
+        // The rendering may be unchanged; otherwise its first image follows without a request.
         let picture = self.running.as_ref().filter(|running| !running.canvas.is_new());
         if shown_otherwise && self.pending.is_none() && picture.is_some() {
             self.changed((noticed, true));
@@ -333,8 +341,8 @@ impl Painter {
         }
     }
 
-    /// The scene, and the shaders that it is to be rendered with: the newest, or where these are known to be wrong for
-    /// it the last good ones.
+    /// Returns the scene, and the shaders to render it with: the newest ones, or the last good ones if the newest
+    /// have errors.
     fn wanted(&self) -> Option<(Arc<Loaded>, Arc<Shaders>)> {
         let (loaded, newest) = (self.loaded.clone()?, self.shaders.clone()?);
         let constants = self.constants(&loaded);
@@ -343,7 +351,7 @@ impl Painter {
         Some((loaded, shaders))
     }
 
-    /// Sees to it that what is rendered is what the files say.
+    /// Makes the rendering match the files.
     fn settle(&mut self, since: (Instant, bool)) {
         let Some((loaded, shaders)) = self.wanted() else { return };
         if self.shaders.as_ref() == Some(&shaders) {
@@ -355,19 +363,21 @@ impl Painter {
         let fitting = running.is_some_and(|running| fits(&running.shaders, running.constants));
         if fitting || self.take_parked(&shaders, &constants) {
             self.pending = None;
+            self.oldest = self.requests + 1;
             if !fitting {
                 self.show_parked(since);
             }
             self.draw_scene(since);
         } else if !(self.pending.as_ref()).is_some_and(|pending| fits(&pending.shaders, pending.constants)) {
             self.since.get_or_insert(since);
-            self.request(&loaded, shaders);
+            self.request(&loaded, shaders, since.0);
         }
     }
 
-    fn request(&mut self, loaded: &Loaded, shaders: Arc<Shaders>) {
+    fn request(&mut self, loaded: &Loaded, shaders: Arc<Shaders>, noticed: Instant) {
         let constants = self.constants(loaded);
-        // A running kernel that fits the scene stays if the new one is wrong; else the last good shaders are compiled.
+        // A running kernel that fits the scene is kept if the new one has errors; otherwise the last good shaders are
+        // compiled.
         let running = self.running.as_ref();
         let stays = running.is_some_and(|running| running.constants == constants);
         let fallback = self.good.clone().filter(|good| !stays && *good != shaders);
@@ -379,6 +389,8 @@ impl Painter {
             shaders: shaders.clone(),
             layer: self.layer().cloned(),
             fallback,
+            constants,
+            noticed,
         });
         self.pending = Some(Pending {
             id: self.requests,
@@ -387,7 +399,7 @@ impl Painter {
         });
     }
 
-    /// Renders the scene with the running kernel, which fits it.
+    /// Renders the scene with the running kernel, which fits.
     fn draw_scene(&mut self, since: (Instant, bool)) {
         let Some(loaded) = self.loaded.clone() else { return };
         let packed = self.packed(&loaded);
@@ -402,25 +414,25 @@ impl Painter {
         running.halted = false;
         match guarded(|| times.of("upload", || running.canvas.update(&packed, view))) {
             Ok(true) => self.begun(since),
-            Ok(false) => {} // it fits, so this cannot be
+            Ok(false) => {} // impossible, because it fits
             Err(error) => self.fail(&error),
         }
     }
 
-    /// A picture has been begun, by the camera as it is now.
+    /// Notes that an image has been started with the current camera.
     fn begun(&mut self, since: (Instant, bool)) {
         self.camera_waits = false;
         self.tell_size();
         self.changed(since);
     }
 
-    /// Another picture is shown from now on.
+    /// Notes that another image is shown from now on.
     fn changed(&mut self, since: (Instant, bool)) {
         self.revision += 1;
         self.since.get_or_insert(since);
     }
 
-    /// Whether [`work`](Self::work) has anything to do.
+    /// Returns whether [`work`](Self::work) has anything to do.
     pub fn has_work(&self) -> bool {
         if self
             .looking
@@ -435,18 +447,18 @@ impl Painter {
             .is_some_and(|running| {
                 let more = !running.canvas.is_done(self.seen());
                 let first = running.canvas.is_new();
-                // While a kernel is compiled the processor is left to the compiler, but for the camera.
+                // The compiler gets the processor, except while the camera moves.
                 self.camera_waits || (more && (first || (self.pending.is_none() && !self.paused)))
             })
     }
 
-    /// Does one call's worth of work.
+    /// Makes one dispatch.
     pub fn work(&mut self) {
         let (view, waits) = (self.seen(), self.camera_waits);
         let Some(loaded) = self.loaded.clone() else { return };
         let camera = self.packed_camera(&loaded);
         let Some(running) = &mut self.running else { return };
-        // A camera that never rests must not keep the first picture from being finished.
+        // Only a complete first image is interrupted, so that a moving camera shows images at all.
         if waits && (!running.canvas.is_new() || running.canvas.is_done(view)) {
             let sliders = self.sliders.values(running.canvas.live().sliders());
             let restarted = guarded(|| {

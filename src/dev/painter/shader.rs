@@ -1,4 +1,4 @@
-//! Sliders and layers of shaders: what the page asks for, and what the kernels have.
+//! Sliders and layers of shaders, and the kernels for them.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -14,7 +14,7 @@ use crate::gpu::marks::{Layer, Value};
 use crate::gpu::{Forms, check_kernels};
 
 impl Painter {
-    /// Takes the shaders as the files have them now.
+    /// Takes the current shaders of the files.
     pub(super) fn read_shaders(&mut self, shaders: Arc<Shaders>) {
         self.sliders.read(shaders.clone());
         let folder = self.sources.shaders.as_deref();
@@ -25,8 +25,8 @@ impl Painter {
         self.take_shaders();
     }
 
-    /// The shaders to be compiled are those of the files, with the values of sliders that need it.
-    /// Returns whether they are others than before.
+    /// Takes the shaders to compile: those of the files, with slider values that must be compiled in. Returns whether
+    /// they changed.
     pub(super) fn take_shaders(&mut self) -> bool {
         let Some(shaders) = self.sliders.shaders() else {
             return false;
@@ -37,6 +37,12 @@ impl Painter {
         let good = self.good.as_ref();
         self.refused
             .retain(|(known, _)| *known == shaders || Some(known) == good);
+        // A kernel with the same code keeps running: later errors refer to the lines of the new text.
+        let kernels = [&mut self.running, &mut self.parked].into_iter().flatten();
+        let known = kernels.map(|kernel| &mut kernel.shaders).chain(&mut self.good);
+        for known in known.filter(|known| known.has_same_code(&shaders)) {
+            *known = shaders.clone();
+        }
         self.shaders = Some(shaders);
         true
     }
@@ -59,7 +65,7 @@ impl Painter {
         }
     }
 
-    /// Sliders stand elsewhere: the running kernel gets their values, or another one is compiled.
+    /// Renders with moved sliders: the running kernel gets their values, or another one is compiled.
     fn slid(&mut self) {
         if self.take_shaders() {
             self.settle((Instant::now(), false));
@@ -67,7 +73,7 @@ impl Painter {
         self.upload_sliders((Instant::now(), false));
     }
 
-    /// Sees to it that the running kernel has the values of its sliders, with the next picture.
+    /// Makes the running kernel use the values of its sliders, from the next image on.
     pub(super) fn upload_sliders(&mut self, since: (Instant, bool)) {
         let Some(running) = &mut self.running else { return };
         if self.sliders.values(running.canvas.live().sliders()) != running.sliders {
@@ -77,20 +83,20 @@ impl Painter {
         }
     }
 
-    /// Writes the values into the shaders' files.
+    /// Saves the slider values to the shader files.
     pub(super) fn write_sliders(&mut self) {
         let result = match &self.sources.shaders {
-            None => Err("the shaders in the program cannot be changed: --shaders must name a folder".to_string()),
-            Some(_) if !self.sliders.are_moved() => Err("every slider stands where its file says".to_string()),
+            None => Err("The built-in shaders cannot be changed; use --shaders DIR".to_string()),
+            Some(_) if !self.sliders.are_moved() => Err("No slider has been moved".to_string()),
             Some(folder) => {
                 let folder = folder.clone();
                 self.check_written().and_then(|()| self.sliders.write(&folder))
             }
         };
-        self.tell_written(result, "sliders written into the shaders");
+        self.tell_written(result, "Saved sliders to shaders");
     }
 
-    /// A kernel may take a value from a buffer with which it cannot be compiled: 1 / c, where c is 0.
+    /// With a value from a buffer a kernel may compile that does not with the constant: 1 / c, where c is 0.
     fn check_written(&self) -> Result<(), String> {
         let (Some(loaded), Some(shaders)) = (&self.loaded, self.sliders.as_written()) else {
             return Ok(());
@@ -101,21 +107,18 @@ impl Painter {
         };
         first(&shaders).map_or(Ok(()), |error| {
             let why = match self.sliders.files().and_then(first) {
-                None => "with these values the shaders would be wrong",
-                Some(_) => "the shaders are wrong by themselves",
+                None => "with these values the shaders would not compile",
+                Some(_) => "the shaders do not compile",
             };
-            Err(format!(
-                "{why}, and stay as they are: {}: {}",
-                error.place, error.message
-            ))
+            Err(format!("{why}; nothing was saved: {}: {}", error.place, error.message))
         })
     }
 
-    /// Takes back what was written into them last.
+    /// Undoes the last save of sliders.
     pub(super) fn take_back_sliders(&mut self) {
         if self.sliders.can_take_back() {
             let result = self.sliders.take_back();
-            self.tell_written(result, "shaders as they were before the sliders were written");
+            self.tell_written(result, "Undid saving sliders");
         }
     }
 
@@ -127,7 +130,7 @@ impl Painter {
         (self.report)(Report::Written(what, result));
     }
 
-    /// The layer that is asked for, if the shaders have it.
+    /// Returns the selected layer, if the shaders have it.
     pub(super) fn layer(&self) -> Option<&Layer> {
         let (View::Layer(name), Some(loaded)) = (self.view, &self.loaded) else {
             return None;
@@ -137,7 +140,7 @@ impl Painter {
             .find(|layer| layer.name == name.as_str())
     }
 
-    /// The names of the layers that can be shown.
+    /// Returns the names of the layers.
     pub(super) fn layers(&self) -> Vec<LayerName> {
         let Some(loaded) = &self.loaded else { return Vec::new() };
         let layers = self.sliders.layers(loaded.packed.integrator);
@@ -146,7 +149,7 @@ impl Painter {
         names
     }
 
-    /// Goes back to the kernel that ran before, if that is what is wanted: a layer's, or that of light.
+    /// Switches back to the previous kernel, if it is the one that is needed.
     pub(super) fn take_parked(&mut self, shaders: &Arc<Shaders>, constants: &Constants) -> bool {
         let fits = |parked: &Running| parked.shaders == *shaders && parked.constants == *constants;
         let found = self.parked.as_ref().is_some_and(fits);
@@ -156,7 +159,7 @@ impl Painter {
         found
     }
 
-    /// The kernel that runs is shown from now on, with what it has.
+    /// Shows the kernel that was switched to, with its current image.
     pub(super) fn show_parked(&mut self, since: (Instant, bool)) {
         let (view, limits) = (self.seen(), self.limits);
         let packed = self.loaded.as_ref().map(|loaded| self.packed(loaded));
@@ -166,7 +169,7 @@ impl Painter {
             running.canvas.set_limits(limits, view)?;
             running.canvas.change_view(view)
         });
-        // Of another scene, or seen from elsewhere, it is begun again at once.
+        // If the scene or the camera changed meanwhile, the image is started again at once.
         let is_current = packed.is_some_and(|packed| running.canvas.shows(&packed));
         match shown {
             Ok(()) => {

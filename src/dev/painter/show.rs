@@ -1,4 +1,4 @@
-//! What everybody is shown and told.
+//! Frames and states for all viewers, and reports for the terminal.
 
 use std::num::NonZeroU32;
 use std::sync::Arc;
@@ -8,22 +8,22 @@ use super::Painter;
 use crate::dev::build::guarded;
 use crate::dev::camera::{Viewpoint, text};
 use crate::dev::diagnostic::Diagnostic;
-use crate::dev::look::Look;
+use crate::dev::look::DisplaySettings;
 use crate::dev::messages::{Preview, Report};
-use crate::dev::object::Seen;
+use crate::dev::object::SceneView;
 use crate::dev::picture::{Content, Frame, Header, Names, View, png_of};
 use crate::dev::save::replace;
 use crate::scene::ViewSettings;
 
-/// What is wrong, by where it comes from.
+/// The current errors by source.
 #[derive(Default)]
 pub struct Problems {
     pub scene: Option<Diagnostic>,
     pub files: Option<Diagnostic>,
     pub shader: Vec<Diagnostic>,
-    /// Marks of shaders that cannot be followed.
+    /// Invalid annotations in shaders.
     pub marks: Vec<Diagnostic>,
-    /// The picture cannot be rendered whole.
+    /// The image cannot be rendered completely.
     pub cut: Option<Diagnostic>,
     pub device: Option<Diagnostic>,
     pub out: Option<Diagnostic>,
@@ -43,7 +43,7 @@ impl Painter {
             .is_some_and(|running| running.canvas.is_done(self.seen()))
     }
 
-    /// Shows the picture as it is now.
+    /// Shows the current image.
     pub(super) fn show(&mut self) {
         let (view, done) = (self.seen(), self.is_done());
         let Some(running) = &mut self.running else { return };
@@ -58,9 +58,9 @@ impl Painter {
         let whole = sent == finest && samples > 0;
         let settings = (self.loaded.as_ref()).map_or(ViewSettings::default(), |loaded| loaded.scene.view);
         if let (Content::Color(colors), true) = (&content, whole) {
-            let look = Look {
+            let look = DisplaySettings {
                 view: settings,
-                ..Look::default()
+                ..DisplaySettings::default()
             };
             self.write_out(|| png_of(colors, look), done);
         }
@@ -92,7 +92,7 @@ impl Painter {
             materials: loaded.scene.material_names.clone(),
         });
         let bins = self.loaded.iter().flat_map(|loaded| &loaded.packed.filter_table);
-        let look = Look {
+        let look = DisplaySettings {
             gain: self.gain,
             marks: self.marks,
             negative: bins.into_iter().any(|bin| bin.z < 0.0),
@@ -128,7 +128,7 @@ impl Painter {
         self.tell();
     }
 
-    /// Replaces the file of `--out`: once all pixels have a sample, and when the picture is done.
+    /// Replaces the file of `--out` when each pixel has a sample, and when the image is finished.
     fn write_out(&mut self, png: impl FnOnce() -> Vec<u8>, done: bool) {
         let Some(out) = &self.out else { return };
         if done || self.written != Some(self.revision) {
@@ -139,13 +139,15 @@ impl Painter {
         }
     }
 
-    /// Says in the terminal that the picture is too large to be shown whole; once for each size.
+    /// Reports an image that is too large to display, once for each size.
     pub(super) fn tell_size(&mut self) {
+        let scale = self.limits.scale;
         let sizes = self
             .running
             .as_ref()
             .map(|running| (running.canvas.size(), running.canvas.finest_size()));
-        let smaller = sizes.filter(|(asked, shown)| asked != shown);
+        // A lower preview resolution is the choice of a viewer.
+        let smaller = sizes.filter(|(asked, shown)| asked.map(|side| side.div_ceil(scale)) != *shown);
         if self.smaller != smaller {
             self.smaller = smaller;
             if let Some((asked, shown)) = smaller {
@@ -154,13 +156,13 @@ impl Painter {
         }
     }
 
-    /// Tells what questions about the scene are answered from, where it has changed.
+    /// Publishes the scene and the camera for questions, if they changed.
     fn tell_seen(&self) {
         let Some(loaded) = &self.loaded else { return };
         let camera = self.packed_camera(loaded);
-        let is_known = |seen: &Arc<Seen>| Arc::ptr_eq(&seen.loaded, loaded) && seen.camera == camera;
+        let is_known = |seen: &Arc<SceneView>| Arc::ptr_eq(&seen.loaded, loaded) && seen.camera == camera;
         if !self.seen_sender.borrow().as_ref().is_some_and(is_known) {
-            self.seen_sender.send_replace(Some(Arc::new(Seen {
+            self.seen_sender.send_replace(Some(Arc::new(SceneView {
                 loaded: Arc::clone(loaded),
                 camera,
                 sources: self.sources.clone(),
@@ -168,7 +170,7 @@ impl Painter {
         }
     }
 
-    /// Tells everybody the state, where it has changed.
+    /// Publishes the state, if it changed.
     pub(super) fn tell(&mut self) {
         self.tell_seen();
         let camera = self

@@ -1,4 +1,4 @@
-//! Which view is shown: what is asked for, what the scene has, and what the running kernel can show.
+//! The view: which one is selected, what the scene provides, and what the running kernel can show.
 
 use std::time::Instant;
 
@@ -23,18 +23,18 @@ impl Painter {
             self.show_what_is_there();
         }
         if kernel(self) != before {
-            self.settle((Instant::now(), false)); // it takes a kernel of its own
+            self.settle((Instant::now(), false)); // needs another kernel
         }
     }
 
-    /// Shows what is rendered of a view already.
+    /// Shows what is already rendered of a view.
     pub(super) fn show_what_is_there(&mut self) {
         if self.is_done() || self.running.as_ref().is_some_and(|running| !running.canvas.is_new()) {
             self.show();
         }
     }
 
-    /// A view that the scene or the shaders do not have is colour's.
+    /// Falls back to color if the scene or the shaders do not provide the selected view.
     pub(super) fn keep_view(&mut self) {
         if self.loaded.is_none() {
             return;
@@ -43,13 +43,13 @@ impl Painter {
             View::Layer(name) if self.layer().is_none() => {
                 let there = self.layers();
                 let there = match there.is_empty() {
-                    true => "there is none".to_string(),
+                    true => "no layer is defined".to_string(),
                     false => {
                         let names: Vec<&str> = there.iter().map(LayerName::as_str).collect();
-                        format!("there are {}", names.join(", "))
+                        format!("the layers are {}", names.join(", "))
                     }
                 };
-                format!("the shaders have no layer `{}`: {there}", name.as_str())
+                format!("the shaders have no layer `{}`; {there}", name.as_str())
             }
             view => match (view.aov(), self.missing(view)) {
                 (Some(aov), Some(rule)) => format!("view `{}`: {rule}", aov.name()),
@@ -60,19 +60,19 @@ impl Painter {
         self.notice(&Err(told), String::new());
     }
 
-    /// Why the scene does not have what a view shows; `None` if it does.
+    /// Returns why the scene does not provide a view; `None` if it does.
     fn missing(&self, view: View) -> Option<&'static str> {
         let packed = &self.loaded.as_ref()?.packed;
         view.aov()?.missing(packed.integrator, packed.adaptive)
     }
 
-    /// The views that the scene does not have, and why.
+    /// Returns the views that the scene does not provide, and why.
     pub(super) fn missing_views(&self) -> Vec<(View, &'static str)> {
         let rules = View::LAYERS.iter().map(|view| (*view, self.missing(*view)));
         rules.filter_map(|(view, rule)| Some((view, rule?))).collect()
     }
 
-    /// What the running kernel shows: what is asked for, unless that takes another one.
+    /// Returns the view that the running kernel shows: the selected one, unless it needs another kernel.
     pub(super) fn seen(&self) -> View {
         match &self.running {
             Some(running) => shown(&running.constants, self.view),

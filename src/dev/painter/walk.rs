@@ -1,4 +1,4 @@
-//! Where the camera is moved to, and the way back.
+//! Moves of the camera, and the history of viewpoints.
 
 use std::time::Instant;
 
@@ -12,32 +12,32 @@ use crate::film::Region;
 use crate::pack::NOTHING;
 use crate::scene::{Bounds, CameraDescription, Geometry, Light, Scene};
 
-/// So many steps can be taken back.
+/// Maximum number of viewpoints that are kept.
 const STEPS: usize = 256;
 
-/// The steps that the camera has made.
+/// The history of viewpoints.
 #[derive(Default)]
-pub struct Walk {
+pub struct CameraHistory {
     /// The cameras before each step.
     back: Vec<CameraDescription>,
-    /// Those that steps were taken back from.
+    /// The cameras that can be returned to.
     forth: Vec<CameraDescription>,
-    /// Whether the next move belongs to the last step.
+    /// True if the next move belongs to the last step.
     in_step: bool,
 }
 
-impl Walk {
-    /// Whether there are steps to take back, and to make again.
+impl CameraHistory {
+    /// Returns whether there is a previous and a next viewpoint.
     pub fn steps(&self) -> [bool; 2] {
         [!self.back.is_empty(), !self.forth.is_empty()]
     }
 
-    /// The next move is another step.
+    /// Ends the step: the next move starts another one.
     pub fn end_step(&mut self) {
         self.in_step = false;
     }
 
-    /// The camera leaves here.
+    /// Adds the current camera before a move.
     fn leave(&mut self, camera: &CameraDescription) {
         if !std::mem::replace(&mut self.in_step, true) {
             self.forth.clear();
@@ -50,7 +50,7 @@ impl Walk {
 }
 
 impl Painter {
-    /// The camera that is looked through.
+    /// Returns the current camera.
     fn seen_by(&self) -> Option<&CameraDescription> {
         self.camera
             .as_ref()
@@ -84,7 +84,7 @@ impl Painter {
         self.step(&old, new);
     }
 
-    /// Shows the whole of what is at a pixel; of the whole scene if that has no end, or is nothing.
+    /// Frames the object at a pixel, or the whole scene if there is no finite object.
     pub(super) fn frame(&mut self, pixel: Option<[u32; 2]>) {
         let (Some(loaded), Some(old)) = (self.loaded.clone(), self.seen_by().cloned()) else {
             return;
@@ -95,7 +95,7 @@ impl Painter {
                 let (center, radius) = (0.5 * low + 0.5 * high, 0.5 * (high - low).length());
                 self.step(&old, framed(&old, center, radius));
             }
-            None => self.notice(&Err("there is nothing here that has an end".to_string()), String::new()),
+            None => self.notice(&Err("Nothing here has a finite extent".to_string()), String::new()),
         }
     }
 
@@ -124,7 +124,7 @@ impl Painter {
         }
     }
 
-    /// Takes the last step back, or makes it again.
+    /// Returns to the previous or the next viewpoint.
     pub(super) fn retrace(&mut self, forth: bool) {
         let Some(now) = self.seen_by().cloned() else { return };
         let walk = &mut self.walk;
@@ -134,16 +134,16 @@ impl Painter {
         };
         let Some(camera) = from.pop() else { return };
         walk.in_step = false;
-        // The file may have another kind of camera by now.
+        // The camera of the file may be of another kind by now.
         if std::mem::discriminant(&camera) == std::mem::discriminant(&now) {
             to.push(now);
             self.look_through(camera);
         } else {
-            *walk = Walk::default();
+            *walk = CameraHistory::default();
         }
     }
 
-    /// A step by itself.
+    /// Moves the camera in a step of its own.
     fn step(&mut self, old: &CameraDescription, new: CameraDescription) {
         self.walk.in_step = false;
         self.go(old, new);
@@ -161,7 +161,7 @@ impl Painter {
         let files = self.loaded.as_ref().map(|loaded| &loaded.camera);
         self.camera = Some(camera).filter(|camera| Some(camera) != files);
         self.camera_waits = true;
-        self.comparison.before = None; // it is seen from elsewhere
+        self.comparison.before = None; // seen from another viewpoint
         if let Some(running) = &mut self.running {
             running.halted = false;
         }

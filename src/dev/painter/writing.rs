@@ -1,5 +1,5 @@
-//! Writing into the scene file: the camera, and values that are set on the page. What is written is checked first, and can be
-//! taken back.
+//! Changes of the scene file: the camera, and values that are set on the page. Each change is validated first, and
+//! can be undone.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,22 +13,22 @@ use super::Painter;
 use crate::dev::edit::edited_in;
 use crate::dev::history::Step;
 use crate::dev::messages::{Report, Set};
-use crate::dev::object::{Seen, object_of};
+use crate::dev::object::{SceneView, object_of};
 use crate::dev::save::{replace_known, wait_settled, with_camera};
-use crate::dev::source::{Loaded, Stamp};
+use crate::dev::source::{FileStamp, Loaded};
 use crate::scene::{Draft, Field, KeyPath, Segment, cut, folder_of, read_text};
 use crate::visible::visible;
 
 impl Painter {
-    /// Writes a value into the scene file.
+    /// Sets a value in the scene file.
     pub(super) fn set(&mut self, set: &Set) {
-        // Who looks may send anything, and the terminal shows what is told.
+        // A viewer may send any text, and the terminal prints the error.
         let result = self.try_set(set).map_err(|why| visible(&why).into_owned());
         match &result {
             Ok(()) => self.taken(),
             Err(_) => self.notice(&result, String::new()),
         }
-        // A slider that is drawn writes many times, and the terminal is told of none but what goes wrong.
+        // A slider writes many times while it is dragged: only errors are reported.
         if result.is_err() || set.gesture.is_none() {
             (self.report)(Report::Wrote(visible(&cut(&set.path)).into_owned(), result));
         }
@@ -36,9 +36,9 @@ impl Painter {
 
     fn try_set(&mut self, set: &Set) -> Result<(), String> {
         let path: KeyPath = set.path.parse().map_err(|problem| format!("{problem}"))?;
-        let (file, before) = self.settled_file("a value")?;
+        let (file, before) = self.settled_file("values")?;
         let loaded = self.read_again(&before)?;
-        let seen = Seen {
+        let seen = SceneView {
             camera: self.packed_camera(&loaded),
             loaded: Arc::clone(&loaded),
             sources: self.sources.clone(),
@@ -46,11 +46,11 @@ impl Painter {
         let whole = || Some((path.clone(), seen.field(&path)?, set.value.clone()));
         let found = whole().or_else(|| with_element(&seen, &path, &set.value));
         let (Some(object), Some((path, field, given))) = (object_of(&path), found) else {
-            return Err(format!("{path}: is nothing that can be changed"));
+            return Err(format!("{path}: cannot be changed"));
         };
         let value = match (&given, &field.fixed) {
             (_, Some(why)) => Err(why.clone()),
-            (Json::Null, None) if field.required => Err("must be there".to_owned()),
+            (Json::Null, None) if field.required => Err("is required".to_owned()),
             (Json::Null, None) => Ok(None),
             (given, None) => field.value_of(given, &seen.names()).map(Some),
         };
@@ -61,15 +61,15 @@ impl Painter {
         self.write(&file, (&loaded, &before), after, step)
     }
 
-    /// Writes the camera that is looked through into the scene file.
+    /// Saves the current camera to the scene file.
     pub(super) fn save_camera(&mut self) {
         let result = self.try_save_camera();
-        self.notice(&result, format!("camera saved into {}", self.sources.scene.display()));
+        self.notice(&result, format!("Camera saved to {}", self.sources.scene.display()));
         (self.report)(Report::Wrote("camera".to_owned(), result));
     }
 
     fn try_save_camera(&mut self) -> Result<(), String> {
-        let (file, before) = self.settled_file("a camera")?;
+        let (file, before) = self.settled_file("the camera")?;
         let loaded = self.read_again(&before)?;
         let camera = self.camera.as_ref().unwrap_or(&loaded.camera);
         let after = with_camera(&before, &self.sources.scene.display().to_string(), camera)?;
@@ -79,7 +79,7 @@ impl Painter {
         self.write(&file, (&loaded, &before), after, step)
     }
 
-    /// Takes back what was written last, or makes it again.
+    /// Undoes or redoes the last change.
     pub(super) fn turn(&mut self, again: bool) {
         let Some(what) = self.history.last(again).map(|step| step.what.clone()) else {
             if let Some(reason) = self.state.undo_blocked.clone() {
@@ -88,9 +88,11 @@ impl Painter {
             return;
         };
         let result = self.try_turn(again);
-        let done = if again { "written again" } else { "taken back" };
-        self.notice(&result, format!("{what}: {done}"));
-        (self.report)(Report::Turned(format!("{done}: {what}"), result));
+        let done = if again { "Redid" } else { "Undid" };
+        self.notice(&result, format!("{done}: {what}"));
+        let action = if again { "Redo" } else { "Undo" };
+        let text = if result.is_ok() { done } else { action };
+        (self.report)(Report::Turned(format!("{text}: {what}"), result));
     }
 
     /// Drops the undo history because another program has changed the scene file.
@@ -103,9 +105,9 @@ impl Painter {
     }
 
     fn try_turn(&mut self, again: bool) -> Result<(), String> {
-        let (file, before) = self.scene_file("a value")?;
+        let (file, before) = self.scene_file("values")?;
         let place = self.sources.scene.display().to_string();
-        let others = || format!("{place}: has been changed since by somebody else, and stays as it is");
+        let others = || format!("{place}: another program has changed the file; nothing was undone");
         let loaded = self
             .loaded
             .clone()
@@ -117,7 +119,7 @@ impl Painter {
         let read = self.read_change(&loaded, &at, after)?;
         self.replace(&file, &before, &read)?;
         self.history.turn(again);
-        // What a save has written was on screen, and stays there.
+        // A saved camera was on screen, and stays there when the save is undone.
         let view = keeps_view.then(|| self.camera.clone().unwrap_or(loaded.camera.clone()));
         let shown_otherwise = self.take_written(read);
         if let (Some(view), Some(loaded)) = (view, &self.loaded) {
@@ -127,19 +129,19 @@ impl Painter {
         Ok(())
     }
 
-    /// The scene file behind its links, and its text.
+    /// Returns the scene file, with links resolved, and its text.
     fn scene_file(&self, what: &str) -> Result<(PathBuf, String), String> {
         let scene = &self.sources.scene;
         let place = scene.display();
         if let Some(reason) = self.sources.read_only() {
-            return Err(format!("{place}: {what} cannot be saved: {reason}"));
+            return Err(format!("{place}: cannot save {what}: {reason}"));
         }
         let file = fs::canonicalize(scene).map_err(|error| format!("{place}: {error}"))?;
         let text = read_text(scene).map_err(|error| error.to_string())?;
         Ok((file, text))
     }
 
-    /// The same once nobody else is saving it: what is not known yet may not be whole.
+    /// Like [`Self::scene_file`], but waits while another program is writing the file.
     fn settled_file(&self, what: &str) -> Result<(PathBuf, String), String> {
         let (file, text) = self.scene_file(what)?;
         if self.loaded.as_ref().is_some_and(|loaded| loaded.text == text) {
@@ -149,7 +151,7 @@ impl Painter {
         self.scene_file(what)
     }
 
-    /// The scene of a text: that which is known, if nobody has changed the file since.
+    /// Returns the scene of a text: the loaded one, unless another program changed the file.
     fn read_again(&self, text: &str) -> Result<Arc<Loaded>, String> {
         if let Some(loaded) = self.loaded.as_ref().filter(|loaded| loaded.text == text) {
             return Ok(Arc::clone(loaded));
@@ -158,11 +160,11 @@ impl Painter {
         let folder = folder_of(&self.sources.scene);
         let read = Draft::read(text, &origin, folder, &self.sources.overrides);
         let read = read.and_then(|draft| draft.check(&mut BTreeSet::new()));
-        let (scene, description) = read.map_err(|error| format!("mend the file first: {error}"))?;
+        let (scene, description) = read.map_err(|error| format!("fix the file first: {error}"))?;
         Ok(Arc::new(Loaded::new(text.to_owned(), scene, description)))
     }
 
-    /// The scene of a text that differs from a known one inside of one table.
+    /// Returns the scene of a text that differs from a known one inside one table.
     fn read_change(&self, known: &Loaded, at: &KeyPath, text: String) -> Result<Arc<Loaded>, String> {
         let origin = self.sources.scene.display().to_string();
         let folder = folder_of(&self.sources.scene);
@@ -173,7 +175,7 @@ impl Painter {
         Ok(Arc::new(Loaded::new(text, scene, description).with_places(places)))
     }
 
-    /// Writes a text that is a scene, and shows it.
+    /// Writes the text of a valid scene, and shows it.
     fn write(
         &mut self,
         file: &Path,
@@ -202,10 +204,10 @@ impl Painter {
             .map_err(|error| format!("{place}: cannot be written: {error}"))
     }
 
-    /// Takes a scene that this session has written, so that its file need not be read again.
+    /// Takes a scene that this session has written, so that its file is not read again.
     fn take_written(&mut self, read: Arc<Loaded>) -> bool {
         if let Some((_, stamp)) = self.files.first_mut() {
-            *stamp = Stamp::Content(read.text.clone().into_bytes());
+            *stamp = FileStamp::Content(read.text.clone().into_bytes());
         }
         {
             let mut writes = self.writes.lock().unwrap_or_else(PoisonError::into_inner);
@@ -216,8 +218,8 @@ impl Painter {
     }
 }
 
-/// For a number of a list the list with that number: its path, what it is, and its value.
-fn with_element(seen: &Seen, path: &KeyPath, given: &Json) -> Option<(KeyPath, Field, Json)> {
+/// Returns a list with one changed number: its path, its field and its value.
+fn with_element(seen: &SceneView, path: &KeyPath, given: &Json) -> Option<(KeyPath, Field, Json)> {
     let (Segment::Index(i), list) = path.0.split_last()? else {
         return None;
     };

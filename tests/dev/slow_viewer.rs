@@ -1,0 +1,109 @@
+//! Viewers behind slow connections: what they see is recent.
+
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+use wgray::dev::{Command, Move};
+
+use super::running::{Files, SCENE, serve};
+use super::viewer::{Received, Viewer};
+
+/// A scene whose frames are noisy, so that PNG hardly compresses them.
+fn noisy() -> String {
+    SCENE
+        .replace("width = 40", "width = 320")
+        .replace("height = 30", "height = 240")
+        .replace(
+            "[render]",
+            "[render]\nintegrator = \"path\"\nbackground = [0.1, 0.2, 0.4]",
+        )
+        .replace(
+            "pixel_samples = { pattern = \"grid\", count = 4 }",
+            "pixel_samples = { pattern = \"jittered\", count = 64 }",
+        )
+}
+
+#[test]
+fn two_frames_at_most_are_in_flight_and_the_next_one_is_the_newest() {
+    let files = Files::new(SCENE);
+    let running = files.start();
+    running.wait_rendered(&files);
+    let (session, address) = serve(running);
+    let mut viewer = Viewer::new(address);
+    let mut frames = Vec::new();
+    let mut states = 0;
+    for _ in 0..6 {
+        let revision = session.revision();
+        session.session.send(Command::Move(Move::Orbit(0.1, 0.0)));
+        session.wait_done(revision);
+    }
+    // Without acknowledgements: two frames, and every state.
+    let newest = session.state().frame;
+    while states < newest {
+        match viewer.receive().unwrap() {
+            Received::Frame(header, _) => frames.push(header),
+            Received::Text(message) => states = message["state"]["frame"].as_u64().unwrap_or(states),
+        }
+    }
+    viewer.set_timeout(Duration::from_secs(2));
+    while let Some(message) = viewer.receive() {
+        if let Received::Frame(header, _) = message {
+            frames.push(header);
+        }
+    }
+    assert_eq!(frames.len(), 2, "{frames:?}");
+    // An acknowledgement of the first is room for one, which is the newest.
+    viewer.acknowledge(&frames[0]);
+    let next = loop {
+        if let Received::Frame(header, _) = viewer.receive().expect("a frame") {
+            break header;
+        }
+    };
+    assert_eq!(next["number"], json!(session.frame().unwrap().header.number));
+}
+
+#[test]
+fn a_slow_connection_does_not_delay_the_cameras_answer() {
+    const RATE: f64 = 30_000.0; // bytes per second
+    let files = Files::new(&noisy());
+    let running = files.start();
+    running.wait("a first image", |running| running.frame());
+    let (session, address) = serve(running);
+    let mut viewer = Viewer::slow(address, RATE);
+    let mut sender = viewer.sender();
+    let moves = std::thread::spawn(move || {
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(5) {
+            sender
+                .say(json!({ "move": { "orbit": [0.02, 0.0] } }).to_string().as_bytes())
+                .unwrap();
+            std::thread::sleep(Duration::from_millis(40));
+        }
+    });
+    let mut largest = 0;
+    while !moves.is_finished() {
+        match viewer.receive().unwrap() {
+            Received::Frame(header, size) => {
+                largest = largest.max(size);
+                viewer.acknowledge(&header);
+            }
+            Received::Text(_) => {}
+        }
+    }
+    let start = Instant::now();
+    let heard = session.state().heard;
+    loop {
+        match viewer.receive().unwrap() {
+            Received::Frame(header, _) => viewer.acknowledge(&header),
+            Received::Text(message) if message["state"]["heard"].as_u64() >= Some(heard) => break,
+            Received::Text(_) => {}
+        }
+    }
+    let frames = Duration::from_secs_f64(2.0 * largest as f64 / RATE);
+    assert!(largest > 4_000, "a frame takes a while: {largest}");
+    assert!(
+        start.elapsed() < frames + Duration::from_secs(1),
+        "{:?}",
+        start.elapsed()
+    );
+}

@@ -1,0 +1,153 @@
+//! A WebSocket client that stands in for the page.
+
+use std::io::{Read as _, Write as _};
+use std::net::{SocketAddr, TcpStream};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use super::running::LONGEST;
+
+/// A viewer's connection.
+pub struct Viewer {
+    stream: TcpStream,
+    /// Maximum bytes per second that are read.
+    rate: Option<f64>,
+}
+
+/// A message of the server.
+pub enum Received {
+    /// A message of text.
+    Text(Value),
+    /// The header of a frame, and the size of its message in bytes.
+    Frame(Value, usize),
+}
+
+impl Viewer {
+    pub fn new(address: SocketAddr) -> Viewer {
+        let mut stream = TcpStream::connect(address).unwrap();
+        stream.set_read_timeout(Some(LONGEST)).unwrap();
+        let request = format!(
+            "GET /socket HTTP/1.1\r\nHost: {address}\r\nOrigin: http://{address}\r\nConnection: Upgrade\r\n\
+             Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+        );
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut head = Vec::new();
+        while !head.ends_with(b"\r\n\r\n") {
+            let mut byte = [0];
+            stream.read_exact(&mut byte).unwrap();
+            head.push(byte[0]);
+        }
+        assert!(head.starts_with(b"HTTP/1.1 101"));
+        Viewer { stream, rate: None }
+    }
+
+    /// A viewer behind a slow connection, in bytes per second.
+    pub fn slow(address: SocketAddr, rate: f64) -> Viewer {
+        Viewer {
+            rate: Some(rate),
+            ..Viewer::new(address)
+        }
+    }
+
+    /// Sends bytes as a message of text, masked with zeros.
+    pub fn say(&mut self, text: &[u8]) -> std::io::Result<()> {
+        let mut bytes = vec![0x81, 0x80 | 127];
+        bytes.extend((text.len() as u64).to_be_bytes());
+        bytes.extend([0; 4]);
+        bytes.extend(text);
+        self.stream.write_all(&bytes)
+    }
+
+    /// Another handle on the same connection, which only sends.
+    pub fn sender(&self) -> Viewer {
+        Viewer {
+            stream: self.stream.try_clone().unwrap(),
+            rate: None,
+        }
+    }
+
+    /// Acknowledges a frame.
+    pub fn acknowledge(&mut self, header: &Value) {
+        let message = json!({ "shown": header["number"] }).to_string();
+        self.say(message.as_bytes()).unwrap();
+    }
+
+    /// Waits at most this long for each message.
+    pub fn set_timeout(&self, timeout: Duration) {
+        self.stream.set_read_timeout(Some(timeout)).unwrap();
+    }
+
+    /// The next message; none once the connection has ended, or after the timeout.
+    pub fn receive(&mut self) -> Option<Received> {
+        loop {
+            let [kind, short] = self.read::<2>()?;
+            let length = match short {
+                126 => u64::from(u16::from_be_bytes(self.read()?)),
+                127 => u64::from_be_bytes(self.read()?),
+                short => u64::from(short),
+            };
+            let mut body = vec![0; length as usize];
+            self.fill(&mut body)?;
+            match kind & 0xf {
+                1 => return Some(Received::Text(serde_json::from_slice(&body).unwrap())),
+                2 => {
+                    let length = u32::from_le_bytes(body[..4].try_into().unwrap()) as usize;
+                    let header = serde_json::from_slice(&body[4..4 + length]).unwrap();
+                    return Some(Received::Frame(header, body.len()));
+                }
+                8 => return None,
+                _ => {}
+            }
+        }
+    }
+
+    /// The next message of text; none once the connection has ended.
+    pub fn hear(&mut self) -> Option<Value> {
+        loop {
+            if let Received::Text(message) = self.receive()? {
+                return Some(message);
+            }
+        }
+    }
+
+    fn read<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let mut bytes = [0; N];
+        self.fill(&mut bytes)?;
+        Some(bytes)
+    }
+
+    fn fill(&mut self, bytes: &mut [u8]) -> Option<()> {
+        let Some(rate) = self.rate else {
+            return self.stream.read_exact(bytes).ok();
+        };
+        for part in bytes.chunks_mut(4096) {
+            let start = Instant::now();
+            self.stream.read_exact(part).ok()?;
+            let time = Duration::from_secs_f64(part.len() as f64 / rate);
+            std::thread::sleep(time.saturating_sub(start.elapsed()));
+        }
+        Some(())
+    }
+
+    /// Sends a message that must be refused, and returns the reason: from the answer, or from the state that follows.
+    #[track_caller]
+    pub fn refused(&mut self, text: &str) -> String {
+        self.say(text.as_bytes()).unwrap();
+        let mut number = None;
+        loop {
+            let message = self.hear().unwrap();
+            if let Some(refused) = message.get("refused") {
+                return refused.as_str().unwrap().to_owned();
+            }
+            number = message.get("asked").and_then(Value::as_u64).or(number);
+            let notice = &message["state"]["notice"];
+            if number.is_some() && notice["command"].as_u64() == number {
+                assert_eq!(notice["bad"], json!(true), "{text}: {notice}");
+                return notice["text"].as_str().unwrap().to_owned();
+            }
+            let heard = message["state"]["heard"].as_u64();
+            assert!(number.is_none() || heard < number, "{text} was followed");
+        }
+    }
+}
