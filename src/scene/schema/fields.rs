@@ -249,7 +249,7 @@ impl Found<'_> {
             let place = Place {
                 value: table.and_then(|table| table.get(key)),
                 default,
-                required: table.is_some() && required.contains(key),
+                required: table.is_some() && required.contains(&key.as_str()),
                 about: "",
             };
             self.look(of_key, path, &place);
