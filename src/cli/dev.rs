@@ -28,8 +28,9 @@ pub struct Args {
     /// Scene file
     scene: PathBuf,
 
-    /// Serve the page at this address. Anyone who can reach it can view the scene and edit values of the scene file and
-    /// annotated shader constants
+    /// Serve the page at this address
+    ///
+    /// Anyone who can reach the address can view the scene and edit values of the scene file and annotated shader constants.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7878", value_parser = NonEmptyStringValueParser::new())]
     listen: String,
 
@@ -45,8 +46,10 @@ pub struct Args {
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     shaders: Option<PathBuf>,
 
-    /// Render on this device: auto and gpu prefer a GPU over software Vulkan; NAME is part of an adapter's name, or its
-    /// number in `wgray devices`
+    /// Render on this device
+    ///
+    /// auto and gpu prefer a GPU over software Vulkan; NAME is a part of an adapter's name, driver or type, or its number in
+    /// `wgray devices`.
     #[arg(long, value_name = "auto|gpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
     device: String,
 
@@ -58,7 +61,10 @@ pub struct Args {
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 
-    /// Open source lines in an editor by this URL, with {file} and optionally {line} and {column}, or disable the links
+    /// Open source lines in an editor by this URL
+    ///
+    /// The URL contains {file} and optionally {line} and {column}, such as idea://open?file={file}&line={line}. off disables
+    /// the links.
     #[arg(long, value_name = "URL|off", default_value = "vscode://file/{file}:{line}:{column}", value_parser = NonEmptyStringValueParser::new())]
     editor: String,
 

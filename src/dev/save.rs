@@ -152,7 +152,11 @@ mod tests {
     #[test]
     fn a_broken_file_and_another_camera_are_refused() {
         let new = camera("type = 'orthographic'\nposition = [0, 1, 2]\nlook_at = [0, 0, 0]\nheight = 2");
-        assert!(with_camera(SCENE, "s.toml", &new).unwrap_err().contains("another type"));
+        assert!(
+            with_camera(SCENE, "s.toml", &new)
+                .unwrap_err()
+                .contains("type of the camera")
+        );
         assert!(
             with_camera("[image", "s.toml", &new)
                 .unwrap_err()
@@ -214,7 +218,7 @@ mod tests {
             is_done.store(true, Relaxed);
             error.unwrap()
         });
-        assert!(error.contains("s.toml: is being saved"), "{error}");
+        assert!(error.contains("s.toml: another program is writing"), "{error}");
     }
 
     #[test]

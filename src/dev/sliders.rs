@@ -427,7 +427,7 @@ mod tests {
         let both = text.replace("mine", "theirs").replace("0.5", "0.1").replace("3u", "4u");
         assert_eq!(fs::read_to_string(&file).unwrap(), both);
         fs::write(&file, "// nothing").unwrap();
-        assert!(sliders.take_back().unwrap_err().contains("has been changed since"));
+        assert!(sliders.take_back().unwrap_err().contains("has changed since"));
         assert!(sliders.write(folder.path()).unwrap_err().contains("no slider any more"));
         assert_eq!(fs::read_to_string(&file).unwrap(), "// nothing");
     }

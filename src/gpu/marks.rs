@@ -603,7 +603,7 @@ mod tests {
     fn a_mark_that_cannot_be_followed_is_told_with_its_place() {
         for (line, wanted) in [
             ("let a = 1.0; // slider 0..1", "must be a line"),
-            ("const a = 1.0; // slider 0..1", "must have its type"),
+            ("const a = 1.0; // slider 0..1", "must have a type"),
             ("override a: f32; // slider 0..1", "must have a type and a value"),
             ("const a: vec2f = vec2f(1.0); // slider 0..1", "`vec2f`"),
             ("const a: f32 = B * 2.0; // slider 0..1", "`B * 2.0` must be a number"),
@@ -614,7 +614,7 @@ mod tests {
             ("const a: f32 = 1.0; // slider 0 1", "must be `slider LOW..HIGH`"),
             ("const a: i32 = 1; // slider 0..1.5", "whole"),
             ("const a: f32 = 2.0; // slider 0..1", "2.0 must be from 0 to 1"),
-            ("const a: f32 = 2.0; // color", "no colour"),
+            ("const a: f32 = 2.0; // color", "neither a color"),
             ("const a: bool = true; // slider 0..1", "no range"),
             ("const a: vec3f = vec3f(-1.0); // color", "must be a number"),
             ("var<private> a: mat3x3f; // layer", "`mat3x3f`"),
