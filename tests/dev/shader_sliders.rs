@@ -30,7 +30,7 @@ fn write(running: &Running) {
         let notice = running.state().notice.clone();
         notice.filter(|notice| before != Some(notice.number))
     });
-    assert!(!notice.bad && notice.text.contains("written"), "{notice:?}");
+    assert!(!notice.bad && notice.text.contains("Saved sliders"), "{notice:?}");
 }
 
 fn slider(running: &Running, name: &str) -> SliderState {
@@ -247,7 +247,7 @@ fn a_mark_that_says_nothing_is_told_and_the_picture_stays() {
         (Some(path), Some(line), Some(1))
     );
     assert!(
-        problem.message.contains("`tint` must have its type"),
+        problem.message.contains("`tint` must have a type"),
         "{}",
         problem.message
     );
