@@ -16,7 +16,7 @@ use crate::render::Options;
 #[cfg(feature = "gpu")]
 use crate::scene::Problem;
 
-/// Which device a render asks for. Without the feature `gpu` there is the CPU alone.
+/// Which device a render asks for. Without the feature `gpu` only the CPU is available.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Device {
     /// A real GPU; else software Vulkan for scenes without trees (meshes, or more than 64 bounded primitives), and the CPU for
@@ -256,14 +256,14 @@ impl<'a> Renderer<'a> {
                     self.take((backend, info));
                     return Ok(());
                 }
-                Ok((_, info)) => reason = Some(format!("{} has no room for its film", info.name)),
+                Ok((_, info)) => reason = Some(format!("{} has too little memory for the film", info.name)),
                 Err(Error::Render(RenderError::Lost { message, .. })) => reason = Some(message),
                 Err(why) => reason = Some(why.to_string()),
             }
         }
         let message = match reason {
-            Some(why) => format!("{message}; it did not come back: {why}"),
-            None => format!("{message}, time after time"),
+            Some(why) => format!("{message}; it could not be opened again: {why}"),
+            None => format!("{message}, repeatedly"),
         };
         let error = of(message.clone());
         match self.device {
@@ -336,9 +336,9 @@ pub fn foresee(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError>
         adapter: None,
     };
     match device {
-        Device::Cpu => return Ok(on_cpu("it was asked for".to_owned())),
+        Device::Cpu => return Ok(on_cpu("requested".to_owned())),
         Device::Auto if !cfg!(feature = "gpu") => {
-            return Ok(on_cpu("the program was built without its feature \"gpu\"".to_owned()));
+            return Ok(on_cpu("this build has no GPU support (feature \"gpu\")".to_owned()));
         }
         Device::Auto => {
             if let Some(why) = faster_on_cpu(scene) {
@@ -358,14 +358,14 @@ pub fn foresee(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError>
 fn preferred(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError> {
     let info = gpu::preferred(&choice_of(device))?;
     let why = match (device, info.kind) {
-        (Device::Named(_), _) => "it was asked for",
+        (Device::Named(_), _) => "requested",
         (_, "software") => {
-            "there is no real GPU, and software Vulkan is faster than the CPU for a scene without trees of boxes"
+            "no hardware GPU found, and software Vulkan is faster than the CPU for a scene without a BVH"
         }
-        _ => "it is the first real GPU",
+        _ => "the first hardware GPU",
     };
     let why = match device {
-        Device::Gpu if info.kind == "software" => "there is no real GPU",
+        Device::Gpu if info.kind == "software" => "no hardware GPU found",
         _ => why,
     };
     let foreseen = gpu::foresee(scene, &info);
@@ -384,7 +384,7 @@ fn preferred(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError> {
 fn preferred(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError> {
     match adapter(scene, device, false, &|_, _| true) {
         Err(Error::Render(error)) => Err(error),
-        _ => Err(RenderError::NoDevice("there is the CPU alone".to_owned())),
+        _ => Err(RenderError::NoDevice("only the CPU is available".to_owned())),
     }
 }
 
@@ -422,9 +422,7 @@ fn faster_on_cpu(scene: &Packed) -> Option<String> {
     let adapter = gpu::adapters().into_iter().next()?;
     (adapter.kind == "software").then(|| {
         let name = adapter.name;
-        format!(
-            "{ON_CPU}there is no GPU, and the CPU walks trees of boxes faster than {name}, which --device gpu asks for"
-        )
+        format!("{ON_CPU}no GPU found, and the CPU traverses the BVH faster than {name}; use --device gpu to override")
     })
 }
 
@@ -456,7 +454,7 @@ fn adapter<'a>(
     let mut options = gpu::Options::best(&opened);
     if exact_rounding {
         if !opened.info.exact {
-            let rule = format!("needs a Vulkan device, {} is {}", info.name, info.interface);
+            let rule = format!("needs a Vulkan device; {} uses {}", info.name, info.interface);
             return Err(Error::Option(Problem::of("exact_rounding", rule)));
         }
         options.exact = Some(Rounding::Software);
@@ -472,6 +470,6 @@ fn adapter<'a>(_: &'a Packed, device: &Device, _: bool, _: &dyn Fn(&str, &str) -
         _ => "a GPU".to_string(),
     };
     Err(Error::Render(RenderError::NoDevice(format!(
-        "{asked}: there is the CPU alone, as the crate was built without its feature \"gpu\""
+        "{asked}: only the CPU is available, because the crate was built without the feature \"gpu\""
     ))))
 }

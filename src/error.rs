@@ -87,8 +87,8 @@ pub enum RenderError {
     },
     /// The driver ends loops before their time, and did so in a kernel that renders a single sample of a pixel.
     #[error(
-        "{device}: this driver ends long loops early, and a single sample of a pixel has longer ones: the scene has too \
-         many shapes, lights or light samples for it, or a shader was edited"
+        "{device}: this driver ends long loops early, even for a single sample of a pixel; use fewer shapes, lights or \
+         light samples, or the CPU"
     )]
     CutShort {
         /// The adapter's name.
@@ -103,13 +103,13 @@ pub enum RenderError {
         message: String,
     },
     /// Work or a look at a film where there is none.
-    #[error("there is no film: one is begun or resumed first")]
+    #[error("no film; begin or resume one first")]
     NoFilm,
     /// A call while another is pending.
-    #[error("a call is pending: it is waited for, or polled until it is done, before anything else")]
+    #[error("a call is pending; wait for it, or poll until it is done")]
     Pending,
     /// Work outside of the pixels that there are.
-    #[error("the {what} x0,y0,x1,y1 = {region} must lie in the {of} {limits}")]
+    #[error("the {what} x0,y0,x1,y1 = {region} must lie within the {of} {limits}")]
     Outside {
         /// What lies outside.
         what: &'static str,
@@ -121,11 +121,11 @@ pub enum RenderError {
         limits: Region,
     },
     /// A film that cannot be gone on from.
-    #[error("a film of another form: {0}")]
+    #[error("the film does not fit the scene: {0}")]
     WrongFilm(String),
     /// Further samples under adaptive sampling, which the first ones of the pixels around decide on, before those.
     #[error(
-        "samples {} to {} come too early: not all pixels of the film have their first {first}",
+        "samples {} to {} come too early: some pixels of the film do not have their first {first} yet",
         samples.start, samples.end
     )]
     TooEarly {
@@ -135,7 +135,7 @@ pub enum RenderError {
         first: u32,
     },
     /// There is no memory for a picture of so many bytes.
-    #[error("a picture in memory takes {} MiB here, which there are not; a crop takes less", .0 >> 20)]
+    #[error("an image in memory needs {} MiB, which are not available; render a crop", .0 >> 20)]
     Memory(u64),
     /// What the work goes on from cannot be read.
     #[error("{0}")]

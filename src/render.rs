@@ -45,9 +45,9 @@ impl Options {
             rule.map(|rule| (aov, rule))
         });
         let rule = if x0 >= x1 || y0 >= y1 {
-            "must have x0 less than x1, and y0 less than y1".to_string()
+            "must have x0 < x1 and y0 < y1".to_string()
         } else if x1 > width || y1 > height {
-            format!("must lie in the picture of {width} x {height} pixels")
+            format!("must lie within the image of {width} x {height} pixels")
         } else if let Some((aov, rule)) = unknown {
             return Err(Problem::of(aov.name(), rule).inside("aov"));
         } else {
@@ -226,7 +226,7 @@ impl<'a> Prepared<'a> {
         let region = options.region(scene).map_err(Error::Option)?;
         let on_fault = FaultHandler {
             tell: Box::new(|why, remedy| match remedy {
-                Recovery::Reopen => warn!("{why}; it is opened anew"),
+                Recovery::Reopen => warn!("{why}; re-opening it"),
                 Recovery::Cpu => warn!("rendering on the CPU: {why}"),
             }),
             stopped: Box::new(|| false), // the pauses are short

@@ -69,7 +69,7 @@ fn floor(from: DVec3, height: f64, [ambient, diffuse, specular]: [f64; 3], shini
         material: "m".into(),
         point: DVec3::ZERO,
         normal: DVec3::Z,
-        tangent: DVec3::X,
+        tangent: Some(DVec3::X),
     }));
     scene
 }
@@ -138,7 +138,7 @@ fn light_of_a_rectangle_on_a_plane() {
             center: DVec3::new(0.0, 0.0, h),
             size,
             normal: -DVec3::Z,
-            tangent: DVec3::X,
+            tangent: Some(DVec3::X),
             color: DVec3::splat(0.9),
             visible: true,
         }));

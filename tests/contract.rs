@@ -36,7 +36,7 @@ pub fn subjects() -> [Packed; 4] {
 /// The scene by the integrator `path`, whose materials are diffuse.
 fn along_paths(scene: &Description) -> Description {
     let mut scene = scene.clone();
-    scene.render.integrator = wgray::scene::Integrator::Path;
+    scene.render.integrator = Some(wgray::scene::Integrator::Path);
     scene.render.ambient = wgray::DVec3::ZERO;
     scene.render.max_depth = 3;
     scene

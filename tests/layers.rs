@@ -460,7 +460,7 @@ fn layers_of_paths_are_refused_under_another_integrator() {
             Aov::Albedo | Aov::Direct | Aov::Indirect | Aov::Emission => {
                 Some(format!("aov.{name}: needs integrator = \"path\""))
             }
-            Aov::SampleCount | Aov::Variance => Some(format!("aov.{name}: is known under adaptive sampling alone")),
+            Aov::SampleCount | Aov::Variance => Some(format!("aov.{name}: needs adaptive sampling")),
             _ => None,
         };
         assert_eq!(told, expected, "{name}");

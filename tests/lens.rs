@@ -268,7 +268,7 @@ fn bad_lenses_are_told() {
         ("f_number = 0", "camera.f_number: 0 must be from 0.1 to 1e9"),
         (
             "f_number = 2\naperture = 0.1",
-            "camera.f_number: must not be here beside \"aperture\": each says how wide the lens is",
+            "camera.f_number: cannot be combined with aperture: both set the diameter of the lens",
         ),
         (
             "focus_distance = 0",

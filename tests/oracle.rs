@@ -124,7 +124,13 @@ impl<'a> Oracle<'a> {
         }
         for (number, light) in scene.lights.iter().enumerate() {
             if let LightDescription::Rectangle(light) = light {
-                let form = flat(light.center, light.normal, light.tangent, Some(light.size), flaw);
+                let form = flat(
+                    light.center,
+                    light.normal,
+                    tangent(light.normal, light.tangent),
+                    Some(light.size),
+                    flaw,
+                );
                 solids.push(Solid {
                     form,
                     shape: scene.shapes.len() + scene.instances.len() + number,
@@ -387,7 +393,7 @@ impl<'a> Oracle<'a> {
         let way = |to: DVec3| ((to - from).normalize(), (to - from).length());
         match light {
             LightDescription::Rectangle(light) => {
-                let (tangent, bitangent) = frame(light.normal, light.tangent);
+                let (tangent, bitangent) = frame(light.normal, tangent(light.normal, light.tangent));
                 let [width, height] = sizes(light.size, self.flaw);
                 let place =
                     |at: DVec2| light.center + tangent * (width * (at.x - 0.5)) + bitangent * (height * (at.y - 0.5));
@@ -456,10 +462,14 @@ fn flat(center: DVec3, normal: DVec3, tangent: DVec3, size: Option<[f64; 2]>, fl
     }
 }
 
-/// A disk; its u goes along x, or y where x is nearly its normal, unless the scene says otherwise.
+/// Returns the direction of u: x, or y where x is nearly the normal, unless the scene has another.
+fn tangent(normal: DVec3, own: Option<DVec3>) -> DVec3 {
+    let across = normal.normalize().x.abs() >= 0.9;
+    own.unwrap_or(if across { DVec3::Y } else { DVec3::X })
+}
+
 fn disk(d: &DiskDescription) -> Form {
-    let across = d.normal.normalize().x.abs() >= 0.9;
-    let (tangent, bitangent) = frame(d.normal, d.tangent.unwrap_or(if across { DVec3::Y } else { DVec3::X }));
+    let (tangent, bitangent) = frame(d.normal, tangent(d.normal, d.tangent));
     Form::Flat {
         center: d.center,
         tangent,
@@ -485,10 +495,19 @@ fn forms(shape: &ShapeDescription, flaw: Flaw) -> (String, Vec<Form>) {
     match shape {
         ShapeDescription::Rectangle(r) => (
             r.material.clone(),
-            vec![flat(r.center, r.normal, r.tangent, Some(r.size), flaw)],
+            vec![flat(
+                r.center,
+                r.normal,
+                tangent(r.normal, r.tangent),
+                Some(r.size),
+                flaw,
+            )],
         ),
         ShapeDescription::Disk(d) => (d.material.clone(), vec![disk(d)]),
-        ShapeDescription::Plane(p) => (p.material.clone(), vec![flat(p.point, p.normal, p.tangent, None, flaw)]),
+        ShapeDescription::Plane(p) => (
+            p.material.clone(),
+            vec![flat(p.point, p.normal, tangent(p.normal, p.tangent), None, flaw)],
+        ),
         ShapeDescription::Ellipsoid(e) => (e.material.clone(), vec![quadric(e.center, [e.a, e.b, e.c])]),
         ShapeDescription::Sphere(s) => {
             let axes = [DVec3::X * s.radius, DVec3::Y * s.radius, DVec3::Z * s.radius];

@@ -162,7 +162,7 @@ fn what_a_panorama_has_not_is_told() {
         ("up = [0, 1, 0]", "camera.look_at: [0, 1, 0] must not lie on the line"),
         (
             "path.keys = [{ frame = 1, fov = 40 }]",
-            "camera.path.keys[0].fov: must not be here: a camera of this type has no such value",
+            "camera.path.keys[0].fov: does not apply to a camera of this type",
         ),
         (
             "path.keys = [{ frame = 1 }]",

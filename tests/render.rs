@@ -67,7 +67,7 @@ pub fn small_scenes() -> Vec<(String, Packed)> {
     let small = |(name, mut d): (String, Description)| {
         let scale = d.image.width.max(d.image.height).div_ceil(100);
         (d.image.width, d.image.height) = (d.image.width / scale, d.image.height / scale);
-        d.render.pixel_samples = patterns::samples(d.render.pixel_samples.pattern(d.render.integrator), 4);
+        d.render.pixel_samples = patterns::samples(d.render.pixel_samples.pattern(d.integrator()), 4);
         (name, scenes::packed(&d))
     };
     scenes::descriptions().into_iter().map(small).collect()

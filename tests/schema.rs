@@ -362,8 +362,8 @@ integrator = "path"
 /// The program refuses these for what several values are together, or for what a name or a file is; the messages have one of these texts.
 const OF_SEVERAL: &[&str] = &[
     // names and files
-    "is no texture",
-    "is no material",
+    "there is no texture",
+    "there is no material",
     "is no mesh",
     "has no such group",
     ".file: ",
@@ -381,7 +381,7 @@ const OF_SEVERAL: &[&str] = &[
     "must be from 1 to 64",
     "must not be here",
     "must not be there",
-    "cannot stand beside",
+    "cannot be combined with",
     "is missing beside",
     "is missing, and",
     "needs a thickness",
@@ -394,12 +394,12 @@ const OF_SEVERAL: &[&str] = &[
     "and not below the count",
     "to cone_angle",
     "must not emit light",
-    "must be greater than that of the key before",
+    "must be greater than the frame of the previous key",
     "camera.path: at frame",
     // several numbers: places, directions, maps. Of lists of 0 alone, and of their lengths, the schema knows
     "must not be parallel",
     "must not lie",
-    "must not be the camera's position",
+    "must differ from the camera's position",
     "must not be where the light is",
     "must not be zero: its length",
     "must have a length from",
@@ -509,7 +509,7 @@ fn disagreement(scene: &Table, folder: &Path) -> Option<String> {
             None
         }
         // What the keys of a camera's path must have then.
-        (true, Err(message)) if message.contains(": camera.") && message.ends_with(": is missing") => {
+        (true, Err(message)) if message.contains(": camera.") && message.ends_with(" is missing") => {
             let has_path = scene["camera"].get("path").is_some();
             (!has_path).then(|| format!("the schema takes a camera without: {message}"))
         }

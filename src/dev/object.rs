@@ -233,14 +233,16 @@ impl SceneView {
         });
         let (line, text, more) = lines.unwrap_or_default();
         let mut fields = fields(path, &table, names);
+        let integrator = self.loaded.description.integrator();
         let render = &self.loaded.description.render;
         let counts = [
-            ("render.pixel_samples.count", &render.pixel_samples),
-            ("render.light_samples.count", &render.light_samples),
+            ("render.pixel_samples", &render.pixel_samples),
+            ("render.light_samples", &render.light_samples),
         ];
         for field in &mut fields {
-            let samples = counts.iter().find(|(path, _)| *path == field.path);
-            field.squares = samples.is_some_and(|(_, samples)| samples.pattern(render.integrator).needs_square());
+            let path = field.path.strip_suffix(".count").unwrap_or(&field.path);
+            let samples = counts.iter().find(|(own, _)| *own == path);
+            field.squares = samples.is_some_and(|(_, samples)| samples.pattern(integrator).needs_square());
             let of_field = field.path.parse().ok();
             if let Some(option) = of_field.and_then(|path| self.sources.overrides.in_place_of(&path)) {
                 field.fixed = Some(format!("{option} overrides the value of the file"));

@@ -65,7 +65,7 @@ pub(super) fn root(text: &[u8], notes: &mut Vec<String>) -> Result<Root, Fault> 
         let message = error.to_string();
         let message = message.split(" at line ").next().unwrap_or_default();
         let message = match message {
-            "recursion limit exceeded" => "lists and objects must be in each other at most 127 deep",
+            "recursion limit exceeded" => "lists and objects must be nested at most 127 levels deep",
             other => other,
         };
         Fault::new(Place::Line(error.line().max(1), error.column().max(1)), message)

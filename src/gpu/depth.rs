@@ -16,7 +16,7 @@ pub fn too_deep(text: &str) -> Option<(Range<usize>, String)> {
     let told = |at: usize, what: &str, most: usize| {
         Some((
             at..at + 1,
-            format!("{what} go deeper than {most} here, which is the most"),
+            format!("{what} must be nested at most {most} levels deep here"),
         ))
     };
     let mut depth = 0;
@@ -88,7 +88,7 @@ mod tests {
         for part in ["+x", ".x", "[0]", "<x", "+(x", "-f(x)", "+1.5"] {
             assert_eq!(too_deep(&of(part, 300)), None, "{part}");
             let (place, message) = too_deep(&of(part, 1001)).expect(part);
-            assert!(place.start > 500 && message.starts_with("operators go deeper than 1000"));
+            assert!(place.start > 500 && message.starts_with("operators must be nested at most 1000 levels deep"));
         }
         let of = |count: usize| format!("if a {{}} {} else {{}}", "else if b { x(); }\n ".repeat(count));
         assert_eq!(too_deep(&of(400)), None);

@@ -12,7 +12,7 @@ use crate::error::RenderError;
 
 /// What to do where there is no adapter.
 pub const HOW_TO_GET_VULKAN: &str =
-    "on Debian, 'apt-get install mesa-vulkan-drivers' brings software Vulkan (lavapipe)";
+    "on Debian, 'apt-get install mesa-vulkan-drivers' installs software Vulkan (lavapipe)";
 
 /// Which device a render asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -139,13 +139,13 @@ fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, String> {
         [] => {
             let there = listed(&everything);
             Err(format!(
-                "no adapter's name, driver or type contains '{name}'; there are {there}"
+                "no adapter's name, driver or type contains '{name}'; available: {there}"
             ))
         }
         [first, rest @ ..] if rest.iter().any(|i| infos[*i].name != infos[*first].name) => {
             let there = listed(&found);
             Err(format!(
-                "'{name}' means several adapters; more of a name or driver, or a number, says which: {there}"
+                "'{name}' matches several adapters; use a longer name, a driver or a number: {there}"
             ))
         }
         _ => Ok(found),
@@ -498,16 +498,20 @@ mod tests {
             assert!(none.contains(&format!("contains '{digit}'")), "{none}");
         }
         assert_eq!(found("15"), Ok(vec![4]), "a word of a name");
-        assert!(found("7900").unwrap_err().starts_with("'7900' means several adapters"));
+        assert!(
+            found("7900")
+                .unwrap_err()
+                .starts_with("'7900' matches several adapters")
+        );
         let several = found("discrete").unwrap_err();
         assert_eq!(
             several,
-            "'discrete' means several adapters; more of a name or driver, or a number, says which: 1: Radeon RX 7900, radv \
+            "'discrete' matches several adapters; use a longer name, a driver or a number: 1: Radeon RX 7900, radv \
              Mesa 25; 2: Radeon RX 7900 XT, radv Mesa 25"
         );
         let none = found("geforce").unwrap_err();
         assert!(
-            none.starts_with("no adapter's name, driver or type contains 'geforce'; there are 1: Radeon"),
+            none.starts_with("no adapter's name, driver or type contains 'geforce'; available: 1: Radeon"),
             "{none}"
         );
         assert_eq!(fitting(&infos, &Choice::Auto), Ok(vec![0, 1, 2, 3, 4]));

@@ -46,9 +46,11 @@ impl Fault {
 
     fn of_loss(reason: wgpu::DeviceLostReason, message: &str) -> Fault {
         match (reason, message) {
-            (wgpu::DeviceLostReason::Destroyed, _) => Fault::Lost("it was given up".to_string()),
+            (wgpu::DeviceLostReason::Destroyed, _) => Fault::Lost("it was released".to_string()),
             (_, NO_MEMORY) => Fault::Memory,
-            (_, LOST) => Fault::Lost("its driver ended it, as after a reset or a call that took too long".to_string()),
+            (_, LOST) => Fault::Lost(
+                "the driver ended it, for example after a reset or a dispatch that took too long".to_string(),
+            ),
             (_, other) => Fault::Lost(other.to_string()),
         }
     }
@@ -124,10 +126,10 @@ pub fn error_of_opening(device: &str, error: &dyn Error) -> RenderError {
     if says(NO_MEMORY_AT_OPENING) {
         RenderError::OutOfMemory {
             device: device.to_string(),
-            message: "its driver has none to open it with; the CPU has the machine's own memory".to_string(),
+            message: "the driver has too little to open it; use the CPU".to_string(),
         }
     } else if says(LOST_AT_OPENING) {
-        Fault::Lost("its driver does not open it".to_string()).into_error(device)
+        Fault::Lost("the driver does not open it".to_string()).into_error(device)
     } else {
         Fault::Other(error.to_string()).into_error(device)
     }

@@ -3,7 +3,7 @@
 use crate::error::RenderError;
 
 /// What a driver that has no more memory is taken to say, until it is known what for.
-pub const NO_MORE: &str = "its driver has no more";
+pub const NO_MORE: &str = "the driver has no more";
 
 /// What there is on a device, in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,7 +34,7 @@ impl Held {
 
     fn message(&self, asked: Option<&Asked>) -> String {
         let asked = match asked {
-            Some((what, bytes)) => format!("its driver has no {} MiB for {what}", mebibytes(*bytes)),
+            Some((what, bytes)) => format!("the driver has no {} MiB for {what}", mebibytes(*bytes)),
             None => NO_MORE.to_string(),
         };
         let there = [
@@ -49,11 +49,9 @@ impl Held {
             .collect();
         let beside = match there.is_empty() {
             true => String::new(),
-            false => format!(" beside {}", there.join(", ")),
+            false => format!(" in addition to {}", there.join(", ")),
         };
-        format!(
-            "{asked}{beside}; a crop or a smaller picture takes less there, and the CPU has the machine's own memory"
-        )
+        format!("{asked}{beside}; render a crop or a smaller image, or use the CPU")
     }
 }
 
@@ -82,15 +80,15 @@ mod tests {
         };
         let asked = ("a copy of it".to_string(), 64 << 20);
         let told = held.explain(error(NO_MORE), Some(&asked));
-        let rest = "a crop or a smaller picture takes less there, and the CPU has the machine's own memory";
+        let rest = "render a crop or a smaller image, or use the CPU";
         let line = format!(
-            "gpu: out of memory: its driver has no 64.0 MiB for a copy of it beside 1.5 for the scene, 64.0 for the \
+            "gpu: out of memory: the driver has no 64.0 MiB for a copy of it in addition to 1.5 for the scene, 64.0 for the \
              film; {rest}"
         );
         assert_eq!(told.to_string(), line);
         assert_eq!(held.explain(told, None).to_string(), line);
         let unknown = Held::default().explain(error(NO_MORE), None).to_string();
-        assert_eq!(unknown, format!("gpu: out of memory: its driver has no more; {rest}"));
+        assert_eq!(unknown, format!("gpu: out of memory: the driver has no more; {rest}"));
         let other = RenderError::Cancelled;
         assert!(matches!(held.explain(other, Some(&asked)), RenderError::Cancelled));
     }

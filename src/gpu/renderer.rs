@@ -48,7 +48,7 @@ pub struct Gpu {
     device: Device,
     kernels: Kernels,
     render: wgpu::ComputePipeline,
-    /// The kernel of first hits, once it was asked for.
+    /// The kernel of first hits, once requested.
     first_hits: Option<wgpu::ComputePipeline>,
     scene: SceneBuffers,
     work: wgpu::Buffer,

@@ -29,7 +29,7 @@ impl TexelParts {
         let sizes = [
             ("shapes", size_of_val(packed.primitives.as_slice())),
             ("shapes' bounds", size_of_val(packed.bounds.as_slice())),
-            ("trees", size_of::<UVec4>() * node_rows_count(packed)),
+            ("BVHs", size_of::<UVec4>() * node_rows_count(packed)),
             ("meshes", size_of::<UVec4>() * mesh_rows_count(packed)),
             ("materials, lights and textures", {
                 let (materials, lights) = (packed.materials.as_slice(), packed.lights.as_slice());
@@ -39,7 +39,7 @@ impl TexelParts {
         if let Some((name, size)) = sizes.into_iter().find(|(_, size)| *size as u64 > largest) {
             let (size, largest) = (mebibytes(size as u64), mebibytes(largest));
             return Err(too_large(format!(
-                "the scene's {name} take {size} MiB, a shader sees {largest} MiB of a buffer at most"
+                "the scene's {name} need {size} MiB; the limit of a buffer is {largest} MiB"
             )));
         }
         let shift = (largest / 4).max(1).ilog2().min(31);
@@ -48,7 +48,7 @@ impl TexelParts {
         if count > most {
             let (size, part) = (mebibytes(4 * packed.texels.len() as u64), mebibytes(4 << shift));
             return Err(too_large(format!(
-                "the scene's images take {size} MiB, a shader sees {most} x {part} MiB of them at most"
+                "the scene's images need {size} MiB; the limit is {most} x {part} MiB"
             )));
         }
         Ok(TexelParts { count, shift })
@@ -142,11 +142,11 @@ mod tests {
         let told = |info: Info, packed: &Packed| TexelParts::of(&info, packed).unwrap_err().to_string();
         assert_eq!(
             told(info(1 << 20, storage), &packed(1, (1 << 18) + 1)),
-            "small: the scene's images take 1.0 MiB, a shader sees 1 x 1.0 MiB of them at most; the CPU has no such limit"
+            "small: the scene's images need 1.0 MiB; the limit is 1 x 1.0 MiB; the CPU has no such limit"
         );
         assert_eq!(
             told(info(1 << 18, storage), &packed(5000, 0)),
-            "small: the scene's shapes take 0.4 MiB, a shader sees 0.2 MiB of a buffer at most; the CPU has no such limit"
+            "small: the scene's shapes need 0.4 MiB; the limit of a buffer is 0.2 MiB; the CPU has no such limit"
         );
         TexelParts::of(&info(1 << 18, storage), &packed(3000, 0)).unwrap();
     }

@@ -127,7 +127,7 @@ impl Aov {
     /// Why pictures by an integrator, under adaptive sampling or not, do not have it; `None` if they do.
     pub(crate) fn missing(self, integrator: Integrator, adaptive: bool) -> Option<&'static str> {
         match self.source(integrator) {
-            AovSource::Adaptive if !adaptive => Some("is known under adaptive sampling alone"),
+            AovSource::Adaptive if !adaptive => Some("needs adaptive sampling"),
             AovSource::Samples if integrator != Integrator::Path => Some("needs integrator = \"path\""),
             _ => None,
         }

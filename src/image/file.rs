@@ -150,7 +150,7 @@ fn nameless(to: File) -> io::Result<Spool> {
         let folder = folder.display();
         io::Error::new(
             error.kind(),
-            format!("it must first be whole in {folder} (TMPDIR): {error}"),
+            format!("cannot create a temporary file in {folder} (TMPDIR): {error}"),
         )
     });
     Ok(Spool::Nameless(spool?, to))

@@ -203,7 +203,7 @@ fn place(path: &Path) -> io::Result<Place> {
         let parent = fs::canonicalize(parent.unwrap_or(Path::new("."))).map_err(|error| match error.kind() {
             io::ErrorKind::NotFound => {
                 let parent = parent.unwrap_or(Path::new(".")).display();
-                io::Error::new(error.kind(), format!("the folder {parent} is not there"))
+                io::Error::new(error.kind(), format!("the folder {parent} does not exist"))
             }
             _ => error,
         })?;
@@ -226,7 +226,7 @@ fn place(path: &Path) -> io::Result<Place> {
         Ok(data) if data.is_dir() => Err(folder()),
         Ok(data) if data.is_file() => {
             if data.permissions().readonly() {
-                let message = "it is read-only; make it writable, or choose another name";
+                let message = "it is read-only; make it writable or choose another name";
                 return Err(io::Error::new(io::ErrorKind::PermissionDenied, message));
             }
             open(&path)?;

@@ -67,7 +67,7 @@ impl Format {
     pub fn check_size(self, width: u32, height: u32) -> Result<(), String> {
         match self.longest_side() {
             Some(most) if width.max(height) > most => Err(format!(
-                "{width} x {height} pixels are too many for {}, which has {most} along a side at most",
+                "{width} x {height} pixels are too many for {}; the limit is {most} along a side",
                 self.title()
             )),
             _ => Ok(()),

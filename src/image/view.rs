@@ -12,13 +12,13 @@ pub(super) type Rgb = [f64; 3];
 impl ViewSettings {
     /// What a display is sent for a linear colour: each from 0 to 1.
     pub fn display(&self, linear: [f32; 3]) -> [f64; 3] {
-        let light = self.exposed(linear);
-        match self.transform {
-            ViewTransform::Gamma22 => light.map(gamma22),
-            ViewTransform::Srgb => light.map(srgb),
-            ViewTransform::Agx => agx(light).map(srgb),
-            ViewTransform::KhronosPbrNeutral => khronos_pbr_neutral(light).map(srgb),
-        }
+        transformed(self.transform, self.exposed(linear))
+    }
+
+    /// Returns the light that is displayed as this color, 0 to 1 each, or nearly so if no light is.
+    pub(crate) fn light_of(&self, display: [f64; 3]) -> [f64; 3] {
+        let factor = self.exposure.exp2();
+        inverse(self.transform, display).map(|light| light / factor)
     }
 
     /// What a display is sent for a share of light, such as an albedo: its curve alone.
@@ -57,6 +57,42 @@ impl ViewSettings {
     pub fn is_srgb(&self) -> bool {
         self.transform != ViewTransform::Gamma22
     }
+}
+
+fn transformed(transform: ViewTransform, light: Rgb) -> Rgb {
+    match transform {
+        ViewTransform::Gamma22 => light.map(gamma22),
+        ViewTransform::Srgb => light.map(srgb),
+        ViewTransform::Agx => agx(light).map(srgb),
+        ViewTransform::KhronosPbrNeutral => khronos_pbr_neutral(light).map(srgb),
+    }
+}
+
+/// Solves `transformed(transform, light) == display` by bisection of one channel after the other, as each grows with its own light.
+fn inverse(transform: ViewTransform, display: Rgb) -> Rgb {
+    /// The maximum light of a channel. PBR Neutral only approaches white.
+    const MAX_LIGHT: f64 = 1e3;
+    /// A displayed value that is rounded to white in 8 bits.
+    const NEARLY_WHITE: f64 = 1.0 - 0.25 / 255.0;
+    const SWEEPS: usize = 100;
+    const BISECTIONS: usize = 60;
+    let [white, ..] = transformed(transform, [MAX_LIGHT; 3]);
+    let goal = display.map(|value| if value <= white { value } else { NEARLY_WHITE });
+    let mut light = [0.18; 3];
+    for _ in 0..SWEEPS {
+        for channel in 0..3 {
+            let (mut low, mut high) = (0.0, MAX_LIGHT);
+            for _ in 0..BISECTIONS {
+                light[channel] = 0.5 * (low + high);
+                match transformed(transform, light)[channel] < goal[channel] {
+                    true => low = light[channel],
+                    false => high = light[channel],
+                }
+            }
+            light[channel] = if goal[channel] > 0.0 { high } else { 0.0 };
+        }
+    }
+    light
 }
 
 /// A linear value as 8 bits by [`ViewTransform::Gamma22`]: clamped to [0, 1], raised to the power 1/2.2, times 255, rounded to
@@ -149,6 +185,32 @@ mod tests {
     /// The largest difference of two colours.
     fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
         a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn the_light_of_a_displayed_color_is_displayed_as_it() {
+        for transform in ViewTransform::ALL {
+            for exposure in [0.0, -2.0, 3.5] {
+                let view = ViewSettings { transform, exposure };
+                for color in [
+                    [255, 255, 255],
+                    [0, 0, 0],
+                    [128, 128, 128],
+                    [20, 20, 20],
+                    [254, 254, 254],
+                    [200, 180, 160],
+                    [90, 140, 200],
+                    [240, 230, 220],
+                ] {
+                    let light = view.light_of(color.map(|value| f64::from(value) / 255.0));
+                    let shown = view.rgb8(light.map(|value| value as f32));
+                    assert_eq!(shown, color, "{view:?}: {light:?}");
+                }
+            }
+        }
+        // The curve of sRGB is inverted exactly.
+        let srgb = view(ViewTransform::Srgb).light_of([1.0, 0.5, 0.0]);
+        assert!(apart(srgb, [1.0, 0.214_041_14, 0.0]) < 1e-8, "{srgb:?}");
     }
 
     /// In each of the standard's branches, and where they meet.

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::error::{At, Problem};
 use super::image_file::srgb_to_linear;
-use super::validate::color;
+use super::validate::{color, view};
 use super::{Description, EnvironmentDescription, EnvironmentName, Integrator};
 
 /// What the camera sees where nothing is, in place of what surrounds the scene.
@@ -18,6 +18,8 @@ pub enum Background {
     Transparent,
     /// This radiance, in linear RGB.
     Color(DVec3),
+    /// The radiance that the scene's view transform and exposure display as this color, 0 to 1 each.
+    Display(DVec3),
 }
 
 /// Puts other surroundings around a scene. Whether the camera sees them stays.
@@ -35,17 +37,22 @@ pub(super) fn surround(description: &mut Description, environment: &EnvironmentD
 impl Background {
     /// Lets the camera see this. The scene is lit as before.
     pub(super) fn show(self, description: &mut Description) -> Result<(), Problem> {
+        let is_path = description.integrator() == Integrator::Path;
+        let image = &description.image;
         let render = &mut description.render;
-        let is_path = render.integrator == Integrator::Path;
         match self {
-            Background::Transparent if is_path => {
+            Background::Transparent if is_path || render.integrator.is_none() => {
                 render.alpha = Some(true);
                 if let Some(environment) = &mut description.environment {
                     environment.background = None;
                 }
             }
             Background::Transparent => return Err(Problem::new("none needs integrator = \"path\"")),
-            Background::Color(seen) => {
+            Background::Color(_) | Background::Display(_) => {
+                let seen = match self {
+                    Background::Display(shown) => DVec3::from_array(view(image)?.light_of(shown.to_array())),
+                    Background::Color(seen) => seen,
+                };
                 let seen = color(seen)?;
                 if !is_path {
                     render.background = seen;
@@ -75,13 +82,14 @@ pub(super) fn of_option(problem: Problem) -> Result<Problem, Problem> {
 impl FromStr for Background {
     type Err = String;
 
-    /// `none`, or a colour.
+    /// `none`, or a color.
     fn from_str(text: &str) -> Result<Background, String> {
-        match (text, color_of(text)) {
-            ("none", _) => Ok(Background::Transparent),
-            (_, Some(color)) => Ok(Background::Color(color)),
-            _ => Err(format!("must be none or a color, {COLOR}")),
+        if text == "none" {
+            return Ok(Background::Transparent);
         }
+        let shown = display_of(text).map(Background::Display);
+        let found = shown.or_else(|| linear_of(text).map(Background::Color));
+        found.ok_or_else(|| format!("must be none or a color, {COLOR}"))
     }
 }
 
@@ -119,18 +127,24 @@ const COLOR_NAMES: [(&str, &str); 4] = [
     ("white", "#ffffff"),
 ];
 
-/// Parses a name or `#rrggbb`, decoded by the sRGB curve, or three linear numbers.
+/// Returns the linear RGB of a name or `#rrggbb`, by the curve of sRGB, or of three linear numbers.
 fn color_of(text: &str) -> Option<DVec3> {
+    let linear = |shown: DVec3| DVec3::from_array(shown.to_array().map(srgb_to_linear));
+    display_of(text).map(linear).or_else(|| linear_of(text))
+}
+
+/// Returns the display values, 0 to 1, of a name or `#rrggbb`.
+fn display_of(text: &str) -> Option<DVec3> {
     let named = COLOR_NAMES.into_iter().find(|(name, _)| *name == text);
-    let text = named.map_or(text, |(_, hex)| hex);
-    if let Some(digits) = text.strip_prefix('#') {
-        let is_hex = digits.len() == 6 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
-        let whole = u32::from_str_radix(digits, 16).ok().filter(|_| is_hex)?;
-        let [_, rgb @ ..] = whole.to_be_bytes();
-        return Some(DVec3::from_array(
-            rgb.map(|value| srgb_to_linear(f64::from(value) / 255.0)),
-        ));
-    }
+    let digits = named.map_or(text, |(_, hex)| hex).strip_prefix('#')?;
+    let is_hex = digits.len() == 6 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+    let whole = u32::from_str_radix(digits, 16).ok().filter(|_| is_hex)?;
+    let [_, rgb @ ..] = whole.to_be_bytes();
+    Some(DVec3::from_array(rgb.map(|value| f64::from(value) / 255.0)))
+}
+
+/// Returns three linear numbers.
+fn linear_of(text: &str) -> Option<DVec3> {
     let numbers: Vec<f64> = text
         .split(',')
         .map(|number| number.trim().parse().ok())
@@ -154,13 +168,12 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
 
     #[test]
     fn colours_are_those_of_displays_or_light() {
-        let shown = |text: &str| match text.parse::<Background>() {
-            Ok(Background::Color(color)) => color.to_array(),
-            other => panic!("{text}: {other:?}"),
-        };
+        let shown = |text: &str| color_of(text).unwrap().to_array();
         assert_eq!(shown("#ffffff"), [1.0; 3]);
         assert_eq!(shown("#000000"), [0.0; 3]);
         assert_eq!(shown("1,0.25, 20"), [1.0, 0.25, 20.0]);
+        assert_eq!("#ff0000".parse(), Ok(Background::Display(DVec3::X)));
+        assert_eq!("1,0,0".parse(), Ok(Background::Color(DVec3::X)));
         // IEC 61966-2-1 by hand: 0x80 is 128 / 255 = 0.50196, and ((0.50196 + 0.055) / 1.055)^2.4 = 0.21586.
         let [r, g, b] = shown("#8000Ff");
         assert!((r - 0.21586).abs() < 1e-5 && g == 0.0 && b == 1.0, "{r} {g} {b}");
@@ -245,6 +258,36 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
     }
 
     #[test]
+    fn a_display_color_is_what_the_view_shows() {
+        for (transform, exposure) in [
+            ("agx", 0.0),
+            ("khronos-pbr-neutral", 1.5),
+            ("srgb", -1.0),
+            ("gamma22", 0.0),
+        ] {
+            for integrator in ["path", "phong"] {
+                let text = SCENE.replace(
+                    "height = 3",
+                    &format!("height = 3, view_transform = '{transform}', exposure = {exposure}"),
+                );
+                for (color, expected) in [("#ffffff", [255; 3]), ("#6480a0", [100, 128, 160])] {
+                    let overrides = Overrides {
+                        background: Some(color.parse().unwrap()),
+                        ..Overrides::default()
+                    };
+                    let text = format!("{text}render.integrator = '{integrator}'\n");
+                    let scene = Scene::parse_with(&text, "s.toml", &overrides).unwrap();
+                    let seen = match &scene.environment {
+                        Some(environment) => environment.background.unwrap(),
+                        None => scene.render.background,
+                    };
+                    assert_eq!(scene.view.rgb8(seen.as_vec3().to_array()), expected, "{text}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn bad_surroundings_are_told_as_the_options_that_they_are() {
         let told = |more: &str, environment: Option<&str>, background: Option<&str>| {
             let overrides = Overrides {
@@ -254,10 +297,15 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
             };
             load(more, &overrides).unwrap_err()
         };
-        let path = "render.integrator = 'path'\n";
+        let (path, phong) = ("render.integrator = 'path'\n", "render.integrator = 'phong'\n");
         for (more, environment, background, wanted) in [
-            ("", Some("sky"), None, "environment: needs integrator = \"path\""),
-            ("", None, Some("none"), "background: none needs integrator = \"path\""),
+            (phong, Some("sky"), None, "environment: needs integrator = \"path\""),
+            (
+                phong,
+                None,
+                Some("none"),
+                "background: none needs integrator = \"path\"",
+            ),
             ("", None, Some("1,2,-1"), "background: -1 must be finite, from 0 to 1e6"),
             (
                 path,

@@ -85,7 +85,7 @@ impl CameraPath {
 
     /// The camera at a frame. The key of a problem is below `camera`.
     pub(super) fn at(&self, frame: f64) -> Result<Camera, Problem> {
-        let camera = self.description(frame).validate();
+        let camera = self.description(frame).validate_frame();
         camera.map_err(|problem| Problem::new(format!("at frame {frame}, {problem}")).at("path"))
     }
 }

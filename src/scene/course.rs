@@ -160,7 +160,7 @@ impl Broken {
                     .replace('`', "\"")
                     .replace(
                         "recursion limit exceeded",
-                        "lists and objects must be in each other at most 127 deep",
+                        "lists and objects must be nested at most 127 levels deep",
                     );
                 (
                     line,
@@ -179,7 +179,7 @@ impl Broken {
             Broken::Large => (
                 1,
                 1,
-                format!("a scene in JSON must not be larger than {} MiB", LARGEST >> 20),
+                format!("a JSON scene must not be larger than {} MiB", LARGEST >> 20),
             ),
         };
         SceneError::Syntax {
@@ -240,7 +240,10 @@ fn check(course: &Course) -> Result<(), Problem> {
     let mut names = BTreeMap::new();
     for (i, material) in materials.iter().enumerate() {
         if let Some(first) = names.insert(material.name.as_str(), i) {
-            let message = format!("{:?} is there twice, first in materials[{first}]", cut(&material.name));
+            let message = format!(
+                "{:?} is defined twice, first in materials[{first}]",
+                cut(&material.name)
+            );
             return Err(Problem::new(message).at("name").at(i).at("materials"));
         }
     }
@@ -286,7 +289,7 @@ fn description(course: &Course) -> Result<Description, Problem> {
         }),
     )
     .with_render(RenderDescription {
-        integrator: Integrator::Path,
+        integrator: Some(Integrator::Path),
         max_depth: *max_depth,
         pixel_samples: SamplesDescription::new(*spp),
         ..RenderDescription::default()

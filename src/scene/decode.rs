@@ -137,7 +137,7 @@ fn weigh(file: &[u8], (width, height): (u32, u32), bytes_of_texel: u64) -> Resul
     match bytes <= most {
         true => Ok(()),
         false => Err(Refused::Large(format!(
-            "has {width} x {height} texels, which take {bytes} bytes; of a file of {length} bytes they must take at most {most}"
+            "has {width} x {height} texels and needs {bytes} bytes; the limit for a file of {length} bytes is {most} bytes"
         ))),
     }
 }
@@ -150,7 +150,7 @@ fn weigh_blank(file: &[u8], (width, height): (u32, u32), stored: u64) -> Result<
     match bytes <= most {
         true => Ok(()),
         false => Err(Refused::Large(format!(
-            "shows {width} x {height} texels and stores {stored}; the others take {bytes} bytes; of a file of {length} bytes they must take at most {most}"
+            "declares {width} x {height} texels and stores {stored}; the rest needs {bytes} bytes; the limit for a file of {length} bytes is {most} bytes"
         ))),
     }
 }

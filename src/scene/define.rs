@@ -9,6 +9,7 @@ use toml_parser::lexer::TokenKind;
 
 use super::error::{KeyPath, Problem, Segment, cut};
 use super::parse::list;
+use super::suggest;
 
 /// A value for a key of a scene file: `KEY=VALUE`.
 ///
@@ -160,13 +161,13 @@ fn index(text: &str) -> Option<usize> {
 fn read_value(text: &str) -> Result<Value, String> {
     let text = text.trim();
     if text.is_empty() {
-        return Err("has no value after its =; \"\" is an empty text".to_owned());
+        return Err("has no value after the =; \"\" is an empty string".to_owned());
     }
     let read = format!("value = {text}").parse::<Table>();
     let error = match read {
         Ok(mut table) => match table.remove("value") {
             Some(value) if table.is_empty() => return Ok(value),
-            _ => "it goes on behind the value".to_owned(),
+            _ => "there is text after the value".to_owned(),
         },
         Err(error) => error.message().replace('`', "'"),
     };
@@ -260,7 +261,7 @@ impl<'a> Defines<'a> {
             path: key.0.clone(),
             own: key.0.len(),
         });
-        about(key, "is not in the scene".to_owned())
+        about(key, "does not exist".to_owned())
     }
 
     /// A key that no table of the file took.
@@ -279,6 +280,12 @@ fn is_step(written: &Segment, step: &Segment) -> bool {
     }
 }
 
+/// Whether the value at a path is a number of samples, which stands for a table.
+fn is_samples(path: &[Segment]) -> bool {
+    let names = ["pixel_samples", "light_samples"];
+    matches!(path, [Segment::Key(section), Segment::Key(key)] if section == "render" && names.contains(&key.as_str()))
+}
+
 /// Puts a value into a tree. Tables on the way are made where there are none, but for what has names of its own. Adds to `path`
 /// where it went, or how far; gives how much of that is no table that was there.
 fn put(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) -> Result<usize, String> {
@@ -287,6 +294,9 @@ fn put(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) 
     for (i, step) in key.iter().enumerate() {
         let is_last = i + 1 == key.len();
         let is_named = matches!(path.as_slice(), [Segment::Key(kind)] if ["textures", "materials", "meshes"].contains(&kind.as_str()));
+        if let (Value::Integer(count), true) = (&*value, is_samples(path)) {
+            *value = Value::Table(Table::from_iter([("count".to_owned(), Value::from(*count))]));
+        }
         let kind = kind_of(value);
         let next = match (value, step) {
             (Value::Table(table), Segment::Key(name)) => {
@@ -294,12 +304,17 @@ fn put(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) 
                 if !table.contains_key(name) {
                     if is_named && !is_last {
                         return Err(match table.is_empty() {
-                            true => "is not in the scene, which has none".to_owned(),
-                            false => format!("is not in the scene; the names there are {}", list(table.keys())),
+                            true => "does not exist; the scene has none".to_owned(),
+                            false => match suggest::hint(name, table.keys().map(String::as_str)) {
+                                hint if hint.is_empty() => {
+                                    format!("does not exist; the scene has {}", list(table.keys()))
+                                }
+                                hint => format!("does not exist{hint}"),
+                            },
                         });
                     }
                     if let Some(Segment::Index(_)) = key.get(i + 1) {
-                        return Err("is not in the scene, and so has no elements".to_owned());
+                        return Err("does not exist, so it has no elements".to_owned());
                     }
                     own.get_or_insert(path.len());
                     table.insert(name.clone(), Value::Table(Table::new()));
@@ -312,25 +327,25 @@ fn put(root: &mut Value, path: &mut Vec<Segment>, key: &[Segment], new: &Value) 
                     Segment::Key(name) => index(name),
                 };
                 let Some(number) = number else {
-                    return Err("is a list: the number of an element must follow, [0] for the first".to_owned());
+                    return Err("is a list; add the index of an element, such as [0]".to_owned());
                 };
                 path.push(Segment::Index(number));
                 let count = list.len();
                 match list.get_mut(number) {
-                    None => return Err(format!("is not in the scene; the list has {count}, counted from 0")),
+                    None => return Err(format!("does not exist; the list has {count} elements, counted from 0")),
                     found => found,
                 }
             }
             _ => {
                 return Err(format!(
-                    "is {kind}, which has no {step}",
+                    "is {kind} and has no {step}",
                     step = KeyPath(vec![step.clone()])
                 ));
             }
         };
         match next {
             Some(next) => value = next,
-            None => return Err("is not in the scene".to_owned()),
+            None => return Err("does not exist".to_owned()),
         }
     }
     *value = new.clone();
@@ -461,42 +476,45 @@ radius = 0.5
             ("camera.position[0]=1e10", "camera.position: 1e10 must be finite"),
             (
                 "camera.position[3]=1",
-                "camera.position[3]: is not in the scene; the list has 3, counted from 0",
+                "camera.position[3]: does not exist; the list has 3 elements, counted from 0",
             ),
             (
                 "camera.position.x=1",
-                "camera.position: is a list: the number of an element must follow",
+                "camera.position: is a list; add the index of an element",
             ),
-            ("camera.fov.x=1", "camera.fov: is a number, which has no x"),
-            ("camera[0]=1", "camera: is a table, which has no [0]"),
+            ("camera.fov.x=1", "camera.fov: is a number and has no x"),
+            ("camera[0]=1", "camera: is a table and has no [0]"),
             (
                 "shapes[2].radius=1",
-                "shapes[2]: is not in the scene; the list has 2, counted from 0",
+                "shapes[2]: does not exist; the list has 2 elements, counted from 0",
             ),
             (
                 "shapes[1].size=1",
-                "shapes[1].size: unknown key; the keys here are \"type\"",
+                "shapes[1].size: unknown key; expected one of \"type\"",
             ),
-            ("shapes.x=1", "shapes: is a list: the number of an element must follow"),
-            ("shapes[1].material=blue", "shapes[1].material: \"blue\" is no material"),
+            ("shapes.x=1", "shapes: is a list; add the index of an element"),
+            (
+                "shapes[1].material=blue",
+                "shapes[1].material: there is no material \"blue\"",
+            ),
             ("shapes[1]=3", "shapes[1]: 3 must be a table"),
             (
                 "lights[0].color=[1,1,1]",
-                "lights: is not in the scene, and so has no elements",
+                "lights: does not exist, so it has no elements",
             ),
             (
                 "materials.blue.color=[0,0,1]",
-                "materials.blue: is not in the scene; the names there are \"dark red\", \"red\"",
+                "materials.blue: does not exist; the scene has \"dark red\", \"red\"",
             ),
             (
                 "textures.a.file=a.png",
-                "textures.a: is not in the scene, which has none",
+                "textures.a: does not exist; the scene has none",
             ),
-            ("materials.blue={}", "materials.blue.type: is missing"),
+            ("materials.blue={}", "materials.blue.type is missing"),
             ("render.sed=1", "render.sed: unknown key"),
             ("rendr.seed=1", "rendr: unknown key"),
-            ("render.adaptive.max_samples=9", "render.adaptive.error: is missing"),
-            ("image={width=4}", "image.height: is missing"),
+            ("render.adaptive.max_samples=9", "render.adaptive.error is missing"),
+            ("image={width=4}", "image.height is missing"),
         ] {
             assert!(
                 told(define).starts_with(&format!("define.{message}")),
@@ -548,13 +566,13 @@ radius = 0.5
             assert!(message.ends_with(rule), "{text}: {message}");
         }
         for (text, message) in [
-            ("a=", "a: has no value after its =; \"\" is an empty text"),
-            ("a.b= ", "a.b: has no value after its ="),
+            ("a=", "a: has no value after the =; \"\" is an empty string"),
+            ("a.b= ", "a.b: has no value after the ="),
             ("a=[1, 2", "a: [1, 2 must be TOML: unclosed array"),
             ("a={x=1", "a: {x=1 must be TOML: "),
             ("a=\"x", "a: \"x must be TOML: "),
             ("a=[1] x", "a: [1] x must be TOML: "),
-            ("a=1\nb=2", "a: 1 b=2 must be TOML: it goes on behind the value"),
+            ("a=1\nb=2", "a: 1 b=2 must be TOML: there is text after the value"),
         ] {
             let told = text.parse::<Define>().unwrap_err().to_string();
             assert!(told.starts_with(message), "{text}: {told}");
@@ -622,11 +640,11 @@ radius = 0.5
         for (define, message) in [
             (
                 "shapes[999999].radius=1",
-                "define.shapes[999999].radius: is not in the scene",
+                "define.shapes[999999].radius: does not exist",
             ),
             (
                 "materials.blue.color=[1, 1, 1]",
-                "define.materials.blue.color: is not in the scene",
+                "define.materials.blue.color: does not exist",
             ),
             ("shapes[3].radius=-1", "define.shapes[3].radius: -1 must be"),
             ("shapes[3].size=-1", "define.shapes[3].size: unknown key"),

@@ -101,6 +101,8 @@ pub struct Problem {
     pub message: String,
     /// Whether it is damage to a file that the scene names, for which a stand-in exists ([`Assets::strict`](super::Assets::strict)).
     pub(crate) is_damage: bool,
+    /// Whether the key is the subject of the message, as in `camera.fov is missing`.
+    pub(super) is_predicate: bool,
 }
 
 impl From<String> for Problem {
@@ -125,6 +127,15 @@ impl Problem {
             key: KeyPath::default(),
             message: cut_to(LONGEST_MESSAGE, &message.into()).into_owned(),
             is_damage: false,
+            is_predicate: false,
+        }
+    }
+
+    /// Creates a problem whose message continues the key, such as `is missing`.
+    pub(super) fn predicate(message: impl Into<String>) -> Self {
+        Self {
+            is_predicate: true,
+            ..Self::new(message)
         }
     }
 
@@ -165,7 +176,8 @@ impl fmt::Display for Problem {
         if self.key.0.is_empty() {
             f.write_str(&self.message)
         } else {
-            write!(f, "{}: {}", self.key, self.message)
+            let colon = if self.is_predicate { "" } else { ":" };
+            write!(f, "{}{colon} {}", self.key, self.message)
         }
     }
 }

@@ -14,12 +14,12 @@ use super::error::{At, Problem, SceneError};
 use super::gltf::{GltfChoice, describe, is_gltf};
 #[cfg(feature = "dev")]
 use super::parse::Places;
-use super::parse::{NOT_UTF8, invalid, line_of_path, syntax_error};
+use super::parse::{NOT_UTF8, encoding, invalid, line_of_path, syntax_error};
 use super::turntable::turning;
 use super::validate::{LIGHT_SAMPLES, adaptive, adaptive_error, max_depth, sample_count, side};
 use super::{
     AdaptiveDescription, Assets, CameraPath, Description, EnvironmentDescription, Integrator, Pattern,
-    SamplesDescription, Scene,
+    SamplesDescription, Scene, ViewSettings, ViewTransform,
 };
 use crate::gltf::GltfError;
 use crate::waiting;
@@ -57,6 +57,10 @@ pub struct Overrides {
     pub environment: Option<EnvironmentDescription>,
     /// What the camera sees where nothing is.
     pub background: Option<Background>,
+    /// The view transform.
+    pub view_transform: Option<ViewTransform>,
+    /// The exposure in stops, -100 to 100.
+    pub exposure: Option<f64>,
     /// So many frames, 1 to 100,000, around what the camera looks at, in place of the way that it goes by itself: a picture of one is that of
     /// [`Overrides::frame`], from 1 on.
     pub turntable: Option<u32>,
@@ -74,9 +78,23 @@ impl Overrides {
             description.image.width = side(width).at("size")?;
             description.image.height = side(height).at("size")?;
         }
+        description.image.view_transform = self.view_transform.unwrap_or(description.image.view_transform);
+        if let Some(stops) = self.exposure {
+            let rule = |rule: String| Problem::of("exposure", format!("{stops} {rule}"));
+            description.image.exposure = ViewSettings::check_exposure(stops).map_err(rule)?;
+        }
+        if self.integrator.is_some() {
+            description.render.integrator = self.integrator;
+        }
+        // Before the settings, as they may decide the integrator.
+        if let Some(environment) = &self.environment {
+            surround(description, environment);
+        }
+        if let Some(background) = self.background {
+            background.show(description).at("background")?;
+        }
+        let integrator = description.integrator();
         let render = &mut description.render;
-        let integrator = self.integrator.unwrap_or(render.integrator);
-        render.integrator = integrator;
         if let Some(depth) = self.max_depth {
             render.max_depth = max_depth(depth, integrator).at("max_depth")?;
         }
@@ -92,12 +110,6 @@ impl Overrides {
             let further = AdaptiveDescription { error, max_samples };
             adaptive(&further, &render.pixel_samples, integrator).at("adaptive")?;
             render.adaptive = Some(further);
-        }
-        if let Some(environment) = &self.environment {
-            surround(description, environment);
-        }
-        if let Some(background) = self.background {
-            background.show(description).at("background")?;
         }
         if let Some(frames) = self.turntable
             && description.camera.validate().is_ok()
@@ -417,7 +429,16 @@ pub(crate) fn read_text(path: &Path) -> Result<String, SceneError> {
         let text = String::from_utf8_lossy(error.as_bytes());
         // Up to there the lossy text is the file's.
         let valid = error.utf8_error().valid_up_to();
-        syntax_error(&text, &path.display().to_string(), valid, NOT_UTF8)
+        let name = path.display().to_string();
+        match encoding(error.as_bytes()) {
+            Some(message) => SceneError::Syntax {
+                origin: name,
+                line: 1,
+                column: 1,
+                message,
+            },
+            None => syntax_error(&text, &name, valid, NOT_UTF8),
+        }
     })
 }
 
@@ -464,6 +485,8 @@ light_samples = { pattern = 'random', count = 5 }
             frame: None,
             environment: None,
             background: None,
+            view_transform: None,
+            exposure: None,
             turntable: None,
             strict: false,
             gltf: GltfChoice::default(),
@@ -544,7 +567,7 @@ light_samples = { pattern = 'random', count = 5 }
                     pixel_samples: Some(8),
                     ..none()
                 },
-                "pixel_samples: 8 must be a square number, as its pattern is n x n cells",
+                "pixel_samples: 8 must be a square number, because its pattern is an n x n grid",
             ),
             (
                 Overrides {
@@ -574,6 +597,17 @@ light_samples = { pattern = 'random', count = 5 }
             told("latin.toml"),
             format!("{}:2:5: not valid UTF-8", path("latin.toml"))
         );
+        for (name, bytes, encoding) in [
+            ("little.toml", &b"\xff\xfe[\0"[..], "UTF-16 (little-endian)"),
+            ("big.toml", b"\xfe\xff\0[", "UTF-16 (big-endian)"),
+        ] {
+            write(name, bytes);
+            let message = format!(
+                "{}:1:1: the file is encoded in {encoding}; save it as UTF-8",
+                path(name)
+            );
+            assert_eq!(told(name), message);
+        }
         assert!(told("none.toml").starts_with(&format!("{}: cannot be read: ", path("none.toml"))));
         File::create(folder.path().join("huge.toml"))
             .unwrap()

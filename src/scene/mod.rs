@@ -25,6 +25,7 @@ mod schema;
 mod sky;
 mod spline;
 mod studio;
+mod suggest;
 pub(crate) mod texture;
 mod turntable;
 mod validate;

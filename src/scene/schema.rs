@@ -57,7 +57,7 @@ fn without_kinds(schema: &mut Value) {
 pub(super) fn tagged(generator: &mut SchemaGenerator, shape: &str, types: Vec<(&str, &str, Schema)>) -> Schema {
     let tags: Vec<&str> = types.iter().map(|(tag, ..)| *tag).collect();
     let told: Vec<&str> = types.iter().map(|(_, told, _)| told.trim()).collect();
-    let key = json!({ "description": "Of what type it is.", "type": "string", "enum": tags, "enumDescriptions": told });
+    let key = json!({ "description": "The type.", "type": "string", "enum": tags, "enumDescriptions": told });
     // A condition for each type, so that a mistake is told at its key. Some editors complete by no conditions: for them alone all types
     // stand beside what everything is.
     let mut all = vec![json!({})];

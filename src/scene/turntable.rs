@@ -20,7 +20,7 @@ pub(super) fn turning(camera: &CameraDescription, frames: u32) -> Result<CameraD
         CameraDescription::Perspective(camera) => (camera.position, camera.look_at, camera.up),
         CameraDescription::Orthographic(camera) => (camera.position, camera.look_at, camera.up),
         CameraDescription::Panorama(_) => {
-            let rule = "needs a camera that looks at something, and a panorama looks everywhere";
+            let rule = "does not apply to a panorama camera, which has no orbit";
             return Err(Problem::new(rule));
         }
     };
@@ -102,6 +102,6 @@ mod tests {
         assert_eq!(told(camera(), 100_001), "100001 must be from 1 to 100000");
         turning(&camera(), 100_000).unwrap();
         let panorama = PanoramaDescription::new([0.0, -1.0, 0.0], [0.0; 3]).into();
-        assert!(told(panorama, 4).starts_with("needs a camera that looks at something"));
+        assert!(told(panorama, 4).starts_with("does not apply to a panorama camera"));
     }
 }

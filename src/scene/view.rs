@@ -59,7 +59,7 @@ impl ViewSettings {
     pub fn check_exposure(stops: f64) -> Result<f64, String> {
         match stops.abs() <= ViewSettings::MOST_STOPS {
             true => Ok(stops),
-            false => Err("must be stops from -100 to 100".to_owned()),
+            false => Err("must be from -100 to 100 stops".to_owned()),
         }
     }
 }

@@ -58,8 +58,8 @@ impl Description {
         for shape in &self.shapes {
             let is_gltf = matches!(shape, ShapeDescription::Gltf(_));
             let text = element("shapes", shape, if is_gltf { &defaults } else { &none })?;
-            let told = "# Its meshes with their materials, and its lights. A table `materials` may put materials of this file in place of\n\
-                        # its own, by their names.\n";
+            let told = "# Meshes with their materials, and lights. A table `materials` replaces materials of the file by those of\n\
+                        # this scene, by name.\n";
             sections.push(format!("{}{text}", if is_gltf { told } else { "" }));
         }
         for instance in &self.instances {
@@ -199,8 +199,8 @@ mod tests {
             "[image]\nwidth = 1024\nheight = 512\n\n\
              [camera]\ntype = \"perspective\"\nposition = [0.1, -5.0, 0.0000001]\nfov = 35.0\nlook_at = [0.0, 0.0, 0.0]\n\n\
              [render]\n\n[environment]\nname = \"studio\"\n\n\
-             # Its meshes with their materials, and its lights. A table `materials` may put materials of this file in place of\n\
-             # its own, by their names.\n\
+             # Meshes with their materials, and lights. A table `materials` replaces materials of the file by those of\n\
+             # this scene, by name.\n\
              [[shapes]]\ntype = \"gltf\"\nfile = \"a b.glb\"\n"
         );
         assert_eq!(Description::parse(&text, "s.toml").unwrap(), description);

@@ -41,10 +41,7 @@ fn wrong_command_lines_exit_with_2() {
         (&["--device", ""], "--device"),
         (&["--threads", "0"], "--threads"),
         (&["--aov", "normal,colour"], "colour"),
-        (
-            &["--aov", "variance"],
-            "--aov variance: is known under adaptive sampling alone",
-        ),
+        (&["--aov", "variance"], "--aov variance: needs adaptive sampling"),
         (&["--pixel-pattern", "hexagonal"], "hexagonal"),
         (
             &["--pixel-pattern", "sobol", "--adaptive", "2"],

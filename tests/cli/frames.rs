@@ -296,7 +296,7 @@ fn a_camera_without_a_view_is_refused_before_anything_is_rendered() {
     let place = Place::new();
     let path = "fov = 40, path.keys = [{ frame = 1, position = [0, -5, 1] }, { frame = 7, position = [0, 5, 1] }] }";
     place.write("through.toml", &SCENE.replace("fov = 40 }", path));
-    let told = "through.toml:2: camera.path: at frame 4, look_at: [0, 0, 1] must not be the camera's position";
+    let told = "through.toml:2: camera.path: at frame 4, look_at: [0, 0, 1] must differ from the camera's position";
     refused(&place, &["through.toml", "--frames", "1-7", "-o", "#.png"], 3, told);
     quietly(&place, &["through.toml", "--frames", "1-7:2", "-o", "#.png"]);
     let ran = place.run(&["check", "through.toml"]);
@@ -455,21 +455,21 @@ fn bad_defines_are_told() {
         ),
         (
             "shapes[7].radius=1",
-            "error: --define shapes[7]: is not in the scene; the list has 2, counted from 0\n",
+            "error: --define shapes[7]: does not exist; the list has 2 elements, counted from 0\n",
         ),
         (
             "materials.grey.color=[1,1,1]",
-            "error: --define materials.grey: is not in the scene; the names there are \"gray\"\n",
+            "error: --define materials.grey: does not exist; the scene has \"gray\"\n",
         ),
         (
             "film.iso=100",
-            "error: --define film: unknown key; the keys here are \"image\"",
+            "error: --define film: unknown key; expected one of \"image\"",
         ),
         (
             "render",
             "render must be KEY=VALUE, such as render.seed=3 or shapes[2].radius=0.5",
         ),
-        ("render.seed=", "render.seed: has no value after its ="),
+        ("render.seed=", "render.seed: has no value after the ="),
     ] {
         refused(&place, &["small.toml", "-o", "x.png", "--define", define], 2, told);
         let ran = place.run(&["check", "small.toml", "--define", define]);
@@ -527,7 +527,7 @@ fn scenes_in_json_take_frames_and_defines_of_their_own_keys() {
         &place,
         &["a.json", "-D", "camera.fov=3"],
         2,
-        "--define camera: unknown key; the keys here are \"spp\"",
+        "--define camera: unknown key; expected one of \"spp\"",
     );
     let ran = place.run(&[&["render", "a.json", "--frames", "1-2", "-o", "f#.exr"], &CPU[..]].concat());
     assert_eq!(ran.code, 0);

@@ -36,7 +36,7 @@ fn things_are_counted() {
     assert_eq!(small["lights"]["by_type"], serde_json::json!({ "rectangle": 1 }));
     assert_eq!(
         (&small["device"]["name"], &small["device"]["why"]),
-        (&"cpu".into(), &"it was asked for".into())
+        (&"cpu".into(), &"requested".into())
     );
     assert_eq!(
         (&small["kernel"]["compiled"], &small["memory"]["scene_on_device"]),
@@ -65,7 +65,7 @@ fn things_are_counted() {
     let shapes = &tube["shapes"];
     assert!(
         shapes["triangles"].as_u64() > shapes["mesh_triangles"].as_u64(),
-        "a mesh is there twice: {shapes}"
+        "a mesh is defined twice: {shapes}"
     );
     assert_eq!(
         shapes["triangles"], shapes["placed_mesh_triangles"],

@@ -165,12 +165,12 @@ fn values_of_a_wrong_kind_are_told_with_the_right_kind() {
         (
             samples,
             "shadow_epsilon = .5",
-            "bad.toml:6:18: render.shadow_epsilon: .5 must have a digit before its point, as 0.5 has",
+            "bad.toml:6:18: render.shadow_epsilon: .5 must have a digit before the decimal point: 0.5",
         ),
         (
             samples,
             "seed = 1\nseed = 2",
-            "bad.toml:7:1: render.seed: is there twice, first in line 6; one must go",
+            "bad.toml:7:1: render.seed: is defined twice, first on line 6; remove one",
         ),
     ] {
         let found = told(from, to);

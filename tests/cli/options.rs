@@ -59,12 +59,12 @@ fn an_integrator_stands_in_for_the_scenes() {
     let told: Vec<&str> = ran.stderr.lines().collect();
     assert_eq!(told.len(), 2, "{}", ran.stderr);
     assert!(
-        told[0].starts_with("warning: small.toml: render.ambient: without effect"),
+        told[0].starts_with("warning: small.toml: render.ambient: no effect"),
         "{}",
         told[0]
     );
     assert!(
-        told[1].starts_with("warning: small.toml: render.light_samples: without effect"),
+        told[1].starts_with("warning: small.toml: render.light_samples: no effect"),
         "{}",
         told[1]
     );

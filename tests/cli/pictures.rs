@@ -203,7 +203,7 @@ fn the_scene_says_how_it_is_shown_and_options_stand_in() {
         of_scene.2
     );
     for (keys, told) in [
-        ("exposure = 101", "image.exposure: 101 must be stops from -100 to 100"),
+        ("exposure = 101", "image.exposure: 101 must be from -100 to 100 stops"),
         ("exposure = nan", "image.exposure: NaN must be stops"),
         ("view_transform = 'filmic'", "image.view_transform: "),
         ("view = 'srgb'", "view"),

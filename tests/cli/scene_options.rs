@@ -111,7 +111,10 @@ fn a_background_is_seen_and_lights_nothing() {
 #[test]
 fn surroundings_that_cannot_be_are_told_as_options() {
     let place = ball();
-    place.write("small.toml", SCENE);
+    place.write(
+        "small.toml",
+        &SCENE.replace("[render]", "[render]\nintegrator = 'phong'"),
+    );
     place.write("text.hdr", "no image");
     for (arguments, told) in [
         (["ball.toml", "--environment", "none.hdr"], "--environment: \""),
@@ -166,8 +169,7 @@ fn surroundings_that_cannot_be_are_told_as_options() {
     let ran = place.run(&["render", "panorama.toml", "--turntable", "4"]);
     assert_eq!(ran.code, 2, "{}", ran.stderr);
     assert!(
-        ran.stderr
-            .contains("--turntable: needs a camera that looks at something"),
+        ran.stderr.contains("--turntable: does not apply to a panorama camera"),
         "{}",
         ran.stderr
     );

@@ -98,7 +98,7 @@ fn layers_are_those_that_render_gives_and_light_is_their_sum() {
         if scene == path() {
             let notice = running.wait("a notice", |running| running.state().notice.clone());
             assert!(
-                notice.bad && notice.text == "view `variance`: is known under adaptive sampling alone",
+                notice.bad && notice.text == "view `variance`: needs adaptive sampling",
                 "{}",
                 notice.text
             );
@@ -157,7 +157,7 @@ fn what_a_scene_does_not_have_is_refused_and_an_edit_changes_that() {
     let running = files.start();
     running.wait_rendered(&files);
     let of_paths = [View::Albedo, View::Direct, View::Indirect, View::Emission];
-    let variance = (View::Variance, "is known under adaptive sampling alone");
+    let variance = (View::Variance, "needs adaptive sampling");
     let missing = of_paths.map(|view| (view, "needs integrator = \"path\""));
     assert_eq!(running.state().missing_views, [&missing[..], &[variance]].concat());
     running.session.send(Command::View(View::Direct));

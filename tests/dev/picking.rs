@@ -191,12 +191,12 @@ materials = {{ leaf = 'leaf' }}
         (
             "shapes[0].materials.leaf",
             json!("bark"),
-            "must be one of the names that it may have",
+            "must be one of the allowed names",
         ),
         (
             "shapes[0].file",
             json!("other.obj"),
-            "names and files are changed in the scene file itself",
+            "names and files can only be changed in the scene file",
         ),
         ("materials.bark.color", json!([1, 1, 1]), "cannot be changed"),
     ] {

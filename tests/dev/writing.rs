@@ -192,11 +192,7 @@ fn a_value_that_breaks_a_rule_is_refused_and_the_file_stays() {
         ("camera.look_at", Value::Null, "is required"),
         ("shapes[1].normal", json!([1, 0, 0]), "must not be parallel"),
         ("shapes[1].normal", json!([1, 0]), "must be a list of 3 numbers"),
-        (
-            "shapes[0].material",
-            json!("blue"),
-            "must be one of the names that it may have",
-        ),
+        ("shapes[0].material", json!("blue"), "must be one of the allowed names"),
         ("render.pixel_samples.count", json!(5), "must be a square number"),
         ("render.pixel_samples.count", json!(2.5), "must be a whole number"),
         ("image.width", json!(70_000), "must be from 1 to 65536"),

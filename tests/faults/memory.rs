@@ -4,7 +4,7 @@ use crate::place::Place;
 
 use super::driver::{Ran, SCENE, driver};
 
-const ADVICE: &str = "; a crop or a smaller picture takes less there, and the CPU has the machine's own memory \
+const ADVICE: &str = "; render a crop or a smaller image, or use the CPU \
                       (--crop, --size, --device cpu)\n";
 
 /// Holds a run to one error for want of memory that tells this.
@@ -25,7 +25,7 @@ fn a_film_that_does_not_fit_tells_its_size() {
     let expected = place.expected(driver, &large);
     let ran = place.run_on(driver, &[large, gpu].concat(), &[("FAULTS_LARGEST", "8388608")]);
     let parts = [
-        ": out of memory: its driver has no 16.0 MiB for a film of 1024 x 1024 pixels",
+        ": out of memory: the driver has no 16.0 MiB for a film of 1024 x 1024 pixels",
         ADVICE,
     ];
     told(&ran, &parts);
@@ -68,7 +68,7 @@ fn memory_that_runs_out_anywhere_is_told_or_leaves_the_work_to_the_cpu() {
         let ran = place.run_on(driver, &[large, ["--device", "gpu"]].concat(), &faults);
         // How many there are depends on how fast it goes.
         if ran.log.iter().any(|line| line.ends_with("refused")) {
-            told(&ran, &[": out of memory: its driver has n"]);
+            told(&ran, &[": out of memory: the driver has n"]);
             refused += 1;
         } else {
             assert_eq!(ran.code, 0, "{from}: {}", ran.stderr);
@@ -93,7 +93,7 @@ fn a_scene_that_does_not_fit_tells_its_size() {
     let ran = place.run_on(driver, &["--device", "gpu"], &limit);
     told(
         &ran,
-        &[": out of memory: its driver has no 5.3 MiB for the scene; ", ADVICE],
+        &[": out of memory: the driver has no 5.3 MiB for the scene; ", ADVICE],
     );
     let ran = place.run_on(driver, &["--device", "gpu"], &[]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
@@ -108,12 +108,12 @@ fn a_call_that_has_no_memory_is_no_loss() {
     for submit in ["1", "2", "3", "4", "5"] {
         let faults = [("FAULTS_NO_MEMORY_IN", submit)];
         let ran = place.run_on(driver, &["--device", "gpu"], &faults);
-        told(&ran, &[": out of memory: its driver has no "]);
+        told(&ran, &[": out of memory: the driver has no "]);
         let ran = place.run_on(driver, &["--device", "auto"], &faults);
         assert_eq!((ran.code, ran.lines().len()), (0, 1), "{submit}: {}", ran.stderr);
         assert!(ran.picture.as_ref() == Some(&expected), "{submit}");
     }
     let refused = [("FAULTS_REFUSE_FIRST", "1"), ("FAULTS_REFUSE_WITH", "-2")];
     let ran = place.run_on(driver, &["--device", "gpu"], &refused);
-    told(&ran, &[": out of memory: its driver has none to open it with; "]);
+    told(&ran, &[": out of memory: the driver has none to open it with; "]);
 }

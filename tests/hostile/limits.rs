@@ -220,7 +220,7 @@ fn images_that_grow_a_thousandfold_are_told() {
     json["bufferViews"][1]["byteLength"] = json!(deep.len());
     json["meshes"][0]["primitives"] = json!([primitive(0)]);
     json["materials"] = json!([slots(0)]);
-    refused(&json, &binary, "they must take at most ");
+    refused(&json, &binary, "; the limit for a file of ");
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("deep.png"), &deep).unwrap();
     let ran = run(folder.path(), &["diff", "deep.png", "deep.png"]);
@@ -255,7 +255,7 @@ fn windows_of_exr_files_are_refused_by_their_headers() {
             2..4,
             3999,
             3,
-            "shows 4000 x 4000 texels and stores 48; the others take ",
+            "declares 4000 x 4000 texels and stores 48; the rest needs ",
         ),
     ] {
         let mut file = sound.clone();
@@ -335,7 +335,7 @@ fn texts_that_go_deep_or_on_for_ever_are_told() {
     let deep = 100_000;
     let dots = vec!["a"; deep].join(".");
     let rule = "at most 80 deep";
-    let json = "lists and objects must be in each other at most 127 deep";
+    let json = "lists and objects must be nested at most 127 levels deep";
     for (name, text, told) in [
         ("a.toml", format!("x = {}{}", "[".repeat(deep), "]".repeat(deep)), rule),
         (

@@ -405,32 +405,32 @@ fn factors_and_sets_that_cannot_be_are_told() {
         (
             "base_color = { texture = 't' }",
             SHAPE,
-            "materials.m.base_color: its texture's factor is 1.5, and must be from 0 to 1 here",
+            "materials.m.base_color: the texture's factor of 1.5 must be from 0 to 1 here",
         ),
         (
             "sheen_color = { texture = 't' }",
             SHAPE,
-            "materials.m.sheen_color: its texture's factor is 1.5, and must be from 0 to 1 here",
+            "materials.m.sheen_color: the texture's factor of 1.5 must be from 0 to 1 here",
         ),
         (
             "roughness = { texture = 't', channel = 'g' }",
             SHAPE,
-            "materials.m.roughness: its texture's factor is 1.5, and must be from 0 to 1 here",
+            "materials.m.roughness: the texture's factor of 1.5 must be from 0 to 1 here",
         ),
         (
             "alpha_mode = 'mask', alpha = { texture = 't', channel = 'a' }",
             SHAPE,
-            "materials.m.alpha: its texture's factor is 3, and must be from 0 to 1 here",
+            "materials.m.alpha: the texture's factor of 3 must be from 0 to 1 here",
         ),
         (
             "normal_map = { texture = 't' }",
             SHAPE,
-            "materials.m.normal_map.texture: \"t\" must have no factor to be a normal map; its strength is the map's own",
+            "materials.m.normal_map.texture: \"t\" must have no factor as a normal map; use strength instead",
         ),
         (
             "base_color = { texture = 'second' }",
             sphere,
-            "shapes[0].material: \"m\" must have no texture with uv_set = 1 here, as this shape has the set 0 alone",
+            "shapes[0].material: \"m\" must have no texture with uv_set = 1 here, because this shape has only the set 0",
         ),
     ] {
         let message = message(keys, shape);

@@ -83,10 +83,10 @@ fn what_is_wrong_is_told_with_its_place() {
     .unwrap();
     let rule = "the values of each must be finite, from 0 to 1e6";
     for (environment, told) in [
-        ("", "4: environment: must have one of \"color\", \"file\" and \"name\"".to_owned()),
+        ("", "4: environment: must have exactly one of \"color\", \"file\" and \"name\"".to_owned()),
         (
             "color = [1, 1, 1]\nfile = 'good.exr'",
-            "4: environment: must have one of \"color\", \"file\" and \"name\"".to_owned(),
+            "4: environment: must have exactly one of \"color\", \"file\" and \"name\"".to_owned(),
         ),
         (
             "file = 'nan.exr'",

@@ -462,7 +462,7 @@ fn what_breaks_a_rule_is_told() {
         ("base_color = [1.1, 0, 0]", "materials.m.base_color: 1.1 must be"),
         (
             "attenuation_color = [0.5, 1, 1]\nthickness = 1",
-            "materials.m.attenuation_distance: is missing",
+            "materials.m.attenuation_distance is missing",
         ),
         (
             "attenuation_color = [0.5, 1, 1]\nattenuation_distance = 1",
@@ -487,7 +487,7 @@ fn what_breaks_a_rule_is_told() {
         ),
         (
             "alpha = { texture = 'u', channel = 'a' }",
-            "materials.m.alpha.texture: \"u\" is no texture",
+            "materials.m.alpha.texture: there is no texture \"u\"",
         ),
         (
             "clearcoat_normal_map = { texture = 't' }",

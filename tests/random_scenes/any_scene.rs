@@ -93,7 +93,7 @@ fn light() -> impl Strategy<Value = LightDescription> {
                 center,
                 size,
                 normal,
-                tangent,
+                tangent: Some(tangent),
                 color,
             })
         });
@@ -277,7 +277,7 @@ fn described(
                         d.render.background = DVec3::ZERO;
                         d.environment = Some(environment);
                     }
-                    d.render.integrator = Integrator::Path;
+                    d.render.integrator = Some(Integrator::Path);
                     d.render.max_depth = paths.max_depth;
                     d.render.rr_depth = paths.rr_depth;
                     d.render.clamp = paths.clamp;

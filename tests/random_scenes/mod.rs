@@ -99,8 +99,9 @@ fn random_scenes_of_many_samples_are_the_same() {
     for case in 0..5 {
         let mut d = strategy.new_tree(&mut runner).expect("a scene").current();
         (d.image.width, d.image.height) = (3, 2);
+        let integrator = d.integrator();
         let (pixel, light) = (&d.render.pixel_samples, &d.render.light_samples);
-        let [pixel, light] = [pixel, light].map(|samples| samples.pattern(d.render.integrator));
+        let [pixel, light] = [pixel, light].map(|samples| samples.pattern(integrator));
         d.render.light_samples = patterns::samples(light, 256);
         match &mut d.render.adaptive {
             Some(adaptive) => adaptive.max_samples = Some(1024),

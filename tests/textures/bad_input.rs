@@ -110,7 +110,7 @@ fn bad_images_are_told() {
         ),
         (
             "large.png",
-            "16384 x 16384 texels, takes 1365.3 MiB, the textures before it 0.0 MiB; together they must fit 1024.0 MiB",
+            "(16384 x 16384 texels) needs 1365.3 MiB and the textures before it 0.0 MiB; the limit is 1024.0 MiB",
         ),
         ("/etc/hostname", "must not leave "),
         ("../", "must not leave "),
@@ -173,8 +173,8 @@ fn all_images_together_must_fit() {
     let small = texture("a", "a.png", "nearest");
     assert_eq!(
         told(&(small.clone() + &texture("b", "huge.png", "nearest"))),
-        "10: textures.b.file: \"huge.png\", 16384 x 16384 texels, takes 1024.0 MiB, the textures before it 1.0 MiB; \
-         together they must fit 1024.0 MiB"
+        "10: textures.b.file: \"huge.png\" (16384 x 16384 texels) needs 1024.0 MiB and the textures before it 1.0 MiB; \
+         the limit is 1024.0 MiB"
     );
     // What fits is decoded, and then is too short for its header.
     assert!(told(&texture("b", "fits.png", "ewa")).contains("is damaged or truncated"));
@@ -310,11 +310,11 @@ fn bad_values_are_told() {
         ),
         (
             format!("{image}scale = [1, 0]"),
-            "6: textures.t.scale: [1, 0] must be finite and not 0: from 1e-6 to 1e6, or negative",
+            "6: textures.t.scale: [1, 0] must be nonzero, with magnitudes from 1e-6 to 1e6",
         ),
         (
             format!("{image}scale = [inf, 1]"),
-            "6: textures.t.scale: [inf, 1] must be finite and not 0: from 1e-6 to 1e6, or negative",
+            "6: textures.t.scale: [inf, 1] must be nonzero, with magnitudes from 1e-6 to 1e6",
         ),
         (
             format!("{image}offset = [0, 2e6]"),
@@ -325,7 +325,7 @@ fn bad_values_are_told() {
             "6: textures.t.rotate: 400 must be from -360 to 360",
         ),
         (format!("{image}blur = 1"), "6: textures.t.blur: unknown key"),
-        ("[textures.t]\ntype = 'image'".into(), "3: textures.t.file: is missing"),
+        ("[textures.t]\ntype = 'image'".into(), "3: textures.t.file is missing"),
         (
             "[textures.t]\ntype = 'image'\nfile = 'good.exr'\nencoding = 'srgb'".into(),
             "5: textures.t.file: \"good.exr\" must not be \"srgb\": files of type EXR are linear",
@@ -352,11 +352,11 @@ fn bad_values_are_told() {
         ),
         (
             "[materials.m]\ntype = 'phong'\ncolor = { texture = 't' }".into(),
-            "5: materials.m.color.texture: \"t\" is no texture; the file has none",
+            "5: materials.m.color.texture: there is no texture \"t\"; the scene has none",
         ),
         (
             format!("{image}[materials.m]\ntype = 'phong'\ncolor = {{ texture = 'u' }}"),
-            "8: materials.m.color.texture: \"u\" is no texture; there are \"t\"",
+            "8: materials.m.color.texture: there is no texture \"u\"; the scene has \"t\"",
         ),
         (
             "[materials.m]\ntype = 'phong'\ncolor = 'red'".into(),
@@ -372,7 +372,7 @@ fn bad_values_are_told() {
         ),
         (
             "[materials.m]\ntype = 'phong'\ncolor = { texture = 't', tint = 1 }".into(),
-            "5: materials.m.color.tint: unknown key; the keys here are \"texture\"",
+            "5: materials.m.color.tint: unknown key; expected one of \"texture\"",
         ),
         (
             "[materials.m]\ntype = 'glass'\nior = 0".into(),
@@ -386,7 +386,7 @@ fn bad_values_are_told() {
             "[materials.m]\ntype = 'glass'\nior = nan".into(),
             "5: materials.m.ior: nan must be from 0.01 to 100",
         ),
-        ("[materials.m]\ntype = 'glass'".into(), "3: materials.m.ior: is missing"),
+        ("[materials.m]\ntype = 'glass'".into(), "3: materials.m.ior is missing"),
         (
             "[materials.m]\ntype = 'mirror'\ntint = [1, 1, 2]".into(),
             "5: materials.m.tint: 2 must be from 0 to 1",
@@ -405,7 +405,7 @@ fn bad_values_are_told() {
         ),
         (
             format!("{image}{mapped}"),
-            "9: materials.m.normal_map.texture: \"t\" must have encoding = \"linear\" to be a normal map",
+            "9: materials.m.normal_map.texture: \"t\" must have encoding = \"linear\" as a normal map",
         ),
         (
             format!("{checker}{mapped}"),
@@ -413,7 +413,7 @@ fn bad_values_are_told() {
         ),
         (
             format!("{linear}{mapped}{triangle}"),
-            "13: shapes[0].material: \"m\" must have no normal map here, as the sides of this shape have no tangents",
+            "13: shapes[0].material: \"m\" must have no normal map here, because this shape has no tangents",
         ),
         (
             format!("{linear}{}", mapped.replace("'t'", "'t', strength = -101")),
@@ -479,7 +479,7 @@ fn alpha_is_that_of_an_image() {
                 "type = 'checker'\neven = [0, 0, 0]\nodd = [1, 1, 1]",
                 "type = 'grid'\ncell = [0, 0, 0]\nline = [1, 1, 1]\nline_width = 0.1",
             ] {
-                let rule = "\"t\" must be a texture of type \"image\" to have alpha";
+                let rule = "\"t\" must be a texture of type \"image\" to have an alpha channel";
                 assert_eq!(scene(texture).unwrap_err(), told(rule), "{kind}");
             }
             let rule = "\"opaque.png\" must have an alpha channel";

@@ -256,6 +256,8 @@ impl Args {
             integrator: self.integrator,
             max_depth: self.max_depth,
             asset_root: self.asset_root.clone(),
+            view_transform: self.pictures.view_transform,
+            exposure: self.pictures.exposure,
             turntable: self.turntable,
             define: self.define.clone(),
             ..Overrides::default()

@@ -246,7 +246,7 @@ fn overrides_stand_in_for_the_files_values() {
     };
     assert_eq!(
         told(&overrides),
-        "pixel_samples: 5 must be a square number, as its pattern is n x n cells"
+        "pixel_samples: 5 must be a square number, because its pattern is an n x n grid"
     );
     let overrides = |integrator, max_depth| Overrides {
         integrator,
@@ -285,7 +285,7 @@ fn defines_have_the_files_own_keys() {
     for (define, told) in [
         ("spp=0", "define.spp: 0 must be from 1 to 65536"),
         ("spp=many", "define.spp: \"many\" must be a whole number"),
-        ("render.seed=3", "define.render: unknown key; the keys here are \"spp\""),
+        ("render.seed=3", "define.render: unknown key; expected one of \"spp\""),
         ("cam_config.fov=3", "define.cam_config.fov: unknown key"),
         (
             "cam_config.vertical_fov=180",
@@ -294,7 +294,7 @@ fn defines_have_the_files_own_keys() {
         ("materials[0].color=[2, 0, 0]", "define.materials[0].color: "),
         (
             "materials[9].color=[2, 0, 0]",
-            "define.materials[9]: is not in the scene; the list has",
+            "define.materials[9]: does not exist; the list has",
         ),
         (
             "materials.first.color=[2, 0, 0]",
@@ -360,10 +360,10 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "\"spp\": 256,",
         "\"spp\": 256, \"SPP\": 16,",
-        "2:22: SPP: unknown key; the keys here are \"spp\", \"max_depth\", \"image_resolution\", \"cam_config\", \
+        "2:22: SPP: unknown key; expected one of \"spp\", \"max_depth\", \"image_resolution\", \"cam_config\", \
          \"light_config\", \"materials\", \"objects\"",
     ),
-    ("  \"spp\": 256,\n", "", "1:1: spp: is missing"),
+    ("  \"spp\": 256,\n", "", "1:1: spp is missing"),
     (
         "\"vertical_fov\": 19.5,\n    ",
         "\"é\": 19.5,\n    ",
@@ -372,7 +372,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "\"vertical_fov\": 19.5,\n",
         "",
-        "5:17: cam_config.vertical_fov: is missing",
+        "5:17: cam_config.vertical_fov is missing",
     ),
     (
         "\"spp\": 256",
@@ -417,7 +417,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "\"scale\": 0.5",
         "\"size\": 0.5",
-        "29:15: objects[2].size: unknown key; the keys here are \"obj_file_path\", \"material_name\", \"translate\", \
+        "29:15: objects[2].size: unknown key; expected one of \"obj_file_path\", \"material_name\", \"translate\", \
          \"scale\", \"has_bvh\"",
     ),
     ("\"has_bvh\": true", "\"has_bvh\": 1", "30:18: objects[2].has_bvh: "),
@@ -441,7 +441,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "\"ref_up\": [0, 1, 0]",
         "\"ref_up\": [0, 0, 2]",
-        "7: cam_config.look_at: [0, 1, 0] must not lie on the line through the position along up, [0, 0, 1]",
+        "7: cam_config.look_at: [0, 1, 0] makes the view parallel to up, [0, 0, 1]",
     ),
     (
         "\"ref_up\": [0, 1, 0]",
@@ -481,12 +481,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "\"name\": \"red\"",
         "\"name\": \"grey\"",
-        "19: materials[1].name: \"grey\" is there twice, first in materials[0]",
+        "19: materials[1].name: \"grey\" is defined twice, first in materials[0]",
     ),
     (
         "\"material_name\": \"red\"",
         "\"material_name\": \"blue\"",
-        "24: objects[1].material_name: \"blue\" is no material; there are \"a mirror\", \"grey\", \"red\"",
+        "24: objects[1].material_name: there is no material \"blue\"; the scene has \"a mirror\", \"grey\", \"red\"",
     ),
     (
         "[0.7, 0, -0.5]",
@@ -538,7 +538,7 @@ fn the_page_has_every_key_and_a_good_example() {
     ] {
         let text = GOOD.replace(before, &format!("\"?\": 1, {before}"));
         let told = Description::parse(&text, "a.json").unwrap_err().to_string();
-        let (_, names) = told.split_once("the keys here are ").unwrap();
+        let (_, names) = told.split_once("expected one of ").unwrap();
         keys.extend(
             names
                 .split(", ")
@@ -565,5 +565,5 @@ fn any_prefix_of_a_file_is_refused_with_a_place() {
     assert!(told.contains("at most 127 deep"), "{told}");
     let large = " ".repeat(LARGEST + 1);
     let told = Scene::parse(&large, "a.json").unwrap_err().to_string();
-    assert_eq!(told, "a.json:1:1: a scene in JSON must not be larger than 4 MiB");
+    assert_eq!(told, "a.json:1:1: a JSON scene must not be larger than 4 MiB");
 }

@@ -36,9 +36,10 @@ pub struct RectangleLightDescription {
     /// Perpendicular to the rectangle; any length.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Along the first edge; any length.
-    #[schemars(with = "Vector")]
-    pub tangent: DVec3,
+    /// Along the first edge; any length. If absent, x, or y where the normal is nearly along x.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Vector>")]
+    pub tangent: Option<DVec3>,
     /// Linear RGB.
     #[schemars(with = "Rgb")]
     pub color: DVec3,
@@ -64,7 +65,7 @@ impl RectangleLightDescription {
             center: center.into(),
             size,
             normal: normal.into(),
-            tangent: tangent.into(),
+            tangent: Some(tangent.into()),
             color: color.into(),
             visible: yes(),
         }

@@ -1,8 +1,14 @@
 //! What a scene file says of how it is rendered.
 
+use std::borrow::Cow;
+use std::fmt;
+
 use glam::DVec3;
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Deserializer, Error, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use crate::scene::schema::kinds::{Clamp, Count, Depth, FilterRadius, MostSamples, Rgb, Seed, ShadowEpsilon, Share};
 use crate::scene::{Integrator, Shadows};
@@ -11,8 +17,9 @@ use crate::scene::{Integrator, Shadows};
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RenderDescription {
-    /// What light is simulated.
-    pub integrator: Integrator,
+    /// The light transport that is simulated. Absent, `"path"` if the scene uses a key that needs it, else `"phong"`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub integrator: Option<Integrator>,
     /// The ambient light.
     #[schemars(with = "Rgb")]
     pub ambient: DVec3,
@@ -61,7 +68,7 @@ impl Default for RenderDescription {
             count: 16,
         };
         Self {
-            integrator: Integrator::Phong,
+            integrator: None,
             ambient: DVec3::ZERO,
             background: DVec3::ZERO,
             shadow_epsilon: 0.0,
@@ -83,28 +90,76 @@ impl Default for RenderDescription {
     }
 }
 
-/// A pattern of samples.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(
-    deny_unknown_fields,
-    expecting = "a table, such as { pattern = \"grid\", count = 16 }"
-)]
+/// A number of samples and their pattern. A scene file has a table, or the number alone.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SamplesDescription {
-    /// How they are laid out; absent, `"grid"`, or `"sobol"` under `integrator = "path"`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Pattern; absent, `"sobol"` under `integrator = "path"`, else `"grid"`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub pattern: Option<Pattern>,
-    /// How many.
-    #[schemars(with = "Count")]
+    /// Number of samples.
     pub count: u32,
 }
 
+/// The table form of [`SamplesDescription`].
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct SamplesTable {
+    /// Pattern; absent, `"sobol"` under `integrator = "path"`, else `"grid"`.
+    #[serde(default)]
+    pattern: Option<Pattern>,
+    /// Number of samples.
+    #[schemars(with = "Count")]
+    count: u32,
+}
+
+// By hand: serde's untagged enums lose the location and the reason of an error.
+impl<'de> Deserialize<'de> for SamplesDescription {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct SamplesVisitor;
+
+        impl<'de> Visitor<'de> for SamplesVisitor {
+            type Value = SamplesDescription;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a whole number or a table, such as { pattern = \"grid\", count = 16 }")
+            }
+
+            fn visit_i64<E: Error>(self, count: i64) -> Result<Self::Value, E> {
+                let count = count
+                    .try_into()
+                    .map_err(|_| E::invalid_value(Unexpected::Signed(count), &self))?;
+                Ok(SamplesDescription::new(count))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+                let SamplesTable { pattern, count } = SamplesTable::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(SamplesDescription { pattern, count })
+            }
+        }
+
+        deserializer.deserialize_any(SamplesVisitor)
+    }
+}
+
+impl JsonSchema for SamplesDescription {
+    fn schema_name() -> Cow<'static, str> {
+        "SamplesDescription".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let table = generator.subschema_for::<SamplesTable>();
+        let number = generator.subschema_for::<Count>();
+        json!({ "anyOf": [table, number] }).try_into().unwrap_or_default()
+    }
+}
+
 impl SamplesDescription {
-    /// So many, laid out as is usual for the integrator.
+    /// Returns this number of samples in the default pattern of the integrator.
     pub fn new(count: u32) -> Self {
         Self { pattern: None, count }
     }
 
-    /// How they are laid out: if nothing is said `"sobol"` under `"path"`, else `"grid"`.
+    /// Returns the pattern: its own, else `"sobol"` under `"path"` and `"grid"` under `"phong"`.
     pub fn pattern(&self, integrator: Integrator) -> Pattern {
         self.pattern.unwrap_or(match integrator {
             Integrator::Phong => Pattern::Grid,

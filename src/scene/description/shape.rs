@@ -50,9 +50,10 @@ pub struct RectangleDescription {
     /// Perpendicular to the rectangle; any length.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Along the first edge; any length.
-    #[schemars(with = "Vector")]
-    pub tangent: DVec3,
+    /// Along the first edge; any length. If absent, x, or y where the normal is nearly along x.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Vector>")]
+    pub tangent: Option<DVec3>,
 }
 
 impl RectangleDescription {
@@ -69,7 +70,7 @@ impl RectangleDescription {
             center: center.into(),
             size,
             normal: normal.into(),
-            tangent: tangent.into(),
+            tangent: Some(tangent.into()),
         }
     }
 }
@@ -226,9 +227,10 @@ pub struct PlaneDescription {
     /// Perpendicular to the plane; any length.
     #[schemars(with = "Vector")]
     pub normal: DVec3,
-    /// Direction of the texture coordinate u; any length.
-    #[schemars(with = "Vector")]
-    pub tangent: DVec3,
+    /// Direction of the texture coordinate u; any length. If absent, x, or y where the normal is nearly along x.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Vector>")]
+    pub tangent: Option<DVec3>,
 }
 
 impl PlaneDescription {
@@ -243,7 +245,7 @@ impl PlaneDescription {
             material: material.into(),
             point: point.into(),
             normal: normal.into(),
-            tangent: tangent.into(),
+            tangent: Some(tangent.into()),
         }
     }
 }

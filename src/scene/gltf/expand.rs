@@ -8,9 +8,10 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
-use super::super::error::{At, Problem, Segment, cut};
+use super::super::error::{At, Problem, Segment};
 use super::super::image_file::Place;
 use super::super::parse::list;
+use super::super::suggest;
 use super::super::validate::placement;
 use super::super::{
     Assets, ColorDescription, Description, GltfDescription, InstanceDescription, LightDescription, MaterialDescription,
@@ -224,8 +225,8 @@ impl Expanded {
                 return Err(Problem::of(name, rule)).at("materials");
             }
             if !self.description.materials.contains_key(own) {
-                let names = list(self.description.materials.keys());
-                let rule = format!("{:?} is no material; there are {names}", cut(own));
+                let names = self.description.materials.keys().map(String::as_str);
+                let rule = suggest::unknown("material", own, names);
                 return Err(Problem::of(name, rule)).at("materials");
             }
         }

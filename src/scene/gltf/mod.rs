@@ -148,7 +148,7 @@ pub(super) fn describe(
         None => framed(imported.points().iter().copied(), framing).into(),
     };
     let render = RenderDescription {
-        integrator: Integrator::Path,
+        integrator: Some(Integrator::Path),
         pixel_samples: SamplesDescription::new(SAMPLES),
         ..RenderDescription::default()
     };

@@ -27,11 +27,12 @@ use super::description::{
 };
 use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
 use super::limits::{BLADES, DEEPEST, MOST, UV_SETS};
+use super::suggest;
 use super::validate::depths;
 
 #[cfg(feature = "dev")]
 pub(crate) use change::{Pieces, Places};
-pub(super) use syntax::{NOT_UTF8, syntax_error};
+pub(super) use syntax::{NOT_UTF8, encoding, syntax_error};
 
 impl Description {
     /// Reads the text of a scene file; `origin` is the file's name in messages, which says by `.json` that it is JSON.
@@ -355,8 +356,8 @@ fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) -> Result<T, 
         (Some(tag), _) => tag,
         (None, Some(default)) => Value::from(default),
         (None, None) => {
-            let message = format!("is missing; it is one of {}", list(T::TYPES));
-            return Err(Problem::new(message).at("type"));
+            let message = format!("is missing; it must be one of {}", list(T::TYPES));
+            return Err(Problem::predicate(message).at("type"));
         }
     };
     let body = table.clone();
@@ -367,7 +368,9 @@ fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) -> Result<T, 
             explain(error, table, true, Integrator::Phong)
         }),
         None => {
-            let message = format!("{} must be one of {}", show(&tag), list(T::TYPES));
+            let hint = tag.as_str().map(|tag| suggest::hint(tag, T::TYPES.iter().copied()));
+            let hint = hint.unwrap_or_default();
+            let message = format!("{} must be one of {}{hint}", show(&tag), list(T::TYPES));
             Err(Problem::new(message).at("type"))
         }
     }
@@ -452,13 +455,24 @@ fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator)
         // The first name is the key's, which is on the path already.
         let names = quoted(message).into_iter().skip(1);
         let tag = (tagged && path.len() == 1).then(|| "type".to_owned());
-        format!(
-            "unknown key; the keys here are {}",
-            listed(tag.into_iter().chain(names), MOST_KEYS)
-        )
+        let names: Vec<String> = tag.into_iter().chain(names).collect();
+        let hint = match path.last() {
+            Some(Segment::Key(wrong)) => suggest::hint(wrong, names.iter().map(String::as_str)),
+            _ => String::new(),
+        };
+        match hint.is_empty() {
+            true => format!("unknown key; expected one of {}", listed(names, MOST_KEYS)),
+            false => format!("unknown key{hint}"),
+        }
     } else if message.starts_with("missing field") {
-        path.extend(quoted(message).into_iter().map(Segment::Key));
-        "is missing".to_owned()
+        let name = quoted(message).into_iter().next().unwrap_or_default();
+        if path.is_empty() && ["image", "camera"].contains(&name.as_str()) {
+            return Problem::new(format!("the scene has no [{name}] table"));
+        }
+        path.push(Segment::Key(name));
+        let mut problem = Problem::predicate("is missing");
+        problem.key = KeyPath(path);
+        return problem;
     } else if let (Some((_, expected)), Some(value)) = (message.rsplit_once(", expected "), value) {
         let rule = match expected {
             "f64" => "a number",

@@ -8,6 +8,16 @@ use crate::visible::visible;
 /// The message of bytes that are no text.
 pub(in crate::scene) const NOT_UTF8: &str = "not valid UTF-8";
 
+/// Returns the message about bytes in an encoding other than UTF-8 that is recognized: UTF-16, by its byte order mark.
+pub(in crate::scene) fn encoding(bytes: &[u8]) -> Option<String> {
+    let name = match bytes {
+        [0xff, 0xfe, ..] => "UTF-16 (little-endian)",
+        [0xfe, 0xff, ..] => "UTF-16 (big-endian)",
+        _ => return None,
+    };
+    Some(format!("the file is encoded in {name}; save it as UTF-8"))
+}
+
 /// The error of a text that goes wrong at the byte `at`; `message` is what the parser says.
 pub(in crate::scene) fn syntax_error(text: &str, origin: &str, at: usize, message: &str) -> SceneError {
     let at = match message.contains(DEEP) && at == 0 {
@@ -48,38 +58,38 @@ fn explain(text: &str, at: usize, message: &str) -> String {
     let token = token(text, at);
     let shown = cut(token);
     let rule = if message.contains(DEEP) || message.contains("recurse") {
-        "tables and lists must be in each other at most 80 deep".to_owned()
+        "tables and lists must be nested at most 80 levels deep".to_owned()
     } else if message == "duplicate key" {
         return twice(text, &place, name(text, at));
     } else if message.contains("mantissa") {
         let digits = token.trim_start_matches(['+', '-']);
         let sign = &token[..token.len() - digits.len()];
         format!(
-            "{shown} must have a digit before its point, as {} has",
+            "{shown} must have a digit before the decimal point: {}",
             cut(&format!("{sign}0{digits}"))
         )
     } else if message.contains("fraction") {
         format!(
-            "{shown} must have a digit after its point, as {} has",
+            "{shown} must have a digit after the decimal point: {}",
             cut(&format!("{token}0"))
         )
     } else if message.contains("exponent") {
-        format!("{shown} must have a digit after the e, as 1e3 has")
+        format!("{shown} must have a digit after the e, as in 1e3")
     } else if message.contains("leading zero") {
-        format!("{shown} must not begin with 0")
+        format!("{shown} must not start with 0")
     } else if message.contains("invalid boolean") {
-        format!("{shown} must be true or false, in small letters")
+        format!("{shown} must be true or false, in lower case")
     } else if message.contains("number overflowed") || message.contains("as i128") {
-        format!("{shown} must be a number that 64 bits can hold")
+        format!("{shown} must fit into 64 bits")
     } else if message.contains("key with no value") {
         return match line(text, at).trim() {
             comment if comment.starts_with("//") => {
-                format!("{} must be KEY = VALUE; a comment begins with #", cut(comment))
+                format!("{} must be KEY = VALUE; comments start with #", cut(comment))
             }
             line => format!("{} must be KEY = VALUE", cut(line)),
         };
     } else if message.contains("values must be quoted") && token.is_empty() {
-        "has no value after its =".to_owned()
+        "has no value after the =".to_owned()
     } else if message.contains("values must be quoted") {
         let rest = line(text, at);
         let rest = rest.find(token).map_or(token, |start| {
@@ -89,14 +99,13 @@ fn explain(text: &str, at: usize, message: &str) -> String {
             true => shown,
             false => cut(rest),
         };
-        format!("{shown} must be a number, true or false, a list in [ ], a table in {{ }}, or text in \" \"")
+        format!("{shown} must be a number, true or false, a list [ ], a table {{ }}, or a string in \" \"")
     } else if message.contains("escaped value") {
-        "text in \" \" must have no single \\; / is right in paths, \\\\ is a \\, and text in ' ' is taken as it is"
-            .to_owned()
+        "a string in \" \" must have no single \\; write \\\\, use / in paths, or put the string in ' '".to_owned()
     } else if message.contains("unexpected key or value") && text[at..].starts_with(',') {
-        format!("{shown} must be one number, with a point and no comma")
+        format!("{shown} must be a single number with a decimal point, not a comma")
     } else if message.contains("basic string") || message.contains("literal string") {
-        "text must end with the quotes that it begins with".to_owned()
+        "the closing quote of the string is missing".to_owned()
     } else {
         let message = message.replace(", expected nothing", "").replace('`', "'");
         match token {
@@ -241,7 +250,7 @@ fn name(text: &str, at: usize) -> &str {
     })
 }
 
-/// What is told of a key or a table that is there twice.
+/// What is told of a key or a table that is defined twice.
 fn twice(text: &str, place: &Place, name: &str) -> String {
     let lines = || text.lines().enumerate();
     let first = match (&place.header, place.key) {
@@ -259,8 +268,8 @@ fn twice(text: &str, place: &Place, name: &str) -> String {
         path.0.push(Segment::from(name)); // in a table in { }
     }
     match first {
-        Some((line, _)) => format!("{path}: is there twice, first in line {}; one must go", line + 1),
-        None => format!("{path}: is there twice; one must go"),
+        Some((line, _)) => format!("{path}: is defined twice, first on line {}; remove one", line + 1),
+        None => format!("{path}: is defined twice; remove one"),
     }
 }
 
@@ -283,72 +292,72 @@ fov = 45
         for (added, told) in [
             (
                 "focal_length = .5",
-                "8:16: camera.focal_length: .5 must have a digit before its point, as 0.5 has",
+                "8:16: camera.focal_length: .5 must have a digit before the decimal point: 0.5",
             ),
             (
                 "focal_length = -.5",
-                "8:16: camera.focal_length: -.5 must have a digit before its point, as -0.5 has",
+                "8:16: camera.focal_length: -.5 must have a digit before the decimal point: -0.5",
             ),
             (
                 "up = [.1, .2, 1]",
-                "8:7: camera.up: .1 must have a digit before its point, as 0.1 has",
+                "8:7: camera.up: .1 must have a digit before the decimal point: 0.1",
             ),
             (
                 "up = [1,.5,0]",
-                "8:9: camera.up: .5 must have a digit before its point, as 0.5 has",
+                "8:9: camera.up: .5 must have a digit before the decimal point: 0.5",
             ),
             (
                 "up = [1,2.,0]",
-                "8:11: camera.up: 2. must have a digit after its point, as 2.0 has",
+                "8:11: camera.up: 2. must have a digit after the decimal point: 2.0",
             ),
             (
                 "up = [0,-.5,0]",
-                "8:9: camera.up: -.5 must have a digit before its point, as -0.5 has",
+                "8:9: camera.up: -.5 must have a digit before the decimal point: -0.5",
             ),
-            ("up = [1,05,0]", "8:9: camera.up: 05 must not begin with 0"),
+            ("up = [1,05,0]", "8:9: camera.up: 05 must not start with 0"),
             ("up = [1,,0]", "8:9: camera.up: extra comma in array, expected value"),
             ("a\u{1b}[31m=1", "8:3: a\\u{1b}[31m=1 must be KEY = VALUE"),
             (
                 "up = [\n  0, # none\n  .1, 1]",
-                "10:3: camera.up: .1 must have a digit before its point, as 0.1 has",
+                "10:3: camera.up: .1 must have a digit before the decimal point: 0.1",
             ),
             (
                 "focal_length = 1.",
-                "8:18: camera.focal_length: 1. must have a digit after its point, as 1.0 has",
+                "8:18: camera.focal_length: 1. must have a digit after the decimal point: 1.0",
             ),
             (
                 "up = [1., 0, 0]",
-                "8:9: camera.up: 1. must have a digit after its point, as 1.0 has",
+                "8:9: camera.up: 1. must have a digit after the decimal point: 1.0",
             ),
             (
                 "focal_length = 0,5",
-                "8:17: camera.focal_length: 0,5 must be one number, with a point and no comma",
+                "8:17: camera.focal_length: 0,5 must be a single number with a decimal point, not a comma",
             ),
             (
                 "focal_length = 1e",
-                "8:18: camera.focal_length: 1e must have a digit after the e, as 1e3 has",
+                "8:18: camera.focal_length: 1e must have a digit after the e, as in 1e3",
             ),
             (
                 "focal_length = 08",
-                "8:16: camera.focal_length: 08 must not begin with 0",
+                "8:16: camera.focal_length: 08 must not start with 0",
             ),
             (
                 "focal_length = 1e999",
-                "8:16: camera.focal_length: 1e999 must be a number that 64 bits can hold",
+                "8:16: camera.focal_length: 1e999 must fit into 64 bits",
             ),
             (
                 "[render]\nseed = 99999999999999999999",
-                "9:8: render.seed: 99999999999999999999 must be a number that 64 bits",
+                "9:8: render.seed: 99999999999999999999 must fit into 64 bits",
             ),
             (
                 "[render]\nray_differentials = True",
-                "9:21: render.ray_differentials: True must be true or false, in small",
+                "9:21: render.ray_differentials: True must be true or false, in lower",
             ),
-            ("focal_length = ", "8:16: camera.focal_length: has no value after its ="),
+            ("focal_length = ", "8:16: camera.focal_length: has no value after the ="),
             ("focal_length", "8:13: focal_length must be KEY = VALUE"),
             (
                 "type = perspective",
-                "8:8: camera.type: perspective must be a number, true or false, a list in [ ], a table in",
+                "8:8: camera.type: perspective must be a number, true or false, a list [ ], a table",
             ),
             (
                 "[[shapes]]\n[[shapes]]\ntype = sphere",
@@ -356,25 +365,25 @@ fov = 45
             ),
             (
                 "[textures.t]\nfile = \"a\\quarry.png\"",
-                "9:11: textures.t.file: text in \" \" must have no single \\; / is",
+                "9:11: textures.t.file: a string in \" \" must have no single \\; write",
             ),
             (
                 "fov = 46",
-                "8:1: camera.fov: is there twice, first in line 7; one must go",
+                "8:1: camera.fov: is defined twice, first on line 7; remove one",
             ),
-            ("[image]", "8:2: image: is there twice, first in line 1; one must go"),
+            ("[image]", "8:2: image: is defined twice, first on line 1; remove one"),
             (
                 "[render]\nseed = 1\n[materials.a]\n[materials.a]",
-                "11:12: materials.a: is there twice, first in line 10;",
+                "11:12: materials.a: is defined twice, first on line 10;",
             ),
             (
                 "[render]\nfilter = { type = 'box', type = 'box' }",
-                "9:26: render.filter.type: is there twice",
+                "9:26: render.filter.type: is defined twice",
             ),
             ("up = [0, 0, 1", "8:14: camera.up: unclosed array, expected ']'"),
             (
                 "// a comment",
-                "8:4: // a comment must be KEY = VALUE; a comment begins with #",
+                "8:4: // a comment must be KEY = VALUE; comments start with #",
             ),
             ("= 3", "8:1: camera: unquoted keys cannot be empty"),
             (
@@ -384,7 +393,7 @@ fov = 45
             ("up = [1 2, 3]", "8:7: camera.up: 1 must be a number, true or false"),
             (
                 "type = \"a",
-                "8:10: camera.type: text must end with the quotes that it begins with",
+                "8:10: camera.type: the closing quote of the string is missing",
             ),
             ("é = 3", "8:1: "),
         ] {

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::super::{
-    Assets, CameraDescription, LightDescription, MaterialDescription, RenderDescription, Scene, ShapeDescription,
-    TextureDescription,
+    Assets, CameraDescription, LightDescription, MaterialDescription, Overrides, Pattern, RenderDescription, Scene,
+    ShapeDescription, TextureDescription,
 };
 use super::*;
 
@@ -33,12 +33,12 @@ fn bad_text_is_told_with_its_line() {
         (
             "far = 3",
             1,
-            "camera.far: unknown key; the keys here are \"type\", \"position\", \"look_at\", \"up\", \"fov\", \"focal_length\", \"aperture\", \"f_number\", \"focus_distance\", \"blades\", \"blade_rotation\", \"path\"",
+            "camera.far: unknown key; expected one of \"type\", \"position\", \"look_at\", \"up\", \"fov\", \"focal_length\", \"aperture\", \"f_number\", \"focus_distance\", \"blades\", \"blade_rotation\", \"path\"",
         ),
         (
             "[film]\n",
             1,
-            "film: unknown key; the keys here are \"image\", \"camera\", \"render\", \"environment\", \"textures\", \"materials\", \"lights\", \"shapes\", \"meshes\", \"instances\"",
+            "film: unknown key; expected one of \"image\", \"camera\", \"render\", \"environment\", \"textures\", \"materials\", \"lights\", \"shapes\", \"meshes\", \"instances\"",
         ),
         (
             "type = 'fisheye'",
@@ -151,10 +151,10 @@ fn bad_text_is_told_with_its_line() {
         (
             "[materials.a]\ntype = 'diffuse'\ncolor = [1, 1, 1]\nroughness = { file = 'a' }",
             4,
-            "materials.a.roughness.file: unknown key; the keys here are \"texture\", \"channel\"",
+            "materials.a.roughness.file: unknown key; expected one of \"texture\", \"channel\"",
         ),
-        ("[materials.a]\ntype = 'diffuse'", 1, "materials.a.color: is missing"),
-        ("[materials.a]\ntype = 'dielectric'", 1, "materials.a.ior: is missing"),
+        ("[materials.a]\ntype = 'diffuse'", 1, "materials.a.color is missing"),
+        ("[materials.a]\ntype = 'dielectric'", 1, "materials.a.ior is missing"),
         (
             "[materials.a]\ntype = 'mirror'\nemission = 1",
             3,
@@ -169,7 +169,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[render]\npixel_samples = { pattern = 'grid' }",
             2,
-            "render.pixel_samples.count: is missing",
+            "render.pixel_samples.count is missing",
         ),
         (
             "[render]\n\nadaptive = [0.1]",
@@ -209,13 +209,13 @@ fn bad_text_is_told_with_its_line() {
         (
             "[render.light_samples]\ncount = 4\nn = 2",
             3,
-            "render.light_samples.n: unknown key; the keys here are \"pattern\", \"count\"",
+            "render.light_samples.n: unknown key; expected one of \"pattern\", \"count\"",
         ),
         ("[materials]\nred = 3", 2, "materials.red: 3 must be a table"),
         (
             "[materials.red]\ncolor = [1, 0, 0]",
             1,
-            "materials.red.type: is missing; it is one of \"phong\", \"mirror\", \"glass\", \"diffuse\", \"conductor\", \"dielectric\", \"principled\"",
+            "materials.red.type is missing; it must be one of \"phong\", \"mirror\", \"glass\", \"diffuse\", \"conductor\", \"dielectric\", \"principled\"",
         ),
         (
             "[materials.\"a b\"]\ntype = 'phong'\nshininess = 'x'",
@@ -230,17 +230,17 @@ fn bad_text_is_told_with_its_line() {
         (
             "[[shapes]]\ntype = 'sphere'\nmaterial = 'a'\ncenter = [0, 0, 0]\n",
             1,
-            "shapes[0].radius: is missing",
+            "shapes[0].radius is missing",
         ),
         (
             "[[shapes]]\n[[shapes]]",
             1,
-            "shapes[0].type: is missing; it is one of \"rectangle\", \"disk\", \"ellipsoid\", \"sphere\", \"triangle\", \"tetrahedron\", \"plane\", \"mesh\", \"gltf\"",
+            "shapes[0].type is missing; it must be one of \"rectangle\", \"disk\", \"ellipsoid\", \"sphere\", \"triangle\", \"tetrahedron\", \"plane\", \"mesh\", \"gltf\"",
         ),
         (
             "[[lights]]\ntype = 'directional'\ndirection = [0, 0, 1]\ncolor = [1, 1, 1]\n[[lights]]\ntype = 'point'\nvertex = 3",
             7,
-            "lights[1].vertex: unknown key; the keys here are \"type\", \"position\", \"color\"",
+            "lights[1].vertex: unknown key; expected one of \"type\", \"position\", \"color\"",
         ),
         (
             "[[shapes]]\ntype = 'triangle'\nmaterial = 'a'\nvertices = [\n[0, 0, 0],\n[1, 'x', 0],\n[0, 1, 0]]",
@@ -260,10 +260,10 @@ fn bad_text_is_told_with_its_line() {
 
 #[test]
 fn a_missing_section_or_key_is_told_at_the_table_it_belongs_to() {
-    assert_eq!(message(""), "s.toml:1: image: is missing");
+    assert_eq!(message(""), "s.toml:1: the scene has no [image] table");
     assert_eq!(
         message(&START.replace("fov = 45", "")),
-        "s.toml:4: camera.fov: is missing"
+        "s.toml:4: camera.fov is missing"
     );
     assert_eq!(message("image = 3"), "s.toml:1: image: 3 must be a table");
     assert_eq!(message("image = [4, 4]"), "s.toml:1: image: [4, 4] must be a table");
@@ -274,7 +274,7 @@ fn text_that_is_no_toml_is_told_with_line_and_column() {
     for (added, told) in [
         ("é = 3", "8:1: "),
         ("up = [0, 1", "8:11: "),
-        ("fov = 46", "8:1: camera.fov: is there twice"),
+        ("fov = 46", "8:1: camera.fov: is defined twice"),
         ("focal_length = ", "8:16: "),
         ("focal_length = 1e999", "8:16: "),
     ] {
@@ -346,7 +346,7 @@ fn rows(heading: &str) -> Vec<&'static str> {
 fn check_keys(text: &str, heading: &str) {
     let message = message(&format!("{text}\n'?' = 1"));
     let (_, keys) = message
-        .split_once("the keys here are ")
+        .split_once("expected one of ")
         .unwrap_or_else(|| panic!("{message}"));
     let mut keys: Vec<_> = keys.split(", ").map(|key| key.trim_matches('"')).collect();
     let mut rows = rows(heading);
@@ -422,4 +422,124 @@ fn the_page_has_every_pattern() {
 #[should_panic(expected = "under ## `[image]`")]
 fn a_key_that_is_not_in_the_page_is_noticed() {
     check_keys(&format!("{START}[render]"), "## `[image]`");
+}
+
+#[test]
+fn a_number_of_samples_stands_for_a_table() {
+    let scene = |render: &str| {
+        let text = format!(
+            "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }}\n\
+             [render]\n{render}"
+        );
+        Scene::parse(&text, "s.toml").map_err(|error| error.to_string())
+    };
+    assert_eq!(
+        scene("pixel_samples = 36\nlight_samples = 4").unwrap().render,
+        scene("pixel_samples = { count = 36 }\nlight_samples = { count = 4 }")
+            .unwrap()
+            .render
+    );
+    for (line, told) in [
+        (
+            "pixel_samples = 0",
+            "s.toml:4: render.pixel_samples.count: 0 must be from 1 to 65536",
+        ),
+        (
+            "pixel_samples = 1.5",
+            "s.toml:4: render.pixel_samples: 1.5 must be a whole number or a table, such as {",
+        ),
+        (
+            "pixel_samples = -4",
+            "s.toml:4: render.pixel_samples: -4 must be a whole number or a table, such as {",
+        ),
+        (
+            "pixel_samples = 4294967296",
+            "s.toml:4: render.pixel_samples: 4294967296 must be a whole number or a",
+        ),
+        (
+            "pixel_samples = '9'",
+            "s.toml:4: render.pixel_samples: \"9\" must be a whole number or a table, such as {",
+        ),
+        (
+            "pixel_samples = [4]",
+            "s.toml:4: render.pixel_samples: [4] must be a whole number or a table, such as {",
+        ),
+        (
+            "pixel_samples = { count = 4, patern = 'grid' }",
+            "s.toml:4: render.pixel_samples.patern: unknown key; did you",
+        ),
+    ] {
+        let message = scene(line).unwrap_err();
+        assert!(message.starts_with(told), "{message}\n{told}");
+    }
+    let define = |define: &str| {
+        let overrides = Overrides {
+            define: vec![define.parse().unwrap()],
+            ..Overrides::default()
+        };
+        let text = "image = { width = 4, height = 4 }\ncamera = { position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }\n\
+                    render.pixel_samples = 36";
+        let samples = Scene::parse_with(text, "s.toml", &overrides)
+            .unwrap()
+            .render
+            .pixel_samples;
+        (samples.pattern, samples.count)
+    };
+    assert_eq!(define("render.pixel_samples.count=4"), (Pattern::Grid, 4));
+    assert_eq!(define("render.pixel_samples.pattern=halton"), (Pattern::Halton, 36));
+    assert_eq!(define("render.pixel_samples=9"), (Pattern::Grid, 9));
+}
+
+#[test]
+fn tangents_are_along_x_or_y_where_a_shape_names_none() {
+    let scene = |normal: &str, tangent: &str| {
+        let text = format!(
+            "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }}\n\
+             materials.m = {{ type = 'mirror' }}\n\
+             [[shapes]]\ntype = 'plane'\nmaterial = 'm'\npoint = [0, 0, 0]\nnormal = {normal}\n{tangent}\n\
+             [[shapes]]\ntype = 'rectangle'\nmaterial = 'm'\ncenter = [0, 0, 0]\nsize = [1, 2]\nnormal = {normal}\n{tangent}\n\
+             [[shapes]]\ntype = 'disk'\nmaterial = 'm'\ncenter = [0, 0, 0]\nradius = 1\nnormal = {normal}\n{tangent}\n\
+             [[lights]]\ntype = 'rectangle'\ncenter = [0, 0, 3]\nsize = [1, 2]\ncolor = [1, 1, 1]\nnormal = {normal}\n{tangent}\n"
+        );
+        Scene::parse(&text, "s.toml").unwrap()
+    };
+    for (normal, tangent) in [
+        ("[0, 0, 1]", "[1, 0, 0]"),
+        ("[0.5, 1, 2]", "[1, 0, 0]"),
+        ("[-1, 0, 0]", "[0, 1, 0]"),
+        ("[1, 0.1, 0.2]", "[0, 1, 0]"),
+    ] {
+        assert_eq!(
+            scene(normal, ""),
+            scene(normal, &format!("tangent = {tangent}")),
+            "{normal}"
+        );
+    }
+    assert_ne!(scene("[0, 0, 1]", ""), scene("[0, 0, 1]", "tangent = [0, 1, 0]"));
+}
+
+#[test]
+fn misspelled_names_are_answered_with_similar_ones() {
+    let told = |more: &str| {
+        let text = format!(
+            "image = {{ width = 4, height = 4 }}\ncamera = {{ position = [0, -3, 1], look_at = [0, 0, 1], fov = 45 }}\n\
+             materials.yellow = {{ type = 'mirror' }}\n{more}"
+        );
+        Scene::parse(&text, "s.toml").unwrap_err().to_string()
+    };
+    for (more, message) in [
+        (
+            "materials.b = { type = 'mirror', tnt = [1, 1, 1] }",
+            "s.toml:4: materials.b.tnt: unknown key; did you mean \"tint\"?",
+        ),
+        ("redner = 3", "s.toml:4: redner: unknown key; did you mean \"render\"?"),
+        (
+            "shapes = [{ type = 'sphere', material = 'yelow', center = [0, 0, 0], radius = 1 }]",
+            "s.toml:4: shapes[0].material: there is no material \"yelow\"; did you mean \"yellow\"?",
+        ),
+    ] {
+        assert_eq!(told(more), message);
+    }
+    let message = told("shapes = [{ type = 'sphre' }]");
+    assert!(message.ends_with("\"gltf\"; did you mean \"sphere\"?"), "{message}");
 }

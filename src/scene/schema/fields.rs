@@ -386,7 +386,7 @@ fn required_keys<'a>(schema: &'a Json, table: Option<&Table>) -> Vec<&'a str> {
 }
 
 /// Why a text cannot be changed: it may name a file.
-const FREE_TEXT: &str = "names and files are changed in the scene file itself";
+const FREE_TEXT: &str = "names and files can only be changed in the scene file";
 
 impl Field {
     /// A value that was sent, as a scene file has it.
@@ -424,8 +424,7 @@ impl Field {
                     is_name || self.choices.iter().any(|choice| choice == text)
                 };
                 let text = given.as_str().filter(is_known);
-                text.map(Value::from)
-                    .ok_or("one of the names that it may have".to_owned())
+                text.map(Value::from).ok_or("one of the allowed names".to_owned())
             }
         };
         found.map_err(|rule| format!("{} must be {rule}", cut(&given.to_string())))

@@ -10,6 +10,7 @@ use super::super::limits::{
     ABSORPTIONS, ANISOTROPIES, ETAS, FACTORS, IORS, KS, LINE_WIDTHS, OFFSETS, SCALES, SHARES, SHININESS, STRENGTHS,
     TURNS, UV_SETS,
 };
+use super::super::suggest;
 use super::super::texture::{levels, words, words_around};
 use super::super::{
     Assets, Channel, ChannelReference, ColorDescription, ConductorDescription, Encoding, Facets, Image,
@@ -18,7 +19,7 @@ use super::super::{
     ValueDescription,
 };
 use super::path::needs_path;
-use super::{At, BTreeMap, BTreeSet, Checked, Color, Problem, between, check, color, list, number, show_pair};
+use super::{At, BTreeMap, BTreeSet, Checked, Color, Problem, between, check, color, number, show_pair};
 
 /// What all texels together may take, in bytes, as they are rendered from.
 pub(in crate::scene) const TEXEL_MEMORY: u64 = 1 << 30;
@@ -164,7 +165,7 @@ fn too_much(file: &str, (width, height): (u32, u32), bytes: u64, others: u64) ->
     let mib = |bytes: u64| format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20));
     let (bytes, others, limit) = (mib(bytes), mib(others), mib(TEXEL_MEMORY));
     format!(
-        "{file:?}, {width} x {height} texels, takes {bytes}, the textures before it {others}; together they must fit {limit}"
+        "{file:?} ({width} x {height} texels) needs {bytes} and the textures before it {others}; the limit is {limit}"
     )
 }
 
@@ -234,7 +235,7 @@ fn transform(scale: [f64; 2], rotate: f64, offset: [f64; 2]) -> Checked<[DVec3; 
     check(valid, || {
         let (low, high) = (number(SCALES.0), number(SCALES.1));
         format!(
-            "{} must be finite and not 0: from {low} to {high}, or negative",
+            "{} must be nonzero, with magnitudes from {low} to {high}",
             show_pair(scale)
         )
     })
@@ -288,7 +289,9 @@ pub(super) fn alphas<'a>(
                 });
                 Ok(textures.len() - 1)
             }
-            _ => Err(format!("{texture:?} must be a texture of type \"image\" to have alpha")),
+            _ => Err(format!(
+                "{texture:?} must be a texture of type \"image\" to have an alpha channel"
+            )),
         });
     }
     alphas
@@ -300,12 +303,7 @@ impl Textures<'_> {
     }
 
     fn find_name(&self, name: &str) -> Checked<usize> {
-        let unknown = || {
-            Problem::new(match self.names.is_empty() {
-                true => format!("{name:?} is no texture; the file has none"),
-                false => format!("{name:?} is no texture; there are {}", list(&self.names)),
-            })
-        };
+        let unknown = || Problem::new(suggest::unknown("texture", name, self.names.iter().copied()));
         // The names are sorted, as those of a map.
         self.names.binary_search(&name).map_err(|_| unknown())
     }
@@ -357,11 +355,11 @@ impl Textures<'_> {
             return Err(Problem::new(format!("{name:?} must be a texture of type \"image\"")).at("texture"));
         };
         check(!matches!(image.texels, Texels::Bytes(Encoding::Srgb, _)), || {
-            format!("{name:?} must have encoding = \"linear\" to be a normal map")
+            format!("{name:?} must have encoding = \"linear\" as a normal map")
         })
         .at("texture")?;
         check(*factor == DVec3::ONE, || {
-            format!("{name:?} must have no factor to be a normal map; its strength is the map's own")
+            format!("{name:?} must have no factor as a normal map; use strength instead")
         })
         .at("texture")?;
         let strength = between(*strength, STRENGTHS).at("strength")?;
@@ -381,10 +379,10 @@ impl Textures<'_> {
             return Err(Problem::new(format!("{name:?} must be a texture of type \"image\"")));
         };
         check(!matches!(image.texels, Texels::Bytes(Encoding::Srgb, _)), || {
-            format!("{name:?} must have encoding = \"linear\" to give directions")
+            format!("{name:?} must have encoding = \"linear\" as a direction map")
         })?;
         check(factor.x == 1.0 && factor.y == 1.0, || {
-            format!("{name:?} must have no factor of red and green to give directions")
+            format!("{name:?} must have a red and green factor of 1 as a direction map")
         })?;
         Ok(Some(texture))
     }
@@ -489,7 +487,7 @@ impl Textures<'_> {
                     )?,
                 };
                 check(!dielectric.thin || dielectric.absorption == DVec3::ZERO, || {
-                    "must be 0 where thin is true: a sheet has no inside".to_owned()
+                    "must be 0 if thin is true: a thin sheet has no interior".to_owned()
                 })
                 .at("absorption")?;
                 (reflection, &dielectric.normal_map, &dielectric.emission)
@@ -524,7 +522,7 @@ impl Textures<'_> {
     }
 
     fn factor(&self, phong: &PhongDescription, own: &Option<ColorDescription>, key: &str) -> Checked<Color> {
-        let missing = || Problem::new("is missing, and there is no color to stand in for it");
+        let missing = || Problem::predicate("is missing; set it or color");
         let factor = own.as_ref().or(phong.color.as_ref()).ok_or_else(missing);
         factor.and_then(|factor| self.color(factor)).at(key)
     }
@@ -533,10 +531,7 @@ impl Textures<'_> {
 /// Checks a texture's factor where the product must be from 0 to 1.
 fn bounded_factor(factor: f64) -> Checked<()> {
     check(factor <= 1.0, || {
-        format!(
-            "its texture's factor is {}, and must be from 0 to 1 here",
-            number(factor)
-        )
+        format!("the texture's factor of {} must be from 0 to 1 here", number(factor))
     })
 }
 
@@ -582,7 +577,7 @@ fn metal_index(conductor: &ConductorDescription) -> Checked<Option<MetalIndex>> 
     };
     if let Some(name) = &conductor.metal {
         check(other("metal").is_none(), || {
-            format!("cannot stand beside {}", other("metal").unwrap_or_default())
+            format!("cannot be combined with {}", other("metal").unwrap_or_default())
         })
         .at("metal")?;
         let index = MetalIndex::named(name).ok_or_else(|| {
@@ -594,11 +589,11 @@ fn metal_index(conductor: &ConductorDescription) -> Checked<Option<MetalIndex>> 
     let (eta, k) = match (conductor.eta, conductor.k) {
         (None, None) => return Ok(None),
         (Some(eta), Some(k)) => (eta, k),
-        (Some(_), None) => return Err(Problem::new("is missing beside eta".to_owned())).at("k"),
-        (None, Some(_)) => return Err(Problem::new("is missing beside k".to_owned())).at("eta"),
+        (Some(_), None) => return Err(Problem::predicate("is missing; eta needs it")).at("k"),
+        (None, Some(_)) => return Err(Problem::predicate("is missing; k needs it")).at("eta"),
     };
     check(other("eta").is_none(), || {
-        format!("cannot stand beside {}", other("eta").unwrap_or_default())
+        format!("cannot be combined with {}", other("eta").unwrap_or_default())
     })
     .at("eta")?;
     for x in eta.to_array() {

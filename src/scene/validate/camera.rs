@@ -1,5 +1,7 @@
 //! The rules of a camera, and of its path.
 
+use glam::DVec3;
+
 use super::{Checked, FLATTEST, between, check, length, number, point, show, unit};
 use crate::scene::camera_path::CameraPath;
 use crate::scene::error::{At, Problem};
@@ -8,6 +10,8 @@ use crate::scene::{Camera, CameraDescription, CameraKeyDescription, Lens, Perspe
 
 /// How far apart keys must be at least, in frames: slopes between them stay finite.
 const CLOSEST: f64 = 1e-6;
+/// The up vector of a camera that looks straight up or down without another one.
+const VERTICAL_UP: DVec3 = DVec3::Y;
 
 impl CameraDescription {
     /// Checks a camera by itself, as it stands; its path is checked with the scene.
@@ -16,11 +20,17 @@ impl CameraDescription {
     ///
     /// The first value that breaks a rule.
     pub fn validate(&self) -> Result<Camera, Problem> {
-        camera(self)
+        camera(self, VERTICAL_UP)
+    }
+
+    /// Validates the camera at one frame of its path. A view along `up` is an error, because another `up` would be a jump.
+    pub(in crate::scene) fn validate_frame(&self) -> Result<Camera, Problem> {
+        camera(self, DVec3::Z)
     }
 }
 
-fn camera(description: &CameraDescription) -> Checked<Camera> {
+/// Returns the camera. `vertical_up` replaces an `up` of +z, which is the default, if the view is along it.
+fn camera(description: &CameraDescription, vertical_up: DVec3) -> Checked<Camera> {
     let mut lens = None;
     let (position, look_at, up, projection) = match description {
         CameraDescription::Perspective(camera) => {
@@ -49,17 +59,18 @@ fn camera(description: &CameraDescription) -> Checked<Camera> {
     let up = unit(up).at("up")?;
     let forward = look_at - position;
     check(forward.length() >= LENGTHS.0, || {
-        format!("{} must not be the camera's position", show(look_at))
+        format!("{} must differ from the camera's position", show(look_at))
     })
     .at("look_at")?;
     if let (Some(lens), CameraDescription::Perspective(camera)) = (&mut lens, description) {
         lens.focus = camera.focus_distance.unwrap_or(forward.length());
     }
     let forward = forward.normalize();
-    let right = forward.cross(up);
+    let is_vertical = up == DVec3::Z && forward.cross(up).length() <= FLATTEST;
+    let right = forward.cross(if is_vertical { vertical_up } else { up });
     check(right.length() > FLATTEST, || {
         let (look_at, up) = (show(look_at), show(up));
-        format!("{look_at} must not lie on the line through the position along up, {up}")
+        format!("{look_at} makes the view parallel to up, {up}; choose another up")
     })
     .at("look_at")?;
     let right = right.normalize();
@@ -80,7 +91,7 @@ fn lens_of(camera: &PerspectiveDescription) -> Checked<Option<Lens>> {
     if let Some(f_number) = camera.f_number {
         between(f_number, F_NUMBERS).at("f_number")?;
         check(camera.aperture.is_none(), || {
-            "must not be here beside \"aperture\": each says how wide the lens is".to_owned()
+            "cannot be combined with aperture: both set the diameter of the lens".to_owned()
         })
         .at("f_number")?;
     }
@@ -147,7 +158,7 @@ fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f6
     if let Some(before) = before {
         check(frame - before >= CLOSEST, || {
             let (frame, before, least) = (number(frame), number(before), number(CLOSEST));
-            format!("{frame} must be greater than that of the key before, {before}, by {least} at least")
+            format!("{frame} must be greater than the frame of the previous key, {before}, by at least {least}")
         })
         .at("frame")?;
     }
@@ -163,8 +174,11 @@ fn key(key: &CameraKeyDescription, camera: &CameraDescription, before: Option<f6
         ("focus_distance", focus_distance.is_some()),
     ] {
         check(!is_there || own.contains(&name), || match own {
-            [] => "must not be here: a camera of this type has no such value".to_owned(),
-            own => format!("must not be here: a camera of this type has {}", all_of(own, "and")),
+            [] => "does not apply to a camera of this type".to_owned(),
+            own => format!(
+                "does not apply to a camera of this type, which has {}",
+                all_of(own, "and")
+            ),
         })
         .at(name)?;
     }
@@ -249,6 +263,25 @@ mod tests {
     }
 
     #[test]
+    fn a_vertical_camera_has_another_up() {
+        let camera = |position: [f64; 3], up: [f64; 3]| {
+            let mut camera = PerspectiveDescription::new(position, [0.0; 3], 40.0);
+            camera.up = up.into();
+            crate::scene::CameraDescription::from(camera).validate()
+        };
+        let down = camera([0.0, 0.0, 5.0], [0.0, 0.0, 2.0]).unwrap();
+        assert_eq!((down.right, down.up), (DVec3::X, DVec3::Y));
+        let up = camera([0.0, 0.0, -5.0], [0.0, 0.0, 1.0]).unwrap();
+        assert_eq!((up.right, up.up), (-DVec3::X, DVec3::Y));
+        // An `up` that was chosen is not replaced.
+        let told = camera([0.0, 5.0, 0.0], [0.0, 1.0, 0.0]).unwrap_err().to_string();
+        assert_eq!(
+            told,
+            "look_at: [0, 0, 0] makes the view parallel to up, [0, 1, 0]; choose another up"
+        );
+    }
+
+    #[test]
     fn without_a_frame_the_camera_is_that_of_the_first_keys() {
         let path = "[camera.path]\ninterpolation = 'smooth'\nkeys = [{ frame = 3, look_at = [1, 0, 0] }, \
                     { frame = 4, position = [0, -4, 2], fov = 30, look_at = [2, 0, 0] }]\n";
@@ -286,7 +319,7 @@ mod tests {
         };
         assert_eq!(at(Some(1.5)).unwrap().camera.position, DVec3::new(0.0, -2.0, 0.0));
         assert_eq!(at(None).unwrap().camera.position, DVec3::new(0.0, -4.0, 0.0));
-        let told = "s.toml:6: camera.path: at frame 2, look_at: [0, 0, 0] must not be the camera's position";
+        let told = "s.toml:6: camera.path: at frame 2, look_at: [0, 0, 0] must differ from the camera's position";
         assert_eq!(at(Some(2.0)).unwrap_err().to_string(), told);
         for frame in [f64::NAN, f64::INFINITY] {
             let told = at(Some(frame)).unwrap_err().to_string();
@@ -314,7 +347,7 @@ mod tests {
                 "[camera.path]\nkeys = []".to_owned(),
                 "7: camera.path.keys: [] must have at least one key",
             ),
-            ("[camera.path]".to_owned(), "6: camera.path.keys: is missing"),
+            ("[camera.path]".to_owned(), "6: camera.path.keys is missing"),
             ("path = 3".to_owned(), "6: camera.path: 3 must be a table"),
             (
                 "path = { keys = [3] }".to_owned(),
@@ -326,7 +359,7 @@ mod tests {
             ),
             (
                 format!("{start}{{ fov = 4 }}]"),
-                "9: camera.path.keys[1].frame: is missing",
+                "9: camera.path.keys[1].frame is missing",
             ),
             (
                 format!("{start}{{ frame = 2 }}]"),
@@ -334,11 +367,11 @@ mod tests {
             ),
             (
                 format!("{start}{{ frame = 1, fov = 4 }}]"),
-                "9: camera.path.keys[1].frame: 1 must be greater than that of the key before, 1, by 1e-6 at least",
+                "9: camera.path.keys[1].frame: 1 must be greater than the frame of the previous key, 1, by at least 1e-6",
             ),
             (
                 format!("{start}{{ frame = 0.5, fov = 4 }}]"),
-                "9: camera.path.keys[1].frame: 0.5 must be greater than that of the key before, 1, by 1e-6",
+                "9: camera.path.keys[1].frame: 0.5 must be greater than the frame of the previous key, 1, by at least 1e-6",
             ),
             (
                 format!("{start}{{ frame = 2e9, fov = 4 }}]"),
@@ -354,7 +387,7 @@ mod tests {
             ),
             (
                 format!("{start}{{ frame = 2, height = 1 }}]"),
-                "9: camera.path.keys[1].height: must not be here: a camera of this type has \"fov\"",
+                "9: camera.path.keys[1].height: does not apply to a camera of this type, which has \"fov\"",
             ),
             (
                 format!("{start}{{ frame = 2, position = [0, 2e9, 0] }}]"),
@@ -370,11 +403,11 @@ mod tests {
             ),
             (
                 format!("{start}{{ frame = 2, speed = 1 }}]"),
-                "9: camera.path.keys[1].speed: unknown key; the keys here are \"frame\", \"position\", \"look_at\", \"up\"",
+                "9: camera.path.keys[1].speed: unknown key; expected one of \"frame\", \"position\", \"look_at\", \"up\"",
             ),
             (
                 format!("{start}{{ frame = 2, position = [0, 0, 4] }}]"),
-                "6: camera.path: at frame 2, look_at: [0, 0, 0] must not lie on the line through the position along up",
+                "6: camera.path: at frame 2, look_at: [0, 0, 0] makes the view parallel to up",
             ),
         ] {
             let message = scene(&format!("{STILL}{path}")).unwrap_err().to_string();
@@ -382,7 +415,7 @@ mod tests {
         }
         let parallel = "[camera]\ntype = 'orthographic'\nposition = [0, -4, 0]\nlook_at = [0, 0, 0]\nheight = 1\n\
                         path.keys = [{ frame = 1, fov = 40 }]";
-        let told = "s.toml:7: camera.path.keys[0].fov: must not be here: a camera of this type has \"height\"";
+        let told = "s.toml:7: camera.path.keys[0].fov: does not apply to a camera of this type, which has \"height\"";
         assert_eq!(scene(parallel).unwrap_err().to_string(), told);
         let closest = format!("{start}{{ frame = 1.000002, fov = 4 }}]");
         scene(&format!("{STILL}{closest}")).unwrap();

@@ -18,8 +18,11 @@ const ELEVATION: f64 = 40.0;
 const TURBIDITY: f64 = 2.0;
 
 /// The surroundings: under the path tracer the section's, or the background, if they shine or are seen.
-pub(super) fn environment(description: &Description, images: &mut Images) -> Checked<Option<Environment>> {
-    let integrator = description.render.integrator;
+pub(super) fn environment(
+    description: &Description,
+    integrator: Integrator,
+    images: &mut Images,
+) -> Checked<Option<Environment>> {
     let background = description.render.background;
     let environment = match &description.environment {
         None if integrator == Integrator::Phong => return Ok(None),
@@ -28,7 +31,7 @@ pub(super) fn environment(description: &Description, images: &mut Images) -> Che
             needs_path(integrator)?;
             check(background == DVec3::ZERO, || {
                 let background = show(background);
-                format!("must not be there beside render.background, {background}, which stands for it")
+                format!("cannot be combined with render.background, {background}; remove one")
             })?;
             described(environment, images)?
         }
@@ -60,7 +63,7 @@ fn described(description: &EnvironmentDescription, images: &mut Images) -> Check
     };
     let background = description.background.map(|background| {
         check(description.visible, || {
-            "must not be there beside visible = false, where the camera sees black".to_owned()
+            "cannot be combined with visible = false, where the camera sees black".to_owned()
         })?;
         color(background)
     });
@@ -86,7 +89,9 @@ fn described(description: &EnvironmentDescription, images: &mut Images) -> Check
         (None, Some(file), None) => Ok(with(images.around(file).at("file")?)),
         (None, None, Some(EnvironmentName::Studio)) => own("studio", studio(), images),
         (None, None, Some(EnvironmentName::Sky)) => own("sky", self::sky(&sky), images),
-        _ => Err(Problem::new("must have one of \"color\", \"file\" and \"name\"")),
+        _ => Err(Problem::new(
+            "must have exactly one of \"color\", \"file\" and \"name\"",
+        )),
     }
 }
 
@@ -109,6 +114,6 @@ fn sky_of(description: &EnvironmentDescription) -> Checked<Sky> {
 pub(super) fn note(description: &Description, environment: Option<&Environment>) -> Option<String> {
     let file = description.environment.as_ref()?.file.as_ref()?;
     let Image { width, height, .. } = *environment?.image.as_ref()?.image;
-    let rule = "an equirectangular one is twice as wide as it is high, and this one is stretched to that";
+    let rule = "equirectangular images are twice as wide as high, so it is stretched";
     (width != 2 * height).then(|| format!("environment.file: {file:?} has {width} x {height} texels; {rule}"))
 }

@@ -33,15 +33,13 @@ fn direction(light: &SpotLightDescription, position: DVec3) -> Checked<DVec3> {
             let way = point(goal).at("look_at")? - position;
             check(way.length() >= LENGTHS.0, || {
                 let (goal, least) = (show(goal), number(LENGTHS.0));
-                format!("{goal} must not be where the light is: at least {least} away")
+                format!("{goal} must be at least {least} away from the light")
             })
             .at("look_at")?;
             Ok(way.normalize())
         }
-        (Some(_), Some(_)) => {
-            Err(Problem::new("must not be there beside look_at, which stands for it")).at("direction")
-        }
-        (None, None) => Err(Problem::new("is missing, and there is no look_at to stand in for it")).at("direction"),
+        (Some(_), Some(_)) => Err(Problem::new("cannot be combined with look_at; remove one")).at("direction"),
+        (None, None) => Err(Problem::predicate("is missing; set it or look_at")).at("direction"),
     }
 }
 

@@ -8,11 +8,11 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 use super::super::error::cut;
 use super::super::image_file::Place;
 use super::super::limits::{FARTHEST, LENGTHS, SCALES, TURNS};
-use super::super::mesh_file;
 use super::super::{
     Assets, Geometry, InstanceDescription, Material, MeshDescription, MeshFileDescription, Reflection, Rotation, Scale,
     Shape, ShapeDescription, Up,
 };
+use super::super::{mesh_file, suggest};
 use super::mtl::Looks;
 use super::{At, Checked, FLATTEST, Problem, between, check, list, number, point, show, unit};
 use crate::mesh::{Group, Mesh, Normals};
@@ -30,12 +30,7 @@ pub(super) struct Known<'a> {
 impl Known<'_> {
     /// The index of a material of the scene.
     pub fn material(&self, name: &str) -> Checked<usize> {
-        let unknown = || {
-            Problem::new(match self.names.is_empty() {
-                true => format!("{name:?} is no material; the file has none"),
-                false => format!("{name:?} is no material; there are {}", list(self.names.keys())),
-            })
-        };
+        let unknown = || Problem::new(suggest::unknown("material", name, self.names.keys().copied()));
         self.names.get(name).copied().ok_or_else(unknown)
     }
 }
@@ -88,12 +83,7 @@ pub(super) fn instance(
     known: &mut Known,
 ) -> Checked<Shape> {
     let name = &instance.mesh;
-    let unknown = || {
-        Problem::new(match meshes.is_empty() {
-            true => format!("{name:?} is no mesh; the file has none"),
-            false => format!("{name:?} is no mesh; there are {}", list(meshes.keys())),
-        })
-    };
+    let unknown = || Problem::new(suggest::unknown("mesh", name, meshes.keys().copied()));
     let NamedMesh { mesh, up, file } = meshes.get(name.as_str()).ok_or_else(unknown).at("mesh")?;
     let placement = Placement {
         material: instance.material.as_ref(),
@@ -301,7 +291,7 @@ pub(in crate::scene) fn placement(
     if let Some(matrix) = matrix {
         let others = translate.is_some() || rotate.is_some() || scale.is_some();
         check(!others, || {
-            "must not be there beside translate, rotate or scale, which it stands in for".to_owned()
+            "cannot be combined with translate, rotate or scale, which it stands in for".to_owned()
         })
         .at("matrix")?;
         return self::matrix(matrix).at("matrix");

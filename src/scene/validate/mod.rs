@@ -5,6 +5,7 @@
 mod appearance;
 mod camera;
 mod environment;
+mod integrator;
 mod light;
 mod mesh;
 mod mtl;
@@ -66,23 +67,34 @@ impl Description {
     /// [`Description::validate_with`]. What files the scene is made of is told even if it breaks a rule.
     pub(super) fn validate_and_list(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problem> {
         files.extend(self.files_beside(assets));
+        let integrator = self.integrator();
         let has_gltf = self
             .shapes
             .iter()
             .any(|shape| matches!(shape, ShapeDescription::Gltf(_)));
-        if !has_gltf {
-            return self.validate_plain(assets, files);
-        }
-        let expanded = Expanded::of(self, assets, files)?;
-        let scene = expanded.description.validate_plain(&expanded.assets, files);
-        let mut scene = scene.map_err(|problem| expanded.place(self, problem))?;
-        scene.notes.splice(0..0, expanded.notes);
-        scene.imported = expanded.imported;
+        let mut scene = match has_gltf {
+            false => self.validate_plain(integrator, assets, files)?,
+            true => {
+                let expanded = Expanded::of(self, assets, files)?;
+                let scene = expanded.description.validate_plain(integrator, &expanded.assets, files);
+                let mut scene = scene.map_err(|problem| expanded.place(self, problem))?;
+                scene.notes.splice(0..0, expanded.notes);
+                scene.imported = expanded.imported;
+                scene
+            }
+        };
+        let chosen = integrator::note(self);
+        scene.notes.splice(0..0, chosen);
         Ok(scene)
     }
 
-    /// The same of what names no glTF files.
-    fn validate_plain(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problem> {
+    /// Validates a description without glTF files.
+    fn validate_plain(
+        &self,
+        integrator: Integrator,
+        assets: &Assets,
+        files: &mut BTreeSet<PathBuf>,
+    ) -> Result<Scene, Problem> {
         // A map is sorted: a material's index is its place among the names.
         let names = self.materials.keys().map(String::as_str);
         let indices: BTreeMap<_, _> = names.zip(0..).collect();
@@ -94,13 +106,13 @@ impl Description {
             textures: &textures,
             alphas,
             damaged,
-            integrator: self.render.integrator,
+            integrator,
         };
         let materials = (self.materials.iter())
             .map(|(name, description)| known.material(description).at(name.as_str()))
             .collect::<Checked<Vec<_>>>()
             .at("materials")?;
-        let environment = environment::environment(self, &mut images).at("environment")?;
+        let environment = environment::environment(self, integrator, &mut images).at("environment")?;
         let own = (self.materials.keys().cloned().collect(), materials);
         let mut known = Known {
             names: &indices,
@@ -122,9 +134,13 @@ impl Description {
         let textures = std::mem::take(&mut looks.textures);
         let files = looks.files.iter().cloned().collect();
         notes.extend(looks.notes());
-        notes.extend(path::notes(&self.render, (&material_names, &materials), &textures));
+        notes.extend(path::notes(
+            (&self.render, integrator),
+            (&material_names, &materials),
+            &textures,
+        ));
         notes.extend(environment::note(self, environment.as_ref()));
-        let mut render = render(&self.render).at("render")?;
+        let mut render = render(&self.render, integrator).at("render")?;
         if render.integrator == Integrator::Path {
             render.background = environment
                 .as_ref()
@@ -152,7 +168,7 @@ impl Description {
     }
 }
 
-fn view(image: &ImageDescription) -> Checked<ViewSettings> {
+pub(super) fn view(image: &ImageDescription) -> Checked<ViewSettings> {
     let rule = |rule: String| Problem::of("exposure", format!("{} {rule}", image.exposure));
     Ok(ViewSettings {
         transform: image.view_transform,
@@ -175,7 +191,7 @@ pub(super) fn sample_count(pattern: Pattern, count: u32) -> Checked<u32> {
     count_to_most(count)?;
     let valid = !pattern.needs_square() || count.isqrt().pow(2) == count;
     check(valid, || {
-        format!("{count} must be a square number, as its pattern is n x n cells")
+        format!("{count} must be a square number, because its pattern is an n x n grid")
     })?;
     Ok(count)
 }
@@ -192,8 +208,7 @@ fn samples(description: &SamplesDescription, integrator: Integrator) -> Checked<
     Ok(Samples { pattern, count })
 }
 
-fn render(description: &RenderDescription) -> Checked<Render> {
-    let integrator = description.integrator;
+fn render(description: &RenderDescription, integrator: Integrator) -> Checked<Render> {
     let is_path = integrator == Integrator::Path;
     let ambient = color(description.ambient).at("ambient")?;
     Ok(Render {
@@ -245,7 +260,7 @@ pub(super) fn adaptive(
             .map(Pattern::name)
             .collect();
         format!(
-            "the pattern of pixel_samples is {name:?}, which has no further samples; it must be one of {}",
+            "the pattern of pixel_samples, {name:?}, cannot add samples; use one of {}",
             list(others)
         )
     })?;
@@ -254,7 +269,7 @@ pub(super) fn adaptive(
     let most = most.unwrap_or(count.saturating_mul(16).min(MOST));
     let least = count.max(LEAST_ADAPTIVE); // one sample tells nothing of an error
     check((least..=MOST).contains(&most), || {
-        format!("{most} must be from {least} to {MOST}, and not below the count of pixel_samples")
+        format!("{most} must be from {least} to {MOST}, and at least the count of pixel_samples")
     })
     .at("max_samples")?;
     Ok(Adaptive {
@@ -323,12 +338,7 @@ fn shape(description: &ShapeDescription, known: &mut Known) -> Checked<Shape> {
         ShapeDescription::Disk(shape) => {
             let center = point(shape.center).at("center")?;
             let radius = length(shape.radius).at("radius")?;
-            let tangent = match shape.tangent {
-                Some(tangent) => tangent,
-                None if unit(shape.normal).at("normal")?.x.abs() < 0.9 => DVec3::X,
-                None => DVec3::Y,
-            };
-            let (tangent, bitangent) = frame(shape.normal, tangent)?;
+            let (tangent, bitangent) = frame(shape.normal, shape.tangent)?;
             let disk = Parallelogram {
                 center,
                 u: tangent * radius,
@@ -362,28 +372,28 @@ fn shape(description: &ShapeDescription, known: &mut Known) -> Checked<Shape> {
     let has_tangents = !matches!(geometry, Geometry::Triangles(_));
     check(
         has_tangents || known.looks.materials[material].normal_map.is_none(),
-        || format!("{name:?} must have no normal map here, as the sides of this shape have no tangents"),
+        || format!("{name:?} must have no normal map here, because this shape has no tangents"),
     )
     .at("material")?;
     let textures = known.looks.materials[material].textures();
     let sets = textures.iter().map(|i| known.looks.textures[*i].uv_set);
     let set = sets.max().unwrap_or(0);
     check(set == 0, || {
-        format!("{name:?} must have no texture with uv_set = {set} here, as this shape has the set 0 alone")
+        format!("{name:?} must have no texture with uv_set = {set} here, because this shape has only the set 0")
     })
     .at("material")?;
     if let Geometry::Plane { .. } = geometry {
         let emission = &known.looks.materials[material].emission;
         let is_dark = path::most(emission, &known.looks.textures) == Some(DVec3::ZERO);
         check(is_dark, || {
-            format!("{name:?} must not emit light here, as this shape is infinite")
+            format!("{name:?} must not emit light here, because this shape is infinite")
         })
         .at("material")?;
     }
     Ok(Shape { geometry, material })
 }
 
-fn rectangle(center: DVec3, size: [f64; 2], normal: DVec3, tangent: DVec3) -> Checked<Parallelogram> {
+fn rectangle(center: DVec3, size: [f64; 2], normal: DVec3, tangent: Option<DVec3>) -> Checked<Parallelogram> {
     let center = point(center).at("center")?;
     let width = length(size[0]).at("size")?;
     let height = length(size[1]).at("size")?;
@@ -453,9 +463,11 @@ fn longest_edge(vertices: &[DVec3]) -> Checked<f64> {
     Ok(longest)
 }
 
-/// The unit vectors of u and v: the part of the tangent that is orthogonal to the normal, and normal x tangent.
-fn frame(normal: DVec3, tangent: DVec3) -> Checked<(DVec3, DVec3)> {
+/// Returns the unit vectors of u and v: the part of the tangent that is orthogonal to the normal, and normal x tangent. Without a
+/// tangent u is along x, or along y if the normal is nearly along x.
+fn frame(normal: DVec3, tangent: Option<DVec3>) -> Checked<(DVec3, DVec3)> {
     let n = unit(normal).at("normal")?;
+    let tangent = tangent.unwrap_or(if n.x.abs() < 0.9 { DVec3::X } else { DVec3::Y });
     let t = unit(tangent).at("tangent")?;
     let t = t - n * n.dot(t);
     check(t.length() > FLATTEST, || {

@@ -45,7 +45,7 @@ pub(super) struct Looks<'a> {
 struct Described {
     /// For each group a file of materials and a material in it, if there is one.
     places: Vec<Option<(usize, usize)>>,
-    /// For each group the scene's material, once it was asked for.
+    /// For each group the scene's material, once requested.
     materials: Vec<Option<usize>>,
 }
 

@@ -13,7 +13,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// What is told of `light_samples` that are ignored.
 pub(in crate::scene) const LIGHT_SAMPLES: &str =
-    "render.light_samples: without effect under integrator = \"path\"; pixel_samples are what makes it smooth";
+    "render.light_samples: no effect with integrator = \"path\"; increase pixel_samples to reduce noise";
 
 /// The rule of what only paths have.
 pub(super) fn needs_path(integrator: Integrator) -> Checked<()> {
@@ -37,19 +37,19 @@ pub(super) fn most(color: &Color, textures: &[Texture]) -> Option<DVec3> {
 
 /// What the path tracer does not do as the file says.
 pub(super) fn notes(
-    render: &RenderDescription,
+    (render, integrator): (&RenderDescription, Integrator),
     (names, materials): (&[String], &[Material]),
     textures: &[Texture],
 ) -> Vec<String> {
-    if render.integrator != Integrator::Path {
+    if integrator != Integrator::Path {
         return Vec::new();
     }
     let mut notes = Vec::new();
     if render.ambient != DVec3::ZERO {
-        notes.push("render.ambient: without effect under integrator = \"path\"; surfaces light each other".to_owned());
+        notes.push("render.ambient: no effect with integrator = \"path\", which computes indirect light".to_owned());
     }
     if render.shadows == Shadows::Transparent {
-        let rule = "without effect under integrator = \"path\"; light goes through glass as it does";
+        let rule = "no effect with integrator = \"path\", which traces light through glass";
         notes.push(format!("render.shadows: {rule}"));
     }
     if render.light_samples != RenderDescription::default().light_samples {
@@ -73,17 +73,14 @@ fn too_bright(names: &[String], materials: &[Material], textures: &[Texture]) ->
     let bright: Vec<(&String, f64)> = (names.iter().zip(materials))
         .filter_map(|(name, material)| Some((name, share(material)?)))
         .collect();
-    // Hundredths tell by how much; sums such as 0.7 + 0.4 have many digits.
+    // Hundredths, because sums such as 0.7 + 0.4 have many digits.
     let shown = bright.iter().map(|(name, share)| {
-        format!(
-            "{} of {:?}",
-            number(((share - ROUNDING) * 100.0).ceil() / 100.0),
-            cut(name)
-        )
+        let share = number(((share - ROUNDING) * 100.0).ceil() / 100.0);
+        format!("{:?} ({share})", cut(name))
     });
     let all = several(shown)?;
     Some(format!(
-        "materials: diffuse + specular must be at most 1 under integrator = \"path\", and both are scaled down to that: {all}"
+        "materials: diffuse + specular are scaled down to 1 with integrator = \"path\", which conserves energy: {all}"
     ))
 }
 
@@ -92,7 +89,7 @@ fn unused_alpha(names: &[String], materials: &[Material]) -> Option<String> {
     let is_unused = |principled: &Principled| {
         principled.alpha_mode == AlphaMode::Opaque && !matches!(principled.alpha, Value::Plain(1.0))
     };
-    let rule = "needs alpha_mode = \"mask\" or \"blend\", and is without effect";
+    let rule = "has no effect without alpha_mode = \"mask\" or \"blend\"";
     Some(format!(
         "materials: alpha {rule}: {}",
         that(names, materials, is_unused)?
@@ -104,7 +101,7 @@ fn unused_cutoff(names: &[String], materials: &[Material]) -> Option<String> {
     let usual = PrincipledDescription::default().alpha_cutoff;
     let is_unused =
         |principled: &Principled| principled.alpha_mode != AlphaMode::Mask && principled.alpha_cutoff != usual;
-    let rule = "needs alpha_mode = \"mask\", and is without effect";
+    let rule = "has no effect without alpha_mode = \"mask\"";
     Some(format!(
         "materials: alpha_cutoff {rule}: {}",
         that(names, materials, is_unused)?

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::super::limits::{ABSORPTIONS, ATTENUATION_DISTANCES, PRINCIPLED_IORS, SHARES, THICKNESSES, TURNS};
 use super::super::{Principled, PrincipledDescription};
 use super::appearance::Textures;
-use super::{At, Checked, between, check};
+use super::{At, Checked, Problem, between, check};
 
 impl Textures<'_> {
     pub(super) fn principled(&self, d: &PrincipledDescription) -> Checked<Principled> {
@@ -13,7 +13,7 @@ impl Textures<'_> {
         between(d.thickness, THICKNESSES).at("thickness")?;
         let absorption = absorption(d.attenuation_color, d.attenuation_distance)?;
         check(!thin || absorption == DVec3::ZERO, || {
-            "needs a thickness: what is thin has no inside in which light is lost".to_owned()
+            "needs a thickness: a thin surface has no interior that absorbs light".to_owned()
         })
         .at("attenuation_color")?;
         Ok(Principled {
@@ -54,11 +54,10 @@ fn absorption(color: DVec3, distance: Option<f64>) -> Checked<DVec3> {
         between(x, SHARES).at("attenuation_color")?;
     }
     let Some(distance) = distance else {
-        check(color == DVec3::ONE, || {
-            "is missing, and attenuation_color, which is left after it, needs it".to_owned()
-        })
-        .at("attenuation_distance")?;
-        return Ok(DVec3::ZERO);
+        return match color == DVec3::ONE {
+            true => Ok(DVec3::ZERO),
+            false => Err(Problem::predicate("is missing; attenuation_color needs it").at("attenuation_distance")),
+        };
     };
     let distance = between(distance, ATTENUATION_DISTANCES).at("attenuation_distance")?;
     Ok(color.map(|x| (-x.ln() / distance).clamp(ABSORPTIONS.0, ABSORPTIONS.1)))

@@ -189,7 +189,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "look_at = [0, 0, 1]",
         "look_at = [0, -4, 1]",
-        "camera.look_at: [0, -4, 1] must not be the camera's position",
+        "camera.look_at: [0, -4, 1] must differ from the camera's position",
     ),
     (
         "look_at = [0, 0, 1]",
@@ -199,7 +199,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "look_at = [0, 0, 1]",
         "look_at = [0, -4, 5]",
-        "camera.look_at: [0, -4, 5] must not lie on the line through the position along up, [0, 0, 1]",
+        "camera.look_at: [0, -4, 5] makes the view parallel to up, [0, 0, 1]",
     ),
     (
         "fov = 90",
@@ -237,7 +237,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         r#"pixel_samples = { pattern = "grid", count = 4 }"#,
         "pixel_samples = { count = 15 }",
-        "render.pixel_samples.count: 15 must be a square number, as its pattern is n x n cells",
+        "render.pixel_samples.count: 15 must be a square number, because its pattern is an n x n grid",
     ),
     (
         r#"light_samples = { pattern = "random", count = 3 }"#,
@@ -337,7 +337,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "material = \"white\" # sphere",
         "material = \"blue\"",
-        "shapes[2].material: \"blue\" is no material; there are \"dark red\", \"white\"",
+        "shapes[2].material: there is no material \"blue\"; the scene has \"dark red\", \"white\"",
     ),
     (
         "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]",
@@ -410,7 +410,7 @@ fn a_factor_without_color_is_missing() {
         .position(|line| line.starts_with("[materials.\"dark"))
         .unwrap()
         + 1;
-    let told = "is missing, and there is no color to stand in for it";
+    let told = "is missing; set it or color";
     assert_eq!(
         message,
         format!("s.toml:{line}: materials.\"dark red\".diffuse: {told}")
@@ -422,7 +422,7 @@ fn a_scene_may_be_empty_but_not_name_a_material_that_is_not_there() {
     let empty = "image = { width = 1, height = 1 }\ncamera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 1 }\n";
     assert_eq!(parse(empty).unwrap().shapes, []);
     let text = format!("{empty}[[shapes]]\ntype = 'sphere'\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'a'\n");
-    let told = "s.toml:7: shapes[0].material: \"a\" is no material; the file has none";
+    let told = "s.toml:7: shapes[0].material: there is no material \"a\"; the scene has none";
     assert_eq!(parse(&text).unwrap_err().to_string(), told);
 }
 

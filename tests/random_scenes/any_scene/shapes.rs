@@ -21,7 +21,7 @@ pub fn shape() -> impl Strategy<Value = ShapeDescription> {
                 center,
                 size,
                 normal,
-                tangent,
+                tangent: Some(tangent),
             })
         },
     );
@@ -69,7 +69,7 @@ pub fn shape() -> impl Strategy<Value = ShapeDescription> {
             material,
             point,
             normal,
-            tangent,
+            tangent: Some(tangent),
         })
     });
     prop_oneof![

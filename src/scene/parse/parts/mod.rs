@@ -89,7 +89,8 @@ impl Broken {
     /// A text that would have to be read as a whole, and is too large for that.
     pub fn whole(text: &str) -> Broken {
         let size = text.len() as f64 / f64::from(1 << 20);
-        let rule = "every texture, material, light, shape, mesh and instance must have a header of its own, such as [[shapes]]";
+        let rule =
+            "every texture, material, light, shape, mesh and instance must have its own header, such as [[shapes]]";
         let message = format!(
             "in a file larger than {} MiB {rule}; it has {size:.1} MiB",
             LARGEST >> 20
@@ -168,7 +169,7 @@ impl<'a> Parts<'a> {
     pub fn too_large(&self) -> Option<Broken> {
         let large = self.parts.iter().find(|part| part.place.len() > LARGEST);
         if let Some(part) = large {
-            let message = format!("the table that begins here is larger than {} MiB", LARGEST >> 20);
+            let message = format!("the table that starts here is larger than {} MiB", LARGEST >> 20);
             return Some(Broken::new(part.place.start, message));
         }
         let parts: usize = self.parts.iter().map(|part| part.place.len()).sum();

@@ -52,7 +52,7 @@ fn good_files_say_the_same() {
     let text = "[materials.z]\ntype = 'phong'\n[materials.z.color]\ntexture = \"\"\"\n[[shapes]]\n\"\"\"\n";
     let render = "[render]\nseed = 3\n[render.pixel_samples]\ncount = 4\n";
     let pieces = [POINT, SPHERE, RED, BLUE, sub, image, nested, text, render];
-    // Every order of three, and those in which a table below comes late or a table is there twice, which is an error.
+    // Every order of three, and those in which a table below comes late or a table is defined twice, which is an error.
     for a in pieces {
         for b in pieces {
             for c in pieces {
@@ -119,7 +119,7 @@ fn parts_and_what_must_be_read_as_a_whole_have_a_largest_size() {
     let long = format!("{START}{RED}[[shapes]]\nx = [{many}]\n");
     assert_eq!(
         told(&long),
-        "s:6:1: shapes[0]: the table that begins here is larger than 4 MiB"
+        "s:6:1: shapes[0]: the table that starts here is larger than 4 MiB"
     );
     let rest = format!("{START}x = [{many}]\n{SPHERE}");
     assert!(told(&rest).starts_with("s:1:1: "));
@@ -148,7 +148,7 @@ fn parts_and_what_must_be_read_as_a_whole_have_a_largest_size() {
     );
     let twice = told(&format!("{START}{RED}{spheres}{RED}"));
     assert!(
-        twice.contains("is there twice, first in line 3") && !twice.starts_with("s:3:"),
+        twice.contains("is defined twice, first on line 3") && !twice.starts_with("s:3:"),
         "{twice}"
     );
     let bad = format!("{START}{spheres}{}", SPHERE.replace("radius", "size"));

@@ -25,13 +25,10 @@ fn a_spot_has_a_direction_or_looks_at_a_point() {
     };
     assert_eq!((direction, cone, inner), (-glam::DVec3::Z, 30_f64.to_radians(), 0.0));
     for (keys, rule) in [
-        (
-            "",
-            "lights[0].direction: is missing, and there is no look_at to stand in for it",
-        ),
+        ("", "lights[0].direction is missing; set it or look_at"),
         (
             "direction = [0, 0, 1]\nlook_at = [0, 0, 0]",
-            "lights[0].direction: must not be there beside look_at, which stands for it",
+            "lights[0].direction: cannot be combined with look_at; remove one",
         ),
         (
             "direction = [0, 0, 0]",

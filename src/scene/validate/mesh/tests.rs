@@ -139,13 +139,13 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "file = \"parts.obj\"",
         "file = \"parts.obj\"\nscale = 2",
-        "meshes.parts.scale: unknown key; the keys here are \"file\", \"normals\", \"up\"",
+        "meshes.parts.scale: unknown key; expected one of \"file\", \"normals\", \"up\"",
     ),
     // Meshes by their names.
     (
         "mesh = \"parts\"",
         "mesh = \"part\"",
-        "instances[0].mesh: \"part\" is no mesh; there are \"parts\"",
+        "instances[0].mesh: there is no mesh \"part\"; did you mean \"parts\"?",
     ),
     // Places.
     (
@@ -201,7 +201,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "translate = [1, 2, 3]",
         "matrix = []",
-        "shapes[0].matrix: must not be there beside translate, rotate or scale, which it stands in for",
+        "shapes[0].matrix: cannot be combined with translate, rotate or scale, which it stands in for",
     ),
     (
         LINE_OF_MATRIX,
@@ -242,7 +242,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "material = \"white\"",
         "material = \"blue\"",
-        "shapes[1].material: \"blue\" is no material; there are \"checked\", \"red\", \"white\"",
+        "shapes[1].material: there is no material \"blue\"; the scene has \"checked\", \"red\", \"white\"",
     ),
     (
         "material = \"white\"",
@@ -262,13 +262,13 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         LINE_OF_MATERIALS,
         "materials = { roof = \"red\", floor = \"white\" }",
-        "instances[0].materials.floor: \"parts.obj\" has no such group or material; there are \"brick\", \"door\", \
+        "instances[0].materials.floor: \"parts.obj\" has no such group or material; the scene has \"brick\", \"door\", \
          \"roof\", \"wall\"",
     ),
     (
         LINE_OF_MATERIALS,
         "materials = { roof = \"red\", brick = \"blue\" }",
-        "instances[0].materials.brick: \"blue\" is no material; there are",
+        "instances[0].materials.brick: there is no material \"blue\"; the scene has",
     ),
     (
         LINE_OF_MATERIALS,
@@ -354,11 +354,11 @@ fn names_of_nothing_are_told_so() {
     };
     assert_eq!(
         told("[[instances]]\nmesh = 'a'\n"),
-        "4: instances[0].mesh: \"a\" is no mesh; the file has none"
+        "4: instances[0].mesh: there is no mesh \"a\"; the scene has none"
     );
     assert_eq!(
         told("[[shapes]]\ntype = 'mesh'\nfile = 'one.obj'\nmaterial = 'a'\n"),
-        "6: shapes[0].material: \"a\" is no material; the file has none"
+        "6: shapes[0].material: there is no material \"a\"; the scene has none"
     );
 }
 

@@ -336,7 +336,7 @@ fn descriptions_made_in_code_are_read_back() {
         .with_material("clay", clay)
         .with_material("gold", ConductorDescription::new([1.0, 0.8, 0.3]))
         .with_material("wine", wine);
-    description.render.integrator = Integrator::Path;
+    description.render.integrator = Some(Integrator::Path);
     description.render.rr_depth = Some(3);
     description.render.clamp = Some(2.5);
     description.render.alpha = Some(true);
@@ -352,7 +352,7 @@ fn descriptions_made_in_code_are_read_back() {
             count: 7
         }
     );
-    description.render.integrator = Integrator::Phong;
+    description.render.integrator = Some(Integrator::Phong);
     let told = description.validate().unwrap_err().to_string();
     assert_eq!(told, "materials.clay.type: \"diffuse\" needs integrator = \"path\"");
 }

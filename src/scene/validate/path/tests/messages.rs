@@ -33,7 +33,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "pixel_samples = { count = 5 }",
         "pixel_samples = { pattern = 'grid', count = 5 }",
-        "render.pixel_samples.count: 5 must be a square number, as its pattern is n x n cells",
+        "render.pixel_samples.count: 5 must be a square number, because its pattern is an n x n grid",
     ),
     (
         "pixel_samples = { count = 5 }",
@@ -84,17 +84,17 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "color = [0.9, 0.9, 0.8]",
         "metal = 'gold'\ncolor = [0.9, 0.9, 0.8]",
-        "materials.silver.metal: cannot stand beside color",
+        "materials.silver.metal: cannot be combined with color",
     ),
     (
         "color = [0.9, 0.9, 0.8]",
         "metal = 'gold'\neta = [1, 1, 1]",
-        "materials.silver.metal: cannot stand beside eta",
+        "materials.silver.metal: cannot be combined with eta",
     ),
     (
         "color = [0.9, 0.9, 0.8]",
         "eta = [1, 1, 1]\nk = [1, 1, 1]\ncolor = [0.9, 0.9, 0.8]",
-        "materials.silver.eta: cannot stand beside color",
+        "materials.silver.eta: cannot be combined with color",
     ),
     (
         "color = [0.9, 0.9, 0.8]",
@@ -109,7 +109,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "ior = 1.33",
         "absorption = [0, 0, 1]\nior = 1.33\nthin = true",
-        "materials.water.absorption: must be 0 where thin is true: a sheet has no inside",
+        "materials.water.absorption: must be 0 if thin is true: a thin sheet has no interior",
     ),
     (
         "roughness = 0.75",
@@ -124,12 +124,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "roughness = { texture = \"dark\" }",
         "roughness = { texture = 'darker' }",
-        "materials.coal.roughness.texture: \"darker\" is no texture; there are \"dark\", \"spots\"",
+        "materials.coal.roughness.texture: there is no texture \"darker\"; did you mean \"dark\"?",
     ),
     (
         "emission = { texture = \"spots\" }",
         "emission = { texture = 'spot' }",
-        "materials.coal.emission.texture: \"spot\" is no texture; there are \"dark\", \"spots\"",
+        "materials.coal.emission.texture: there is no texture \"spot\"; did you mean \"spots\"?",
     ),
     (
         "emission = [7, 0, 0]",
@@ -174,12 +174,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "material = \"clay\"",
         "material = \"gold\"",
-        "shapes[0].material: \"gold\" must not emit light here, as this shape is infinite",
+        "shapes[0].material: \"gold\" must not emit light here, because this shape is infinite",
     ),
     (
         "material = \"clay\"",
         "material = \"coal\"",
-        "shapes[0].material: \"coal\" must not emit light here, as this shape is infinite",
+        "shapes[0].material: \"coal\" must not emit light here, because this shape is infinite",
     ),
 ];
 
@@ -193,7 +193,7 @@ fn bad_values_are_told_with_line_key_value_and_rule() {
     }
     let text = GOOD.replace("[render]", "[render]\nbackground = [0, 0.5, 0]");
     let place = text[..text.find("[environment]").unwrap()].lines().count() + 1;
-    let rule = "must not be there beside render.background, [0, 0.5, 0], which stands for it";
+    let rule = "cannot be combined with render.background, [0, 0.5, 0]; remove one";
     assert_eq!(
         parse(&text).unwrap_err().to_string(),
         format!("s.toml:{place}: environment: {rule}")
@@ -273,8 +273,24 @@ fn what_only_paths_have_is_refused_under_phong() {
         ),
     ] {
         let text = format!("{START}{added}\n");
-        let told = format!("s.toml:{}: {key} needs integrator = \"path\"", line + 2);
-        assert_eq!(parse(&text).unwrap_err().to_string(), told);
+        let render = "[render]\nintegrator = 'phong'";
+        let under_phong = match text.contains("[render]") {
+            true => text.replace("[render]", render),
+            false => text.replace("[materials.a]", &format!("{render}\n[materials.a]")),
+        };
+        let under_phong = under_phong.replace("[environment]", &format!("{render}\n[environment]"));
+        let told = format!(
+            "s.toml:{}: {key} needs integrator = \"path\"",
+            line + 3 + usize::from(!text.contains("[render]"))
+        );
+        assert_eq!(parse(&under_phong).unwrap_err().to_string(), told);
+        // Without an integrator the path tracer is used.
+        let scene = parse(&text).unwrap();
+        assert_eq!(scene.render.integrator, Integrator::Path);
+        let key = key.split(':').next().unwrap_or_default();
+        let note =
+            format!("render.integrator: using \"path\", which {key} needs; set it in the scene to silence this note");
+        assert_eq!(scene.notes, [note]);
         // It is the integrator that counts, wherever it is from.
         let overrides = |integrator| Overrides {
             integrator: Some(integrator),

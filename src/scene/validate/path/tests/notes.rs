@@ -12,11 +12,11 @@ fn what_paths_ignore_is_told() {
     for (added, told) in [
         (
             "ambient = [0, 0.1, 0]",
-            "render.ambient: without effect under integrator = \"path\"; surfaces light each other",
+            "render.ambient: no effect with integrator = \"path\", which computes indirect light",
         ),
         (
             "shadows = 'transparent'",
-            "render.shadows: without effect under integrator = \"path\"; light goes through glass as it does",
+            "render.shadows: no effect with integrator = \"path\", which traces light through glass",
         ),
         ("light_samples = { count = 4 }", LIGHT_SAMPLES),
         ("light_samples = { pattern = 'sobol', count = 16 }", LIGHT_SAMPLES),
@@ -52,17 +52,18 @@ fn what_paths_ignore_is_told() {
 
 #[test]
 fn phong_materials_that_are_too_bright_are_told() {
-    const RULE: &str = "materials: diffuse + specular must be at most 1 under integrator = \"path\", and both are scaled down to that: ";
+    const RULE: &str =
+        "materials: diffuse + specular are scaled down to 1 with integrator = \"path\", which conserves energy: ";
     let (diffuse, specular) = ("diffuse = [0.5, 0, 0]", "specular = [0.5, 0.5, 0.5]");
     for (line, changed, told) in [
-        (diffuse, "diffuse = [0.7, 0.1, 0]", Some("1.2 of \"red\"")),
-        (specular, "specular = [0.501, 0, 0]", Some("1.01 of \"red\"")),
+        (diffuse, "diffuse = [0.7, 0.1, 0]", Some("\"red\" (1.2)")),
+        (specular, "specular = [0.501, 0, 0]", Some("\"red\" (1.01)")),
         (specular, "specular = [0.5, 1, 1]", None),
-        (specular, "specular = [0, 1.5, 1]", Some("1.5 of \"red\"")),
+        (specular, "specular = [0, 1.5, 1]", Some("\"red\" (1.5)")),
         // The largest of a texture's colours is 1, 2, 3.
-        (diffuse, "diffuse = { texture = 'spots' }", Some("3.5 of \"red\"")),
+        (diffuse, "diffuse = { texture = 'spots' }", Some("\"red\" (3.5)")),
         (diffuse, "diffuse = { texture = 'dark' }", None),
-        (specular, "specular = { texture = 'spots' }", Some("3 of \"red\"")),
+        (specular, "specular = { texture = 'spots' }", Some("\"red\" (3)")),
     ] {
         let text = with(line, changed);
         let told: Vec<String> = told.map(|told| format!("{RULE}{told}")).into_iter().collect();
@@ -73,7 +74,7 @@ fn phong_materials_that_are_too_bright_are_told() {
         .map(|i| format!("[materials.m{i}]\ntype = 'phong'\ncolor = [0.{i}, 0.8, 0]\n"))
         .collect();
     let told = notes(&GOOD.replace("[materials.clay]", &format!("{materials}[materials.clay]")));
-    let names: Vec<String> = (0..8).map(|i| format!("1.6 of \"m{i}\"")).collect();
+    let names: Vec<String> = (0..8).map(|i| format!("\"m{i}\" (1.6)")).collect();
     assert_eq!(told, [format!("{RULE}{} and 2 more", names.join(", "))]);
 }
 
@@ -85,8 +86,8 @@ fn alpha_that_nothing_asks_is_told() {
             &format!("[materials.leaf]\ntype = 'principled'\n{keys}\n[materials.clay]"),
         ))
     };
-    const ALPHA: &str = "materials: alpha needs alpha_mode = \"mask\" or \"blend\", and is without effect: \"leaf\"";
-    const CUTOFF: &str = "materials: alpha_cutoff needs alpha_mode = \"mask\", and is without effect: \"leaf\"";
+    const ALPHA: &str = "materials: alpha has no effect without alpha_mode = \"mask\" or \"blend\": \"leaf\"";
+    const CUTOFF: &str = "materials: alpha_cutoff has no effect without alpha_mode = \"mask\": \"leaf\"";
     for (keys, told) in [
         ("alpha = 0.5", vec![ALPHA]),
         ("alpha = { texture = 'spots' }", vec![ALPHA]),

@@ -1,0 +1,75 @@
+//! Suggestions for misspelled names and keys.
+
+use super::error::cut;
+use super::parse::list;
+
+/// Maximum length of a name that is compared, in bytes. Comparing takes time proportional to the product of both lengths.
+const MAX_LEN: usize = 64;
+
+/// Returns the name that is most similar to a misspelled one, if any is similar enough.
+fn closest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    if wrong.len() > MAX_LEN {
+        return None;
+    }
+    let similar = names.into_iter().filter(|name| name.len() <= MAX_LEN).map(|name| {
+        let (a, b) = (wrong.to_lowercase(), name.to_lowercase());
+        (strsim::damerau_levenshtein(&a, &b), name)
+    });
+    // One edit for every three letters: "fovv" is like "fov", and "red" is not like "blue".
+    let limit = |name: &str| wrong.chars().count().max(name.chars().count()).div_ceil(3);
+    let similar = similar.filter(|(edits, name)| *edits <= limit(name) && *edits < name.chars().count());
+    similar.min_by_key(|(edits, _)| *edits).map(|(_, name)| name)
+}
+
+/// Returns `; did you mean "NAME"?`, or nothing if no name is similar.
+pub(super) fn hint<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    closest(wrong, names).map_or_else(String::new, |name| format!("; did you mean {name:?}?"))
+}
+
+/// Returns the message that a scene has nothing of a kind by this name, and what it has instead.
+pub(super) fn unknown<'a>(kind: &str, wrong: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
+    let instead = match hint(wrong, names.clone()) {
+        hint if !hint.is_empty() => hint,
+        _ if names.clone().next().is_none() => "; the scene has none".to_owned(),
+        _ => format!("; the scene has {}", list(names)),
+    };
+    format!("there is no {kind} {:?}{instead}", cut(wrong))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn similar_names_are_suggested_and_others_are_not() {
+        let names = ["yellow", "red", "fov", "look_at"];
+        for (wrong, right) in [
+            ("yelow", Some("yellow")),
+            ("Yellow", Some("yellow")),
+            ("fovv", Some("fov")),
+            ("lookat", Some("look_at")),
+            ("ofv", Some("fov")),
+            ("rde", Some("red")),
+            ("blue", None),
+            ("x", None),
+            ("", None),
+        ] {
+            assert_eq!(closest(wrong, names), right, "{wrong}");
+        }
+        assert_eq!(closest(&"y".repeat(1000), names), None);
+    }
+
+    #[test]
+    fn unknown_names_are_reported_with_what_exists() {
+        let of = |wrong, names: &[&'static str]| unknown("material", wrong, names.iter().copied());
+        assert_eq!(of("a", &[]), "there is no material \"a\"; the scene has none");
+        assert_eq!(
+            of("yelow", &["red", "yellow"]),
+            "there is no material \"yelow\"; did you mean \"yellow\"?"
+        );
+        assert_eq!(
+            of("blue", &["red", "yellow"]),
+            "there is no material \"blue\"; the scene has \"red\", \"yellow\""
+        );
+    }
+}
