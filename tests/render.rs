@@ -76,7 +76,7 @@ pub fn small_scenes() -> Vec<(String, Packed)> {
 /// Every pattern in some scene, every scene with some pattern, with many sizes, seeds and numbers of samples.
 pub fn variations() -> Vec<(String, Packed)> {
     let (mut scenes, patterns) = (scenes::descriptions(), patterns::all());
-    scenes.sort_by_key(|(_, d)| d.render.integrator == Integrator::Path); // later, so that the others keep their numbers
+    scenes.sort_by_key(|(_, d)| d.integrator() == Integrator::Path); // later, so that the others keep their numbers
     let vary = |i: usize| {
         let (name, d) = &scenes[i % scenes.len()];
         let (size, counts) = (

@@ -37,37 +37,40 @@ pub(super) fn surround(description: &mut Description, environment: &EnvironmentD
 impl Background {
     /// Lets the camera see this. The scene is lit as before.
     pub(super) fn show(self, description: &mut Description) -> Result<(), Problem> {
+        let seen = match self {
+            Background::Transparent => return transparent(description),
+            Background::Color(seen) => seen,
+            Background::Display(shown) => match view(&description.image) {
+                Ok(view) => DVec3::from_array(view.light_of(shown.to_array())),
+                Err(_) => return Ok(()), // reported when the scene is validated
+            },
+        };
+        let seen = color(seen)?;
         let is_path = description.integrator() == Integrator::Path;
-        let image = &description.image;
         let render = &mut description.render;
-        match self {
-            Background::Transparent if is_path || render.integrator.is_none() => {
-                render.alpha = Some(true);
-                if let Some(environment) = &mut description.environment {
-                    environment.background = None;
-                }
-            }
-            Background::Transparent => return Err(Problem::new("none needs integrator = \"path\"")),
-            Background::Color(_) | Background::Display(_) => {
-                let seen = match self {
-                    Background::Display(shown) => DVec3::from_array(view(image)?.light_of(shown.to_array())),
-                    Background::Color(seen) => seen,
-                };
-                let seen = color(seen)?;
-                if !is_path {
-                    render.background = seen;
-                    return Ok(());
-                }
-                render.alpha = None;
-                let light = &mut render.background;
-                let plain = || EnvironmentDescription::new(std::mem::take(light));
-                let environment = description.environment.get_or_insert_with(plain);
-                environment.background = Some(seen);
-                environment.visible = true;
-            }
+        if !is_path {
+            render.background = seen;
+            return Ok(());
         }
+        render.alpha = None;
+        let light = &mut render.background;
+        let plain = || EnvironmentDescription::new(std::mem::take(light));
+        let environment = description.environment.get_or_insert_with(plain);
+        environment.background = Some(seen);
+        environment.visible = true;
         Ok(())
     }
+}
+
+fn transparent(description: &mut Description) -> Result<(), Problem> {
+    if description.render.integrator == Some(Integrator::Phong) {
+        return Err(Problem::new("none needs integrator = \"path\""));
+    }
+    description.render.alpha = Some(true);
+    if let Some(environment) = &mut description.environment {
+        environment.background = None;
+    }
+    Ok(())
 }
 
 /// A problem of the surroundings that stand in for a scene's, as one of the option.
