@@ -1,5 +1,4 @@
-//! What renders: the choice among the CPU and the adapters of the machine, the device that is opened anew where one was lost,
-//! and the CPU that takes over where an adapter cannot do the work.
+//! Device selection among the CPU and the GPU adapters, recovery of lost devices, and fallback to the CPU.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,16 +15,16 @@ use crate::render::Options;
 #[cfg(feature = "gpu")]
 use crate::scene::Problem;
 
-/// Which device a render asks for. Without the feature `gpu` only the CPU is available.
+/// The requested device. Without the feature `gpu` only the CPU is available.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Device {
-    /// A real GPU; else software Vulkan for scenes without trees (meshes, or more than 64 bounded primitives), and the CPU for
-    /// those with, which it walks faster; the CPU where there is no adapter.
+    /// A hardware GPU if there is one. Otherwise the CPU for scenes with a BVH (meshes, or more than 64 bounded primitives), which
+    /// it traverses faster than software Vulkan, and software Vulkan for all others. The CPU if no adapter exists.
     #[default]
     Auto,
     /// The CPU, without any driver.
     Cpu,
-    /// Any adapter: a real GPU, else software Vulkan.
+    /// Any adapter: a hardware GPU, else software Vulkan.
     Gpu,
     /// The adapter with this text as part of its name, driver or type, or with this number in the list of all adapters,
     /// counted from 1.
@@ -33,7 +32,7 @@ pub enum Device {
 }
 
 impl From<&str> for Device {
-    /// `auto`, `cpu` and `gpu`, in any case of letters, are those choices; any other text is an adapter's name.
+    /// Parses `auto`, `cpu` and `gpu`, ignoring case; any other text is the name of an adapter.
     fn from(name: &str) -> Device {
         match name.to_lowercase().as_str() {
             "auto" => Device::Auto,
@@ -44,7 +43,7 @@ impl From<&str> for Device {
     }
 }
 
-/// What a picture is rendered on.
+/// The device that renders an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct DeviceInfo {
@@ -58,39 +57,39 @@ pub struct DeviceInfo {
 
 type Ready<'a> = (Box<dyn Backend + 'a>, DeviceInfo);
 
-/// What is done about a fault of a device.
+/// The recovery from a device fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Recovery {
-    /// The device is opened anew.
+    /// The device is opened again.
     Reopen,
     /// The CPU renders from now on.
     Cpu,
 }
 
-/// What is told of a fault that does not end the work.
+/// The callback that reports a fault from which the renderer recovers.
 pub type Tell<'a> = Box<dyn FnMut(&RenderError, Recovery) + 'a>;
 
-/// Whom a renderer turns to at a fault.
+/// Callbacks of a renderer about device faults.
 pub struct FaultHandler<'a> {
-    /// Is told of a fault that does not end the work, and what is done about it.
+    /// Reports a fault and the recovery from it.
     pub tell: Tell<'a>,
-    /// Tells whether to give up while a lost device is waited for.
+    /// Returns true to give up waiting for a lost device.
     pub stopped: Box<dyn Fn() -> bool + 'a>,
 }
 
-/// So long a lost device is given to come back before it is opened anew, time after time without any progress in between.
+/// Pauses before the attempts to open a lost device again, without progress between them.
 const PAUSES: [Duration; 3] = [Duration::ZERO, Duration::from_millis(500), Duration::from_secs(2)];
 
-/// So often a pause is looked up from.
-const LOOK: Duration = Duration::from_millis(20);
+/// Interval at which the stop callback is polled during a pause.
+const STOP_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Tells a renderer, in the midst of its work, that the work has come further in a way that a loss of the device does not undo.
-/// Losses are counted from there: work that comes on between them goes on, however many there are.
+/// A counter of results that a loss of the device does not undo. The renderer counts losses since the last progress, so that work that
+/// advances between losses continues however often the device is lost.
 #[derive(Clone, Debug, Default)]
 pub struct Progress(Arc<AtomicU64>);
 
 impl Progress {
-    /// Something was finished for good.
+    /// Counts a finished result.
     pub fn made(&self) {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
@@ -100,7 +99,7 @@ impl Progress {
     }
 }
 
-/// A scene on a device, which is opened anew if it is lost, with the CPU to fall back on.
+/// A scene on a device that is opened again if it is lost, with the CPU as a fallback.
 pub struct Renderer<'a> {
     scene: &'a Packed,
     device: Device,
@@ -109,25 +108,25 @@ pub struct Renderer<'a> {
     info: DeviceInfo,
     why: Option<String>,
     on_fault: FaultHandler<'a>,
-    /// The film that work may be cut for, once that is known: a device that takes the place of another must have room for it.
+    /// The size of the film for which the work was divided, once known. A replacement device must support it.
     needed_film: Option<u64>,
-    /// The device that was lost, and why, while there is no other.
+    /// The lost device and the reason, while no device is open.
     gone: Option<(String, String)>,
-    /// How often the device was lost since there was progress.
+    /// Number of losses since the last progress.
     losses: usize,
     progress: Progress,
-    /// What it counted at the last loss.
+    /// Value of `progress` at the last loss.
     known_progress: u64,
 }
 
 impl<'a> Renderer<'a> {
-    /// Makes a device ready for a scene. With [`Device::Auto`] the CPU renders where there is no adapter, where the scene is
-    /// too large for it, and where it is lost and does not come back; `on_fault` is told why.
+    /// Opens a device for a scene. With [`Device::Auto`] the CPU renders if no adapter exists, if the scene is too large for it, or if it
+    /// is lost for good; `on_fault` reports the reason.
     ///
     /// # Errors
     ///
-    /// No device that fits the choice, scenes that it has no room for, what its driver refuses or loses, and
-    /// [`Options::exact_rounding`] on an adapter that is not reached by Vulkan.
+    /// No device matches the request, the scene does not fit, the driver fails, or [`Options::exact_rounding`] is set for an adapter that
+    /// does not use Vulkan.
     pub fn new(scene: &'a Packed, options: &Options, on_fault: FaultHandler<'a>) -> Result<Renderer<'a>, Error> {
         let (backend, info) = cpu(scene);
         let mut renderer = Renderer {
@@ -139,7 +138,7 @@ impl<'a> Renderer<'a> {
             backend,
             info,
             why: match options.device {
-                Device::Auto => faster_on_cpu(scene),
+                Device::Auto => faster_on_cpu(scene).map(|why| format!("{ON_CPU}{why}")),
                 _ => None,
             },
             on_fault,
@@ -164,34 +163,34 @@ impl<'a> Renderer<'a> {
         Ok(renderer)
     }
 
-    /// Why [`Device::Auto`] chose the CPU though there is an adapter.
+    /// Returns the reason why [`Device::Auto`] chose the CPU although an adapter exists.
     pub fn why(&self) -> Option<&str> {
         self.why.as_deref()
     }
 
-    /// What it renders on now.
+    /// Returns the current device.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
     }
 
-    /// The largest film that the device can have, in pixels. It stays so when another device takes its place.
+    /// Returns the maximum size of a film in pixels. It is kept when another device replaces this one.
     pub fn largest_film(&self) -> u64 {
         self.needed_film.unwrap_or_else(|| self.backend.largest_film())
     }
 
-    /// What work can tell its progress by.
+    /// Returns the counter that work reports its progress to.
     pub fn progress(&self) -> Progress {
         self.progress.clone()
     }
 
-    /// Does work on the device, which is told what it is. If the device is lost, it is opened anew and does the work again.
-    /// Where it does not come back, or has no memory for the work, and [`Device::Auto`] chose it, the CPU does it, and all that
-    /// follows; so it does, whatever the choice, where the driver cuts the work short, as the CPU has no such limit.
+    /// Runs `work` on the device. If the device is lost, it is opened again and the work is repeated. With [`Device::Auto`] the CPU takes
+    /// over for good if the device cannot be opened again or has too little memory. With any choice it takes over if the driver ends loops
+    /// early, because the CPU has no such limit.
     ///
     /// # Errors
     ///
-    /// The errors of the work; [`RenderError::Lost`] if the device does not come back; [`RenderError::Cancelled`] if the
-    /// renderer was told to stop while it waited for that.
+    /// The errors of the work; [`RenderError::Lost`] if the device cannot be opened again; [`RenderError::Cancelled`] if the renderer was
+    /// stopped while it waited.
     pub fn work<T>(
         &mut self,
         mut work: impl FnMut(&mut dyn Backend, &DeviceInfo) -> Result<T, RenderError>,
@@ -210,10 +209,10 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// Does what there is to do about an error, after which work can be done again; or returns it.
+    /// Recovers from an error so that the work can be repeated, or returns the error.
     fn mend(&mut self, error: RenderError) -> Result<(), RenderError> {
         match error {
-            RenderError::Lost { device, message } => self.open_anew(device, message),
+            RenderError::Lost { device, message } => self.reopen(device, message),
             RenderError::CutShort { .. } => {
                 self.go_on_cpu(&error);
                 Ok(())
@@ -226,8 +225,8 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// Opens the lost device anew, or one that may take its place.
-    fn open_anew(&mut self, lost: String, message: String) -> Result<(), RenderError> {
+    /// Opens the lost device again, or a replacement.
+    fn reopen(&mut self, lost: String, message: String) -> Result<(), RenderError> {
         let progress = self.progress.count();
         if progress > std::mem::replace(&mut self.known_progress, progress) {
             self.losses = 0;
@@ -278,11 +277,11 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// Gives back what is on a lost device.
+    /// Releases the resources of a lost device.
     fn release(&mut self, lost: &str, message: &str) {
         let (cpu, _) = cpu(self.scene);
         let backend = std::mem::replace(&mut self.backend, cpu);
-        let _ = contained(|| drop(backend)); // wgpu may panic, and nothing is left to be done about that
+        let _ = contained(|| drop(backend)); // wgpu may panic, which has no consequence here
         self.gone = Some((lost.to_string(), message.to_string()));
     }
 
@@ -294,7 +293,7 @@ impl<'a> Renderer<'a> {
             }
             match length.saturating_sub(start.elapsed()) {
                 Duration::ZERO => return Ok(()),
-                left => std::thread::sleep(left.min(LOOK)),
+                left => std::thread::sleep(left.min(STOP_INTERVAL)),
             }
         }
     }
@@ -310,20 +309,20 @@ impl<'a> Renderer<'a> {
     }
 }
 
-/// What a render would begin on, and why.
+/// The device that a render would use, and the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Foreseen {
     /// The device.
     pub info: DeviceInfo,
-    /// Why that one.
+    /// The reason.
     pub why: String,
-    /// The adapter, if it is one, and what it would do.
+    /// The adapter and its plan, unless it is the CPU.
     #[cfg(feature = "gpu")]
     pub adapter: Option<(gpu::Info, gpu::Foreseen)>,
 }
 
-/// Says what a render would begin on. No device is opened. One that then cannot be opened, or has no room for the scene, gives way to
-/// the next, or to the CPU.
+/// Returns the device that a render would use, without opening it. A render uses the next device, or the CPU, if that one cannot be opened
+/// or is too small for the scene.
 ///
 /// # Errors
 ///
@@ -342,7 +341,6 @@ pub fn foresee(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError>
         }
         Device::Auto => {
             if let Some(why) = faster_on_cpu(scene) {
-                let why = why.strip_prefix(ON_CPU).unwrap_or(&why).to_owned();
                 return Ok(on_cpu(why));
             }
         }
@@ -406,14 +404,14 @@ fn cpu_info() -> DeviceInfo {
     }
 }
 
-/// How a message begins that says why the CPU was chosen.
+/// Prefix of the message why the CPU was chosen.
 const ON_CPU: &str = "rendering on the CPU: ";
 
 fn cpu(scene: &Packed) -> Ready<'_> {
     (Box::new(Cpu::new(scene)), cpu_info())
 }
 
-/// Whether the CPU is faster for a scene than what else there is, and why: measured in `docs/performance.md`.
+/// Returns the reason why the CPU is faster for a scene than any adapter, if it is: measured in `docs/performance.md`.
 #[cfg(feature = "gpu")]
 fn faster_on_cpu(scene: &Packed) -> Option<String> {
     if scene.specialization.in_tree == 0 {
@@ -422,7 +420,7 @@ fn faster_on_cpu(scene: &Packed) -> Option<String> {
     let adapter = gpu::adapters().into_iter().next()?;
     (adapter.kind == "software").then(|| {
         let name = adapter.name;
-        format!("{ON_CPU}no GPU found, and the CPU traverses the BVH faster than {name}; use --device gpu to override")
+        format!("no GPU found, and the CPU traverses the BVH faster than {name}; use --device gpu to override")
     })
 }
 
@@ -431,7 +429,7 @@ fn faster_on_cpu(_: &Packed) -> Option<String> {
     None
 }
 
-/// A scene on an adapter that fits the choice, and whose name and type are wanted.
+/// Opens the first adapter that matches the request and that `wanted` accepts by its name and type.
 #[cfg(feature = "gpu")]
 fn adapter<'a>(
     scene: &'a Packed,

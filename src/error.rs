@@ -1,4 +1,4 @@
-//! What can go wrong, as types.
+//! Error types of scenes, devices and renders.
 
 use std::fmt;
 use std::ops::Range;
@@ -8,37 +8,37 @@ use thiserror::Error;
 use crate::film::Region;
 use crate::scene::{Problem, SceneError};
 
-/// What can go wrong between a scene and its picture.
+/// An error of loading, rendering or saving a scene.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A scene file that is no scene.
+    /// An invalid scene file.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A description, made in code, that is no scene.
+    /// An invalid description that was made in code.
     #[error(transparent)]
     Description(#[from] Problem),
-    /// An option of a render that does not fit the scene or the device.
+    /// A render option that does not apply to the scene or the device.
     #[error("{0}")]
     Option(Problem),
-    /// A picture that could not be rendered or written.
+    /// An image that could not be rendered or written.
     #[error(transparent)]
     Render(#[from] RenderError),
 }
 
-/// A shader that naga refuses: where and why.
+/// An error in a shader.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{place}: {message}")]
 pub struct ShaderError {
-    /// File, line and column that the author wrote, `camera.wgsl:12:9`; or the stage that failed.
+    /// File, line and column of the source, such as `camera.wgsl:12:9`, or the stage that failed.
     pub place: String,
-    /// What is wrong.
+    /// The message.
     pub message: String,
-    /// The source around the place, with the place marked, if there is one.
+    /// The marked source line and its neighbors, if the place is known.
     pub excerpt: Option<String>,
 }
 
-/// All that is wrong with shaders: one mistake at least.
+/// All errors of the shaders; at least one.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub struct ShaderErrors(pub Vec<ShaderError>);
 
@@ -52,40 +52,40 @@ impl fmt::Display for ShaderErrors {
     }
 }
 
-/// Why a picture could not be rendered.
+/// The reason why an image could not be rendered.
 #[derive(Debug, Error)]
 pub enum RenderError {
-    /// No device fits what was asked for.
+    /// No device matches the request.
     #[error("{0}")]
     NoDevice(String),
-    /// The shaders are wrong.
+    /// A shader is invalid.
     #[error(transparent)]
     Shader(#[from] ShaderError),
-    /// The driver refused or lost something.
+    /// The driver reported an error.
     #[error("{device}: {message}")]
     Device {
         /// The adapter's name.
         device: String,
-        /// What it says.
+        /// The message of the driver.
         message: String,
     },
-    /// The device is gone, as when its driver was reset: what was on it is lost. Another one may be opened.
+    /// The device was lost, for example because its driver was reset, with all of its memory. Another one may be opened.
     #[error("{device}: the device was lost: {message}")]
     Lost {
         /// The adapter's name.
         device: String,
-        /// What its driver says.
+        /// The message of the driver.
         message: String,
     },
-    /// The device has no memory left for what is needed.
+    /// The device has too little memory.
     #[error("{device}: out of memory: {message}")]
     OutOfMemory {
         /// The adapter's name.
         device: String,
-        /// What takes how much.
+        /// The allocation that failed, and the memory in use.
         message: String,
     },
-    /// The driver ends loops before their time, and did so in a kernel that renders a single sample of a pixel.
+    /// The driver ends long loops early, even in a kernel that renders a single sample of a pixel.
     #[error(
         "{device}: this driver ends long loops early, even for a single sample of a pixel; use fewer shapes, lights or \
          light samples, or the CPU"
@@ -94,36 +94,36 @@ pub enum RenderError {
         /// The adapter's name.
         device: String,
     },
-    /// The device cannot see all of the scene.
+    /// The scene exceeds a limit of the device.
     #[error("{device}: {message}; the CPU has no such limit")]
     TooLarge {
         /// The adapter's name.
         device: String,
-        /// What is too large, and what would fit.
+        /// The size and the limit.
         message: String,
     },
-    /// Work or a look at a film where there is none.
+    /// A call that needs a film before one was begun or resumed.
     #[error("no film; begin or resume one first")]
     NoFilm,
     /// A call while another is pending.
     #[error("a call is pending; wait for it, or poll until it is done")]
     Pending,
-    /// Work outside of the pixels that there are.
+    /// A region outside of the film or the image.
     #[error("the {what} x0,y0,x1,y1 = {region} must lie within the {of} {limits}")]
     Outside {
-        /// What lies outside.
+        /// Name of the region.
         what: &'static str,
         /// Its pixels.
         region: Region,
-        /// What it should lie in.
+        /// Name of the region that must contain it.
         of: &'static str,
         /// Its pixels.
         limits: Region,
     },
-    /// A film that cannot be gone on from.
+    /// A film that cannot be resumed for this scene.
     #[error("the film does not fit the scene: {0}")]
     WrongFilm(String),
-    /// Further samples under adaptive sampling, which the first ones of the pixels around decide on, before those.
+    /// Adaptive samples before the first samples of all pixels, which decide how many are needed.
     #[error(
         "samples {} to {} come too early: some pixels of the film do not have their first {first} yet",
         samples.start, samples.end
@@ -131,19 +131,19 @@ pub enum RenderError {
     TooEarly {
         /// The samples.
         samples: Range<u32>,
-        /// How many all pixels get first.
+        /// Number of first samples of every pixel.
         first: u32,
     },
-    /// There is no memory for a picture of so many bytes.
+    /// The image, with this size in bytes, does not fit into memory.
     #[error("an image in memory needs {} MiB, which are not available; render a crop", .0 >> 20)]
     Memory(u64),
-    /// What the work goes on from cannot be read.
+    /// A checkpoint or part to resume from cannot be read.
     #[error("{0}")]
     Input(std::io::Error),
     /// The work was cancelled.
     #[error("cancelled")]
     Cancelled,
-    /// Whatever takes the picture failed.
+    /// The output failed.
     #[error(transparent)]
     Output(#[from] std::io::Error),
 }

@@ -147,7 +147,7 @@ fn options_that_do_not_fit_are_told() {
     for (options, told) in [
         (
             crop(0, 0, 25, 16),
-            "crop: 0,0,25,16 must lie in the picture of 24 x 16 pixels",
+            "crop: 0,0,25,16 must lie within the image of 24 x 16 pixels",
         ),
         (crop(3, 0, 3, 16), "crop: 3,0,3,16 must have x0 < x1 and y0 < y1"),
         (crop(5, 9, 7, 2), "crop: 5,9,7,2 must have x0 < x1 and y0 < y1"),

@@ -1,4 +1,4 @@
-//! What surrounds a scene and what its camera sees there, in place of what its file says.
+//! Overrides of the environment and of the background that the camera sees.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -10,11 +10,11 @@ use super::image_file::srgb_to_linear;
 use super::validate::{color, view};
 use super::{Description, EnvironmentDescription, EnvironmentName, Integrator};
 
-/// What the camera sees where nothing is, in place of what surrounds the scene.
+/// The background that the camera sees in place of the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Background {
-    /// Nothing: the picture is transparent there. For [`Integrator::Path`] alone.
+    /// Transparency. Only for [`Integrator::Path`].
     Transparent,
     /// This radiance, in linear RGB.
     Color(DVec3),
@@ -22,7 +22,7 @@ pub enum Background {
     Display(DVec3),
 }
 
-/// Puts other surroundings around a scene. Whether the camera sees them stays.
+/// Replaces the environment. Its visibility to the camera is kept.
 pub(super) fn surround(description: &mut Description, environment: &EnvironmentDescription) {
     let before = description.environment.take();
     let (visible, background) = before.map_or((true, None), |before| (before.visible, before.background));
@@ -35,7 +35,7 @@ pub(super) fn surround(description: &mut Description, environment: &EnvironmentD
 }
 
 impl Background {
-    /// Lets the camera see this. The scene is lit as before.
+    /// Shows this to the camera. The light of the scene is not changed.
     pub(super) fn show(self, description: &mut Description) -> Result<(), Problem> {
         let seen = match self {
             Background::Transparent => return transparent(description),
@@ -73,7 +73,7 @@ fn transparent(description: &mut Description) -> Result<(), Problem> {
     Ok(())
 }
 
-/// A problem of the surroundings that stand in for a scene's, as one of the option.
+/// Returns a problem of the environment override as one of the option.
 pub(super) fn of_option(problem: Problem) -> Result<Problem, Problem> {
     let key = problem.key.to_string();
     match key.strip_prefix("environment") {
@@ -99,7 +99,7 @@ impl FromStr for Background {
 impl FromStr for EnvironmentDescription {
     type Err = String;
 
-    /// One of the program's own by its name, a colour, or else an image by its path, relative to the current folder.
+    /// A built-in environment by its name, a color, or the path of an image, relative to the current folder.
     fn from_str(text: &str) -> Result<EnvironmentDescription, String> {
         let own = EnvironmentName::ALL.into_iter().find(|name| name.name() == text);
         if let Some(name) = own {

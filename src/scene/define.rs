@@ -97,11 +97,11 @@ fn no_path(text: &str) -> Problem {
     Problem::new(format!("{} must be a path, such as shapes[2].radius", cut(text)))
 }
 
-/// The most steps of a path: tables and lists of a file are no deeper in each other.
-const LONGEST_PATH: usize = 80;
+/// Maximum number of segments of a path, which is the nesting limit of a file.
+const MAX_SEGMENTS: usize = 80;
 
 fn too_deep(text: &str) -> Problem {
-    Problem::new(format!("{} must have at most {LONGEST_PATH} steps", cut(text)))
+    Problem::new(format!("{} must have at most {MAX_SEGMENTS} steps", cut(text)))
 }
 
 /// The path at the start of a text, and what is behind it: nothing, or what begins with `=`. What is told of another text is
@@ -146,7 +146,7 @@ fn read_key(text: &str, unreadable: fn(&str) -> Problem) -> Result<(KeyPath, &st
         }
     }
     match between && !path.is_empty() {
-        true if path.len() > LONGEST_PATH => Err(too_deep(text)),
+        true if path.len() > MAX_SEGMENTS => Err(too_deep(text)),
         true => Ok((KeyPath(path), rest)),
         false => Err(unreadable(text)),
     }
@@ -157,7 +157,7 @@ fn index(text: &str) -> Option<usize> {
     text.parse().ok().filter(|_| digits)
 }
 
-/// A value of TOML, or a text. What begins as a list, a table or a quoted text must be one.
+/// Parses a TOML value, or a string without quotes. A text that starts like a list, table or quoted string must be one.
 fn read_value(text: &str) -> Result<Value, String> {
     let text = text.trim();
     if text.is_empty() {
@@ -177,8 +177,7 @@ fn read_value(text: &str) -> Result<Value, String> {
     }
 }
 
-/// Values on their way into a file that is being read. What was put where is kept, so that messages name who brought a bad
-/// value.
+/// Defined values that are inserted while a file is parsed. Their paths are kept, so that messages attribute errors to them.
 pub(super) struct Defines<'a> {
     given: &'a [Define],
     /// Those that have been put, or could not be.
@@ -186,7 +185,7 @@ pub(super) struct Defines<'a> {
 }
 
 struct Put {
-    /// Which of those given.
+    /// Index among the given values.
     number: usize,
     /// The key, with numbers where lists are.
     path: Vec<Segment>,
@@ -209,7 +208,7 @@ impl<'a> Defines<'a> {
         self.put.clear();
     }
 
-    /// Whether a value was brought from outside, at this key or around it.
+    /// Returns true if the value of this key, or of a table around it, was defined.
     pub fn brought(&self, key: &KeyPath) -> bool {
         let key = key.0.as_slice();
         self.put.iter().any(|put| {
@@ -272,7 +271,7 @@ impl<'a> Defines<'a> {
     }
 }
 
-/// Whether a step of a key is this one; a number may be written as a name.
+/// Returns true if a segment of a key is this one; an index may be written as a name.
 fn is_step(written: &Segment, step: &Segment) -> bool {
     match (written, step) {
         (Segment::Key(name), Segment::Index(number)) => index(name) == Some(*number),
@@ -280,7 +279,7 @@ fn is_step(written: &Segment, step: &Segment) -> bool {
     }
 }
 
-/// Whether the value at a path is a number of samples, which stands for a table.
+/// Returns true if the value at a path is a number of samples, which stands for a table.
 fn is_samples(path: &[Segment]) -> bool {
     let names = ["pixel_samples", "light_samples"];
     matches!(path, [Segment::Key(section), Segment::Key(key)] if section == "render" && names.contains(&key.as_str()))
@@ -606,13 +605,13 @@ radius = 0.5
     #[test]
     fn a_path_is_no_deeper_than_a_file() {
         let path = |steps: usize| format!("{}=1", vec!["a"; steps].join("."));
-        assert!(path(LONGEST_PATH).parse::<Define>().is_ok());
-        for steps in [LONGEST_PATH + 1, 100_000] {
+        assert!(path(MAX_SEGMENTS).parse::<Define>().is_ok());
+        for steps in [MAX_SEGMENTS + 1, 100_000] {
             let told = path(steps).parse::<Define>().unwrap_err().to_string();
             assert!(told.ends_with(".a=1 must have at most 80 steps"), "{told}");
             assert!(told.len() < 100, "{told}");
         }
-        let numbers = format!("a{}=1", "[0]".repeat(LONGEST_PATH));
+        let numbers = format!("a{}=1", "[0]".repeat(MAX_SEGMENTS));
         assert!(numbers.parse::<Define>().is_err());
     }
 

@@ -1,4 +1,4 @@
-//! What can be wrong with a scene file, and where.
+//! Errors of scene files and their locations.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use crate::gltf::GltfError;
 
-/// Why there is no scene. Every message begins with the place.
+/// An error of loading a scene. Every message starts with its location.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -17,10 +17,10 @@ pub enum SceneError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The error of the operating system.
         error: io::Error,
     },
-    /// The file is no TOML, or JSON of another form than a scene's.
+    /// The file is not valid TOML or JSON, or not in the form of a scene.
     #[error("{origin}:{line}:{column}: {message}")]
     Syntax {
         /// Name of the file.
@@ -29,28 +29,28 @@ pub enum SceneError {
         line: usize,
         /// In characters, counted from 1.
         column: usize,
-        /// What the parser says.
+        /// The message.
         message: String,
     },
-    /// The file describes no scene.
+    /// A value of the file is invalid.
     #[error("{origin}:{line}: {problem}")]
     Invalid {
         /// Name of the file.
         origin: String,
         /// Counted from 1.
         line: usize,
-        /// What is wrong.
+        /// The problem.
         problem: Problem,
     },
-    /// A glTF file is no scene.
+    /// The glTF file could not be loaded as a scene.
     #[error("{0}")]
     Gltf(GltfError),
-    /// A value that stands in for one of the file is bad; the key is the field of [`Overrides`](super::Overrides).
+    /// A value that overrides one of the file is invalid; the key is the field of [`Overrides`](super::Overrides).
     #[error("{0}")]
     Override(Problem),
 }
 
-/// Where an error is, as far as that is known.
+/// The location of an error, as far as it is known.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ErrorPlace {
@@ -60,12 +60,12 @@ pub struct ErrorPlace {
     pub line: Option<usize>,
     /// Counted from 1.
     pub column: Option<usize>,
-    /// The way to the value: `shapes[2].size`.
+    /// The key path of the value: `shapes[2].size`.
     pub key: Option<String>,
 }
 
 impl SceneError {
-    /// Where it is.
+    /// Returns the location.
     pub fn place(&self) -> ErrorPlace {
         let of_file = |file: String| ErrorPlace {
             file: Some(file),
@@ -95,13 +95,13 @@ impl SceneError {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Problem {
-    /// Where it stands.
+    /// The key path of the value.
     pub key: KeyPath,
     /// The value and the rule.
     pub message: String,
-    /// Whether it is damage to a file that the scene names, for which a stand-in exists ([`Assets::strict`](super::Assets::strict)).
+    /// True if it is damage to a file that the scene names, for which a stand-in exists ([`Assets::strict`](super::Assets::strict)).
     pub(crate) is_damage: bool,
-    /// Whether the key is the subject of the message, as in `camera.fov is missing`.
+    /// True if the key is the subject of the message, as in `camera.fov is missing`.
     pub(super) is_predicate: bool,
 }
 
@@ -112,12 +112,12 @@ impl From<String> for Problem {
 }
 
 impl Problem {
-    /// A problem of one key.
+    /// Creates a problem of one key.
     pub(crate) fn of(key: &str, message: impl Into<String>) -> Self {
         Self::new(message).at(key)
     }
 
-    /// The problem of a key inside of another one.
+    /// Prepends a key to the path.
     pub(crate) fn inside(self, key: &str) -> Self {
         self.at(key)
     }
@@ -125,7 +125,7 @@ impl Problem {
     pub(super) fn new(message: impl Into<String>) -> Self {
         Self {
             key: KeyPath::default(),
-            message: cut_to(LONGEST_MESSAGE, &message.into()).into_owned(),
+            message: cut_to(MAX_MESSAGE_LEN, &message.into()).into_owned(),
             is_damage: false,
             is_predicate: false,
         }
@@ -148,18 +148,18 @@ impl Problem {
     }
 }
 
-/// The longest value or key in a message, and the longest message, in characters.
-const LONGEST: usize = 60;
-const LONGEST_MESSAGE: usize = 1000;
-/// The most steps of a way to a value that are shown.
-const MOST_SEGMENTS: usize = 20;
+/// Maximum length of a value or key in a message, and of a message, in characters.
+const MAX_VALUE_LEN: usize = 60;
+const MAX_MESSAGE_LEN: usize = 1000;
+/// Maximum number of segments of a key path that are printed.
+const MAX_SEGMENTS: usize = 20;
 
-/// A value or a key for a message: where it is long, its start and its end.
+/// Returns a value or key for a message: only its start and end if it is long.
 pub(crate) fn cut(text: &str) -> Cow<'_, str> {
-    cut_to(LONGEST, text)
+    cut_to(MAX_VALUE_LEN, text)
 }
 
-/// A text without its middle where it is longer than so many characters.
+/// Removes the middle of a text that is longer than this number of characters.
 pub(super) fn cut_to(longest: usize, text: &str) -> Cow<'_, str> {
     let count = text.chars().count();
     if count <= longest {
@@ -184,11 +184,11 @@ impl fmt::Display for Problem {
 
 impl std::error::Error for Problem {}
 
-/// The way from the top of a file to a value: `shapes[2].size`.
+/// The key path of a value: `shapes[2].size`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct KeyPath(pub(crate) Vec<Segment>);
 
-/// A step of a [`KeyPath`].
+/// A segment of a [`KeyPath`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Segment {
     Key(String),
@@ -210,10 +210,10 @@ impl From<usize> for Segment {
 impl fmt::Display for KeyPath {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        let end = self.0.len().saturating_sub(MOST_SEGMENTS / 2);
+        let end = self.0.len().saturating_sub(MAX_SEGMENTS / 2);
         for (i, segment) in self.0.iter().enumerate() {
-            if self.0.len() > MOST_SEGMENTS && (MOST_SEGMENTS / 2..end).contains(&i) {
-                if i == MOST_SEGMENTS / 2 {
+            if self.0.len() > MAX_SEGMENTS && (MAX_SEGMENTS / 2..end).contains(&i) {
+                if i == MAX_SEGMENTS / 2 {
                     f.write_str("...")?;
                 }
                 continue;
@@ -239,7 +239,7 @@ impl fmt::Display for KeyPath {
 
 #[cfg(feature = "dev")]
 impl KeyPath {
-    /// The path as a scene file has it, whatever its length: what is read back as the same path.
+    /// Returns the path as it is written in a scene file, at any length. Parsing it returns the same path.
     pub(crate) fn exact(&self) -> String {
         let mut text = String::new();
         for segment in &self.0 {
@@ -257,7 +257,7 @@ impl KeyPath {
     }
 }
 
-/// A key as TOML has it: bare, or in quotes.
+/// Returns a key as it is written in TOML: bare or quoted.
 #[cfg(feature = "dev")]
 fn written_key(key: &str) -> std::borrow::Cow<'_, str> {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
@@ -272,10 +272,10 @@ fn written_key(key: &str) -> std::borrow::Cow<'_, str> {
     format!("\"{}\"", escaped.collect::<String>()).into()
 }
 
-/// Says, on the way up, where a problem is, so that no path is built while all is well:
+/// Adds the location of a problem while it is returned, so that no path is built without one:
 /// `check(x).at("center").at(2).at("shapes")?`.
 pub(super) trait At {
-    /// Puts a step in front of the problem's path.
+    /// Prepends a segment to the path of the problem.
     fn at(self, segment: impl Into<Segment>) -> Self;
 }
 

@@ -44,7 +44,7 @@ mod tests {
     fn similar_names_are_suggested_and_others_are_not() {
         let names = ["yellow", "red", "fov", "look_at"];
         for (wrong, right) in [
-            ("yelow", Some("yellow")),
+            ("yellwo", Some("yellow")),
             ("Yellow", Some("yellow")),
             ("fovv", Some("fov")),
             ("lookat", Some("look_at")),
@@ -64,8 +64,8 @@ mod tests {
         let of = |wrong, names: &[&'static str]| unknown("material", wrong, names.iter().copied());
         assert_eq!(of("a", &[]), "there is no material \"a\"; the scene has none");
         assert_eq!(
-            of("yelow", &["red", "yellow"]),
-            "there is no material \"yelow\"; did you mean \"yellow\"?"
+            of("yellwo", &["red", "yellow"]),
+            "there is no material \"yellwo\"; did you mean \"yellow\"?"
         );
         assert_eq!(
             of("blue", &["red", "yellow"]),

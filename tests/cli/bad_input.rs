@@ -35,7 +35,7 @@ fn wrong_command_lines_exit_with_2() {
         (&["--crop", "0,4,5,3"], "y0 less than y1"),
         (
             &["--crop", "0,0,11,6"],
-            "--crop: 0,0,11,6 must lie in the picture of 10 x 6 pixels",
+            "--crop: 0,0,11,6 must lie within the image of 10 x 6 pixels",
         ),
         (&["--crop", "0,6,10,7"], "--crop"),
         (&["--device", ""], "--device"),
@@ -220,7 +220,7 @@ fn a_device_that_is_not_there_exits_with_4() {
         &place,
         &ran,
         4,
-        "no adapter's name, driver or type contains 'abacus'; there are 1: ",
+        "no adapter's name, driver or type contains 'abacus'; available: 1: ",
     );
     for device in ["gpu", "lavapipe"] {
         let ran = place.run_with(&["render", "small.toml", "--device", device], &NO_DRIVER);

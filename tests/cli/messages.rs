@@ -109,13 +109,13 @@ fn values_of_a_wrong_kind_are_told_with_the_right_kind() {
     for (from, to, message) in [
         (
             samples,
-            "pixel_samples = 16",
-            "bad.toml:6: render.pixel_samples: 16 must be a table, such as { pattern = \"grid\", count = 16 }",
+            "pixel_samples = 16.5",
+            "bad.toml:6: render.pixel_samples: 16.5 must be a whole number or a table, such as { pattern = \"grid\", count = 16 }",
         ),
         (
             samples,
             "pixel_samples = 'sobol'",
-            "bad.toml:6: render.pixel_samples: \"sobol\" must be a table, such as { pattern =",
+            "bad.toml:6: render.pixel_samples: \"sobol\" must be a whole number or a table, such as { pattern =",
         ),
         (
             samples,
@@ -130,7 +130,7 @@ fn values_of_a_wrong_kind_are_told_with_the_right_kind() {
         (
             samples,
             "adaptive = { error = 0.01 }",
-            "render.adaptive: the pattern of pixel_samples is \"grid\", which has no further samples; it must be one of \"jittered\", \"random\", \"halton\", \"sobol\"",
+            "render.adaptive: the pattern of pixel_samples, \"grid\", cannot add samples; use one of \"jittered\", \"random\", \"halton\", \"sobol\"",
         ),
         (
             "width = 10",
@@ -244,7 +244,7 @@ fn wrong_arguments_are_told_with_the_way_out() {
     assert!(
         adaptive
             .stderr
-            .starts_with("error: --adaptive: the pattern of pixel_samples is \"grid\", ")
+            .starts_with("error: --adaptive: the pattern of pixel_samples, \"grid\", ")
             && adaptive.stderr.contains("--pixel-pattern sobol"),
         "{}",
         adaptive.stderr

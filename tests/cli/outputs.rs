@@ -412,7 +412,7 @@ mod unix {
         assert_eq!((ran.code, ran.stdout.as_str()), (8, ""));
         assert!(
             ran.stderr
-                .contains("standard output: cannot be written: it must first be whole in /nonexistent"),
+                .contains("standard output: cannot be written: cannot create a temporary file in /nonexistent"),
             "{}",
             ran.stderr
         );

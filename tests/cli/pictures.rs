@@ -607,12 +607,12 @@ fn pictures_that_a_format_has_no_room_for_are_refused() {
         (
             "a.jpg",
             "65536x60000",
-            "--output: a.jpg: 65536 x 60000 pixels are too many for a JPEG, which has 65535 along a side at most",
+            "--output: a.jpg: 65536 x 60000 pixels are too many for a JPEG; the limit is 65535 along a side",
         ),
         (
             "a.webp",
             "60000x16384",
-            "--output: a.webp: 60000 x 16384 pixels are too many for a WebP, which has 16383 along a side",
+            "--output: a.webp: 60000 x 16384 pixels are too many for a WebP; the limit is 16383 along a side",
         ),
     ] {
         refused(

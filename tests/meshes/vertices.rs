@@ -662,11 +662,11 @@ fn images_that_give_no_directions_are_told() {
         ("type = 'constant', color = [1, 1, 1]", "be a texture of type \"image\""),
         (
             "type = 'image', file = 't.png'",
-            "have encoding = \"linear\" to give directions",
+            "have encoding = \"linear\" as a direction map",
         ),
         (
             "type = 'image', file = 't.png', encoding = 'linear', factor = [1, 0.5, 1, 1]",
-            "have no factor of red and green to give directions",
+            "have a red and green factor of 1 as a direction map",
         ),
     ] {
         let message = message(texture);

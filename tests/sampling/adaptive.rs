@@ -331,7 +331,7 @@ fn what_cannot_be_is_told() {
     for (render, expected) in [
         (
             "adaptive = { error = 0.1 }",
-            "s.toml:4: render.adaptive: the pattern of pixel_samples is \"grid\", which has no further samples",
+            "s.toml:4: render.adaptive: the pattern of pixel_samples, \"grid\", cannot add samples",
         ),
         (
             &format!("{sobol}adaptive = {{ error = 2 }}"),
@@ -383,7 +383,7 @@ fn what_cannot_be_is_told() {
         pixel_pattern: pattern,
         ..Overrides::default()
     };
-    let grid = "adaptive: the pattern of pixel_samples is \"grid\", which has no further samples";
+    let grid = "adaptive: the pattern of pixel_samples, \"grid\", cannot add samples";
     assert!(told("", &option(0.1, None)).starts_with(grid));
     assert!(told("", &option(-0.1, Some(Pattern::Sobol))).starts_with("adaptive: -0.1 must be from 0 to 1"));
     let scene = Scene::parse_with(&text(""), "s.toml", &option(0.1, Some(Pattern::Sobol))).expect("a sound scene");

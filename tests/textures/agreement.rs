@@ -213,7 +213,7 @@ fn texels_in_several_buffers_give_the_same_picture() {
     small.info.storage_buffers = 9;
     let error = new(&small, false).err().unwrap().to_string();
     assert!(
-        error.contains("the scene's images take 0.0 MiB, a shader sees 2 x 0.0 MiB"),
+        error.contains("the scene's images need 0.0 MiB; the limit is 2 x 0.0 MiB"),
         "{error}"
     );
     assert!(error.ends_with("the CPU has no such limit"), "{error}");

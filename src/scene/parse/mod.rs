@@ -1,4 +1,4 @@
-//! From the text of a scene file to its [`Description`], and from a key path to its line.
+//! Parses scene files to a [`Description`], and finds the line of a key path.
 
 #[cfg(feature = "dev")]
 mod change;
@@ -35,17 +35,17 @@ pub(crate) use change::{Pieces, Places};
 pub(super) use syntax::{NOT_UTF8, encoding, syntax_error};
 
 impl Description {
-    /// Reads the text of a scene file; `origin` is the file's name in messages, which says by `.json` that it is JSON.
-    /// Values are not checked yet.
+    /// Parses a scene file without validating its values. `origin` is the name of the file in messages; if it ends in `.json`, the text is
+    /// JSON.
     ///
     /// # Errors
     ///
-    /// Text that is no TOML or JSON, unknown and missing keys, unknown types, and values of the wrong type.
+    /// Invalid TOML or JSON, unknown and missing keys, unknown types, and values of the wrong type.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SceneError> {
         Description::parse_with(text, origin, &mut Defines::new(&[]))
     }
 
-    /// The same scene with other values in place of some of its own.
+    /// Returns the description with the defined values.
     pub(super) fn defined(&self, defines: &mut Defines) -> Result<Description, Problem> {
         let mut file = Table::try_from(self).map_err(|error| Problem::new(error.to_string()))?;
         let put = defines.put(&[], &mut file, |_| false);
@@ -53,7 +53,7 @@ impl Description {
             .map_err(|problem| problem.at("define"))
     }
 
-    /// [`Description::parse`], with other values in place of some of the text's.
+    /// Parses a scene file with the defined values.
     pub(super) fn parse_with(text: &str, origin: &str, defines: &mut Defines) -> Result<Self, SceneError> {
         if course::is_course(Path::new(origin)) {
             return course::read(text, origin, defines);
@@ -80,7 +80,7 @@ impl Description {
     }
 }
 
-/// The error of a text whose value at the problem's path is bad, or of the value that was brought to that path.
+/// Returns the error of an invalid value, of the text or of a define.
 pub(super) fn invalid(text: &str, origin: &str, problem: Problem, defines: &Defines) -> SceneError {
     if defines.brought(&problem.key) {
         return SceneError::Override(problem.at("define"));
@@ -92,7 +92,7 @@ pub(super) fn invalid(text: &str, origin: &str, problem: Problem, defines: &Defi
     }
 }
 
-/// The line, from 1, of the key at the end of a path; of its innermost table that is there if it is not.
+/// Returns the line, from 1, of the key at a path, or of the innermost table that exists.
 fn locate(text: &str, path: &KeyPath) -> usize {
     let at = match text.len() > LARGEST {
         true => place_in_parts(&Parts::of(text), path),
@@ -101,12 +101,12 @@ fn locate(text: &str, path: &KeyPath) -> usize {
     line_number(text, at)
 }
 
-/// The line, from 1, of a camera's path.
+/// Returns the line, from 1, of the path of the camera.
 pub(super) fn line_of_path(text: &str) -> usize {
     locate(text, &KeyPath(["camera", "path"].map(Segment::from).to_vec()))
 }
 
-/// The byte where the key at the end of a path begins, in a text that is too large to be read as a whole.
+/// Returns the byte offset of the key at a path, in a text that is too large to parse at once.
 fn place_in_parts(parts: &Parts, path: &KeyPath) -> usize {
     match parts.find(path) {
         Some((part, path)) => part.place.start + place_in(parts.text(part), &path),
@@ -117,7 +117,7 @@ fn place_in_parts(parts: &Parts, path: &KeyPath) -> usize {
     }
 }
 
-/// The byte where the key at the end of a path begins.
+/// Returns the byte offset of the key at a path.
 fn place_in(text: &str, path: &KeyPath) -> usize {
     let Ok(document) = DeTable::parse(text) else {
         return 0;
@@ -145,7 +145,7 @@ fn line_number(text: &str, at: usize) -> usize {
     1 + newlines.count()
 }
 
-/// The sections of a file, before they are looked into.
+/// The sections of a file, not yet parsed.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Sections {
@@ -184,10 +184,10 @@ fn read_file(file: Table) -> Result<Description, Problem> {
     })
 }
 
-/// Reads a camera. What it does not say itself is as in the first of its path's keys that does.
+/// Parses a camera. A missing value is taken from the first key of its path that has one.
 fn read_camera(mut camera: Table) -> Result<CameraDescription, Problem> {
     if let Some(Value::Table(path)) = camera.get("path") {
-        // First by itself, so that what is wrong with a key is told there.
+        // First, so that an error in a key is reported there.
         let path: CameraPathDescription = read(path.clone()).at("path")?;
         let point = |point: DVec3| Value::from(point.to_array().to_vec());
         let first = |of: fn(&CameraKeyDescription) -> Option<DVec3>| path.keys.iter().find_map(of).map(point);
@@ -218,11 +218,10 @@ fn read_camera(mut camera: Table) -> Result<CameraDescription, Problem> {
     read_tagged(camera, Some(CameraDescription::DEFAULT))
 }
 
-/// What was read of the parts of one kind, or the first problem among them.
+/// The parts of one kind, or the first problem among them.
 type Read<T> = Result<T, Problem>;
 
-/// A file's description from its parts, one after the other; `None` if they depend on each other, and the file must be
-/// read as a whole.
+/// Parses a file part by part. Returns `None` if the parts depend on each other, so that the file must be parsed at once.
 fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Read<Description>>, Broken> {
     let rest = parts.read_rest();
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
@@ -235,7 +234,7 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Read<Descri
     let mut instances: Read<Vec<InstanceDescription>> = Ok(Vec::new());
     for part in parts.parts.iter() {
         match &rest {
-            // What comes first in the text is told first.
+            // Errors are reported in the order of the text.
             Err(broken) if broken.at < part.place.start => break,
             Ok(rest) if rest.contains_key(part.kind.name()) => return Ok(None),
             _ => {}
@@ -271,11 +270,11 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Read<Descri
         return Ok(Some(Err(problem)));
     }
     if defines.left().is_some() {
-        return Ok(None); // a whole list, or a name or number that there is not
+        return Ok(None); // a whole list, or a name or index that does not exist
     }
     let others = read_file(rest);
     let together = |mut all: Description| {
-        // A kind is in parts or in what is outside of them, not in both.
+        // The parts and the rest have no kind in common.
         if has(Kind::Textures) {
             all.textures = textures.at("textures")?;
         }
@@ -299,7 +298,7 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Read<Descri
     Ok(Some(others.and_then(together)))
 }
 
-/// After a problem no more is read.
+/// Adds a named part, unless there was a problem before.
 fn add_named<T>(all: &mut Read<BTreeMap<String, T>>, name: String, table: Table, read: fn(Table) -> Read<T>) {
     let Ok(map) = all else { return };
     match read(table).at(name.as_str()) {
@@ -331,7 +330,7 @@ fn read_list<T>(tables: Vec<Table>, read: fn(Table) -> Read<T>) -> Read<Vec<T>> 
     tables.map(|(i, table)| read(table).at(i)).collect()
 }
 
-/// Reads a table that says of what type it is.
+/// Parses a table with the key `type`.
 fn tagged<T: Tagged>(table: Table) -> Read<T> {
     read_tagged(table, None)
 }
@@ -342,9 +341,9 @@ fn read<T: DeserializeOwned>(table: Table) -> Result<T, Problem> {
     read_for(table, said.unwrap_or(Integrator::Phong))
 }
 
-/// Reads a table. What it may say depends on the integrator.
+/// Parses a table. The ranges in messages depend on the integrator.
 pub(super) fn read_for<T: DeserializeOwned>(table: Table, integrator: Integrator) -> Result<T, Problem> {
-    // The copy is for the message: reading consumes the values.
+    // The copy is for the message, because parsing consumes the values.
     tables::read(table.clone()).map_err(|error| {
         let error = with_names(error, &table, |table| tables::read::<T>(table).err());
         explain(error, table, false, integrator)
@@ -376,15 +375,15 @@ fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) -> Result<T, 
     }
 }
 
-/// So many keys of a table are told: all that any has.
-const MOST_KEYS: usize = 64;
+/// Maximum number of keys in a message, which no table exceeds.
+const MAX_KEYS: usize = 64;
 
-/// `"a", "b", "c"`, the first of them where there are many.
+/// Formats names as `"a", "b", "c"`, up to a limit.
 pub(super) fn list<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> String {
     listed(names, 24)
 }
 
-/// The same, of so many at most.
+/// Formats up to `most` names.
 fn listed<S: AsRef<str>>(names: impl IntoIterator<Item = S>, most: usize) -> String {
     let mut text = String::new();
     let mut names = names.into_iter();
@@ -399,13 +398,13 @@ fn listed<S: AsRef<str>>(names: impl IntoIterator<Item = S>, most: usize) -> Str
     }
 }
 
-/// A value as the file has it, on one line, cut short where it is long.
+/// Formats a value as TOML on one line, truncated if it is long.
 fn show(value: &Value) -> String {
     cut(&value.to_string().replace('\n', " ")).into_owned()
 }
 
-/// Where a value must be one of some names, serde tells them to a text alone: another value is told by the error that a text in
-/// its place gives.
+/// Returns an error that lists the allowed names. For values other than strings serde does not list them, so the value is replaced by a
+/// string and parsed again.
 fn with_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<ReadError>) -> ReadError {
     if !error.inner().message().ends_with(NAMES_EXPECTED) {
         return error;
@@ -429,10 +428,10 @@ fn with_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<Re
     told.filter(is_same).unwrap_or(error)
 }
 
-/// How serde's message ends where a value is no text and must be one of some names.
+/// End of serde's message about a value that must be a string of an enum.
 const NAMES_EXPECTED: &str = ", expected string only";
 
-/// Makes a problem of serde's error while reading `table`, which has lost its key `type` if it is `tagged`.
+/// Converts serde's error about `table`, whose key `type` was removed if it is `tagged`.
 fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator) -> Problem {
     let mut path = segments(error.path());
     let mut value = Some(&Value::Table(table));
@@ -443,7 +442,7 @@ fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator)
         };
     }
     let message = error.inner().message();
-    // serde tells the name and the rule in text only.
+    // serde has the name and the rule only as text.
     let quoted = |text: &str| {
         text.split('`')
             .skip(1)
@@ -452,7 +451,7 @@ fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator)
             .collect::<Vec<_>>()
     };
     let message = if message.starts_with("unknown field") {
-        // The first name is the key's, which is on the path already.
+        // The first name is the key, which is in the path already.
         let names = quoted(message).into_iter().skip(1);
         let tag = (tagged && path.len() == 1).then(|| "type".to_owned());
         let names: Vec<String> = tag.into_iter().chain(names).collect();
@@ -461,7 +460,7 @@ fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator)
             _ => String::new(),
         };
         match hint.is_empty() {
-            true => format!("unknown key; expected one of {}", listed(names, MOST_KEYS)),
+            true => format!("unknown key; expected one of {}", listed(names, MAX_KEYS)),
             false => format!("unknown key{hint}"),
         }
     } else if message.starts_with("missing field") {
@@ -507,7 +506,7 @@ fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator)
     }
 }
 
-/// The steps of serde's path.
+/// Converts the segments of serde's path.
 pub(super) fn segments(path: &serde_path_to_error::Path) -> Vec<Segment> {
     use serde_path_to_error::Segment as Step;
     let steps = path.iter().filter_map(|segment| match segment {
@@ -518,7 +517,7 @@ pub(super) fn segments(path: &serde_path_to_error::Path) -> Vec<Segment> {
     steps.collect()
 }
 
-/// What a key's whole number must be. How small it may be exactly is checked later, beside other keys.
+/// Returns the rule of an integer key. Limits that depend on other keys are checked later.
 fn whole(key: Option<&Segment>, integrator: Integrator) -> String {
     if key == Some(&Segment::from("blades")) {
         return format!("0 or a whole number from {} to {}", BLADES.0, BLADES.1);

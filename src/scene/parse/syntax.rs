@@ -1,11 +1,11 @@
-//! What is told of text that is no TOML: which key it stands at, what stands there, and what would be right.
+//! Messages about invalid TOML: the key, the text and the rule.
 
 use std::collections::BTreeMap;
 
 use crate::scene::error::{KeyPath, SceneError, Segment, cut};
 use crate::visible::visible;
 
-/// The message of bytes that are no text.
+/// The message about bytes that are not text.
 pub(in crate::scene) const NOT_UTF8: &str = "not valid UTF-8";
 
 /// Returns the message about bytes in an encoding other than UTF-8 that is recognized: UTF-16, by its byte order mark.
@@ -18,10 +18,10 @@ pub(in crate::scene) fn encoding(bytes: &[u8]) -> Option<String> {
     Some(format!("the file is encoded in {name}; save it as UTF-8"))
 }
 
-/// The error of a text that goes wrong at the byte `at`; `message` is what the parser says.
+/// Returns the error of a text at the byte `at`; `message` is the parser's.
 pub(in crate::scene) fn syntax_error(text: &str, origin: &str, at: usize, message: &str) -> SceneError {
     let at = match message.contains(DEEP) && at == 0 {
-        true => deepest_line(text), // of names with points the parser says no place
+        true => deepest_line(text), // for dotted keys the parser reports no location
         false => text.floor_char_boundary(at),
     };
     let line_start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
@@ -33,10 +33,10 @@ pub(in crate::scene) fn syntax_error(text: &str, origin: &str, at: usize, messag
     }
 }
 
-/// What the parser says of names with too many points.
+/// Part of the parser's message about dotted keys with too many segments.
 const DEEP: &str = "recursion limit";
 
-/// Where the first line begins that has the most points, which is where they are too many.
+/// Returns the start of the line with the most dots.
 fn deepest_line(text: &str) -> usize {
     let points = |line: &str| line.bytes().filter(|byte| *byte == b'.').count();
     let (mut at, mut deepest) = (0, (0, 0));
@@ -120,18 +120,18 @@ fn explain(text: &str, at: usize, message: &str) -> String {
     }
 }
 
-/// What is written at a byte: up to the next space or mark on both sides.
+/// Returns the token at a byte: up to the next space or punctuation on both sides.
 fn token(text: &str, at: usize) -> &str {
     let ends = |c: char| c.is_whitespace() || "[]{}=#\"'".contains(c);
     let start = text[..at]
         .rfind(ends)
         .map_or(0, |end| end + text[end..].chars().next().map_or(1, char::len_utf8));
-    // In a list it is the value behind the last comma.
+    // In a list it starts after the last comma.
     let start = match is_in_list(text, start) {
         true => text[start..at].rfind(',').map_or(start, |comma| start + comma + 1),
         false => start,
     };
-    // A comma parts the values of a list, but may be meant as a point.
+    // A comma separates the values of a list, but elsewhere it may be meant as a decimal point.
     let end = text[at..].find(ends).map_or(text.len(), |end| at + end);
     let all = &text[start..end];
     match all.split_once(',') {
@@ -141,24 +141,24 @@ fn token(text: &str, at: usize) -> &str {
     }
 }
 
-/// Whether what begins here, or around here, is an element of a list.
+/// Returns true if the token here is an element of a list.
 fn is_in_list(text: &str, at: usize) -> bool {
     text[..at].trim_end().ends_with(['[', ','])
 }
 
-/// The line of a byte.
+/// Returns the line of a byte.
 fn line(text: &str, at: usize) -> &str {
     let start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
     text[start..].lines().next().unwrap_or_default()
 }
 
-/// Where in the file's tables a line is, as far as plain lines tell.
+/// The table and key of a line, found line by line without parsing.
 struct Place<'a> {
-    /// The header above, and how many of the same stand before it where it is one of a list.
+    /// The header above, and the number of equal headers before it, for arrays of tables.
     header: Option<(Header<'a>, usize)>,
-    /// The first line behind the header.
+    /// The first line after the header.
     line: usize,
-    /// What stands before the last `=`, or is the line.
+    /// The text before the last `=`, or the line.
     key: Option<&'a str>,
 }
 
@@ -169,7 +169,7 @@ struct Header<'a> {
 }
 
 impl<'a> Header<'a> {
-    /// `[name]` or `[[name]]`. Rows of numbers in lists are none.
+    /// Parses `[name]` or `[[name]]`, but not a row of numbers in a list.
     fn of(line: &'a str) -> Option<Header<'a>> {
         let inner = line.trim().strip_prefix('[')?;
         let (inner, is_list) = match inner.strip_prefix('[') {
@@ -182,7 +182,7 @@ impl<'a> Header<'a> {
     }
 }
 
-/// The key that a line gives a value, or begins to.
+/// Returns the key that is assigned on a line.
 fn key(line: &str) -> Option<&str> {
     let key = line.split(['=', '#']).next()?.trim();
     let is_key =
@@ -199,7 +199,7 @@ impl<'a> Place<'a> {
             key: None,
         };
         let mut before: BTreeMap<&str, usize> = BTreeMap::new();
-        // Brackets that are open since the key: its value goes on in the next line.
+        // Open brackets since the key, whose value continues on the next line.
         let mut open = 0;
         for (i, line) in text.lines().take(number + 1).enumerate() {
             if let Some(header) = Header::of(line).filter(|_| open <= 0) {
@@ -238,7 +238,7 @@ fn segments(dotted: &str) -> impl Iterator<Item = Segment> {
     parts.map(Segment::from)
 }
 
-/// The part of a dotted key that begins at a byte.
+/// Returns the segment of a dotted key at a byte.
 fn name(text: &str, at: usize) -> &str {
     let rest = &text[at..];
     let quote = rest.chars().next().filter(|c| "\"'".contains(*c));
@@ -250,7 +250,7 @@ fn name(text: &str, at: usize) -> &str {
     })
 }
 
-/// What is told of a key or a table that is defined twice.
+/// Returns the message about a key or table that is defined twice.
 fn twice(text: &str, place: &Place, name: &str) -> String {
     let lines = || text.lines().enumerate();
     let first = match (&place.header, place.key) {

@@ -465,8 +465,8 @@ fn a_number_of_samples_stands_for_a_table() {
             "s.toml:4: render.pixel_samples: [4] must be a whole number or a table, such as {",
         ),
         (
-            "pixel_samples = { count = 4, patern = 'grid' }",
-            "s.toml:4: render.pixel_samples.patern: unknown key; did you",
+            "pixel_samples = { count = 4, pattrn = 'grid' }",
+            "s.toml:4: render.pixel_samples.pattrn: unknown key; did you",
         ),
     ] {
         let message = scene(line).unwrap_err();
@@ -532,14 +532,14 @@ fn misspelled_names_are_answered_with_similar_ones() {
             "materials.b = { type = 'mirror', tnt = [1, 1, 1] }",
             "s.toml:4: materials.b.tnt: unknown key; did you mean \"tint\"?",
         ),
-        ("redner = 3", "s.toml:4: redner: unknown key; did you mean \"render\"?"),
+        ("rendr = 3", "s.toml:4: rendr: unknown key; did you mean \"render\"?"),
         (
-            "shapes = [{ type = 'sphere', material = 'yelow', center = [0, 0, 0], radius = 1 }]",
-            "s.toml:4: shapes[0].material: there is no material \"yelow\"; did you mean \"yellow\"?",
+            "shapes = [{ type = 'sphere', material = 'yellwo', center = [0, 0, 0], radius = 1 }]",
+            "s.toml:4: shapes[0].material: there is no material \"yellwo\"; did you mean \"yellow\"?",
         ),
     ] {
         assert_eq!(told(more), message);
     }
-    let message = told("shapes = [{ type = 'sphre' }]");
+    let message = told("shapes = [{ type = 'spher' }]");
     assert!(message.ends_with("\"gltf\"; did you mean \"sphere\"?"), "{message}");
 }

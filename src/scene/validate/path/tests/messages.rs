@@ -43,7 +43,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "pixel_samples = { count = 5 }",
         "adaptive = { error = 0.1 }\npixel_samples = { pattern = 'grid', count = 4 }",
-        "render.adaptive: the pattern of pixel_samples is \"grid\", which has no further samples; it must be one of \
+        "render.adaptive: the pattern of pixel_samples, \"grid\", cannot add samples; use one of \
          \"jittered\", \"random\", \"halton\", \"sobol\"",
     ),
     (
