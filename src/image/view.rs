@@ -77,7 +77,13 @@ fn inverse(transform: ViewTransform, display: Rgb) -> Rgb {
     const SWEEPS: usize = 100;
     const BISECTIONS: usize = 60;
     let [white, ..] = transformed(transform, [MAX_LIGHT; 3]);
-    let goal = display.map(|value| if value <= white { value } else { NEARLY_WHITE });
+    let goal = display.map(|value| {
+        if value <= white + 1e-9 {
+            value.min(white)
+        } else {
+            NEARLY_WHITE
+        }
+    });
     let mut light = [0.18; 3];
     for _ in 0..SWEEPS {
         for channel in 0..3 {

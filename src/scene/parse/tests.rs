@@ -179,7 +179,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[render]\npixel_samples = ['grid', 4]",
             2,
-            "render.pixel_samples: [\"grid\", 4] must be a table, such as { pattern = \"grid\", count = 16 }",
+            "render.pixel_samples: [\"grid\", 4] must be a whole number or a table, such as { pattern = \"grid\", count = 16 }",
         ),
         (
             "path = ['linear', [[1]]]",

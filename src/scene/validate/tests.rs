@@ -198,8 +198,8 @@ const BAD: &[(&str, &str, &str)] = &[
     ),
     (
         "look_at = [0, 0, 1]",
-        "look_at = [0, -4, 5]",
-        "camera.look_at: [0, -4, 5] makes the view parallel to up, [0, 0, 1]",
+        "look_at = [0, 9, 1]\nup = [0, 1, 0]",
+        "camera.look_at: [0, 9, 1] makes the view parallel to up, [0, 1, 0]; choose another up",
     ),
     (
         "fov = 90",
@@ -411,10 +411,7 @@ fn a_factor_without_color_is_missing() {
         .unwrap()
         + 1;
     let told = "is missing; set it or color";
-    assert_eq!(
-        message,
-        format!("s.toml:{line}: materials.\"dark red\".diffuse: {told}")
-    );
+    assert_eq!(message, format!("s.toml:{line}: materials.\"dark red\".diffuse {told}"));
 }
 
 #[test]

@@ -128,7 +128,7 @@ fn parts_and_what_must_be_read_as_a_whole_have_a_largest_size() {
     );
     let spheres = SPHERE.repeat(LARGEST / SPHERE.len() + 1);
     assert!(by_parts(&format!("{START}{spheres}{RED}")).unwrap().shapes.len() > 50_000);
-    assert!(told(&format!("{START}{spheres}[materials]\n{RED}")).contains("must have a header of its own"));
+    assert!(told(&format!("{START}{spheres}[materials]\n{RED}")).contains("must have its own header"));
     let bad = format!("{START}{spheres}{RED}[render]\nseed = -1\n");
     let line = 1 + bad[..bad.len() - 10].matches('\n').count();
     assert!(

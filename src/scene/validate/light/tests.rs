@@ -36,7 +36,7 @@ fn a_spot_has_a_direction_or_looks_at_a_point() {
         ),
         (
             "look_at = [1, 2, 3]",
-            "lights[0].look_at: [1, 2, 3] must not be where the light is: at least 1e-9 away",
+            "lights[0].look_at: [1, 2, 3] must be at least 1e-9 away from the light",
         ),
     ] {
         let told = spot(&format!("{angle}{keys}")).expect_err(keys);

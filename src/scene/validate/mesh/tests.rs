@@ -262,7 +262,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         LINE_OF_MATERIALS,
         "materials = { roof = \"red\", floor = \"white\" }",
-        "instances[0].materials.floor: \"parts.obj\" has no such group or material; the scene has \"brick\", \"door\", \
+        "instances[0].materials.floor: \"parts.obj\" has no such group or material; there are \"brick\", \"door\", \
          \"roof\", \"wall\"",
     ),
     (

@@ -245,7 +245,7 @@ fn metals_have_an_index_by_name_or_by_numbers() {
             .unwrap_err()
             .to_string();
         assert!(
-            told.ends_with(&format!("materials.silver.{other}: is missing beside {own}")),
+            told.ends_with(&format!("materials.silver.{other} is missing; {own} needs it")),
             "{told}"
         );
     }
