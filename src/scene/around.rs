@@ -182,7 +182,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
         assert!((r - 0.21586).abs() < 1e-5 && g == 0.0 && b == 1.0, "{r} {g} {b}");
         assert_eq!("none".parse(), Ok(Background::Transparent));
         for bad in [
-            "", "#", "#fff", "#12345g", "#+12345", "#1234567", "1,2", "1,2,3,4", "1,2,x", "white", "None",
+            "", "#", "#fff", "#12345g", "#+12345", "#1234567", "1,2", "1,2,3,4", "1,2,x", "blue", "None",
         ] {
             let told = bad.parse::<Background>().unwrap_err();
             assert!(
