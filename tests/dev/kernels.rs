@@ -30,7 +30,7 @@ fn mistakes_in_kernels_that_are_not_used_are_told_at_once() {
         Some(problems(running)).filter(|all| all.len() == 3)
     });
     for (file, words) in [
-        (FIRST_HITS, "must be named `first_hits`"),
+        (FIRST_HITS, "must be called `first_hits`"),
         (ADAPTIVE, "`moments.xyz`"),
         (KERNEL, "(4, 4)"),
     ] {
