@@ -136,7 +136,7 @@ pub fn main() -> ExitCode {
     prepare_environment(threads);
     signal::file_size_limit_is_an_error();
     wgray::contain::install_quiet_hook(); // the panics of a lost device become errors
-    let result = match cli.command {
+    let result = start_threads(threads).and_then(|()| match cli.command {
         Command::Render(args) => render::run(*args, start),
         Command::Check(args) => check::run(&args),
         Command::Info(args) => info::run(&args),
@@ -150,7 +150,7 @@ pub fn main() -> ExitCode {
         Command::Man(args) => man::run(&args),
         #[cfg(feature = "dev")]
         Command::Dev(args) => dev::run(*args),
-    };
+    });
     match result {
         Ok(code) => code,
         Err(error) => {
@@ -216,6 +216,13 @@ fn prepare_environment(threads: Option<u16>) {
         // Mesa prints a warning if it is unset, and does not use it without a window.
         set("XDG_RUNTIME_DIR", std::env::temp_dir().as_os_str());
     }
+}
+
+/// Starts the threads of parallel work, which would panic without them.
+fn start_threads(threads: Option<u16>) -> anyhow::Result<()> {
+    let count = threads.map_or(0, usize::from); // 0: all
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(count);
+    Ok(pool.build_global().map_err(NoThreads)?)
 }
 
 /// Reads a scene file, with overridden values.

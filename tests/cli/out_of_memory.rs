@@ -66,6 +66,22 @@ fn the_program_ends_with_code_7() {
     assert!(failed > 2 && succeeded > 3, "{failed} failed, {succeeded} succeeded");
 }
 
+/// Other commands, too, end without a panic if no thread can be started.
+#[test]
+fn other_commands_end_with_code_7() {
+    let place = Place::new();
+    large(&place);
+    let mut failed = 0;
+    for limit in (0..24).map(|i| 24_000 + 1_500 * i) {
+        for command in ["check large.toml", "info large.toml", "diff mesh.obj large.toml"] {
+            let ran = place.shell("sh", &format!("ulimit -v {limit}; RUST_BACKTRACE=1 $0 {command}"));
+            failed += usize::from(ran.code == 7);
+            assert!(!ran.stderr.contains("panicked"), "{command} {limit}: {}", ran.stderr);
+        }
+    }
+    assert!(failed > 2, "{failed}");
+}
+
 /// An image that is too large for the memory is an error with its size, as before.
 #[test]
 fn handled_allocations_are_errors() {

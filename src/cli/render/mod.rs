@@ -26,7 +26,7 @@ use super::log::{self, Level};
 use super::outputs::Outputs;
 use super::signal::{Signals, Stop};
 use super::stats::Stats;
-use super::{Interrupted, NoThreads, Usage, facts_of, plain, progress};
+use super::{Interrupted, Usage, facts_of, plain, progress};
 
 pub use args::{Args, parse_duration, parse_size};
 pub use trial::Trial;
@@ -82,9 +82,6 @@ impl<'a> Job<'a> {
         if args.verbose {
             log::print_events();
         }
-        let threads = args.threads.map_or(0, usize::from); // 0: all
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        pool.build_global().map_err(NoThreads)?; // before any parallel work, which would panic without threads
         if args.shown_progress() == progress::Mode::Openjd && log::is_json() {
             let rule = "openjd cannot be combined with --log-format json";
             return Err(Usage(format!("--progress: {rule}")).into());
