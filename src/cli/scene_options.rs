@@ -2,7 +2,9 @@
 
 use clap::ValueHint;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
-use wgray::scene::{Background, EnvironmentDescription, GltfChoice, Overrides, Scene, Selection, View};
+use wgray::scene::{
+    Background, EnvironmentDescription, GltfChoice, Orbit, Overrides, Presentation, Scene, Selection, UpAxis, View,
+};
 
 /// The options as they are written.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -21,7 +23,31 @@ pub struct SceneOptions {
     pub strict: bool,
 
     #[command(flatten)]
+    presentation: PresentationOptions,
+
+    #[command(flatten)]
     gltf: GltfOptions,
+}
+
+/// The options for a model file without a scene.
+#[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Scene")]
+struct PresentationOptions {
+    /// Look at the whole model from this direction: 0,0 is the front, 90,0 the right, 0,90 above
+    #[arg(long, hide_short_help = true, value_name = "AZ,EL", allow_hyphen_values = true, conflicts_with_all = ["view", "camera"])]
+    orbit: Option<Orbit>,
+
+    /// Set the vertical field of view of the automatic camera, in degrees
+    #[arg(long, hide_short_help = true, value_name = "DEGREES", allow_negative_numbers = true)]
+    fov: Option<f64>,
+
+    /// Turn this axis of the model upwards: x, y, z, -x, -y or -z
+    #[arg(long, hide_short_help = true, value_name = "AXIS", allow_hyphen_values = true)]
+    up: Option<UpAxis>,
+
+    /// Put a grey disk below the model, which catches its shadow
+    #[arg(long, hide_short_help = true)]
+    ground: bool,
 }
 
 /// The options for models.
@@ -61,7 +87,7 @@ impl SceneOptions {
 
     /// Returns true if the automatic camera shows a model, rather than one of the file.
     pub fn is_framed(&self, scene: &Scene) -> bool {
-        self.gltf.view.is_some() || !scene.has_model_cameras()
+        self.gltf.view.is_some() || self.presentation.orbit.is_some() || !scene.has_model_cameras()
     }
 
     /// Adds these options to the values that override the scene.
@@ -70,8 +96,20 @@ impl SceneOptions {
             environment: self.environment.clone(),
             background: self.background,
             strict: self.strict,
+            presentation: self.presentation.presentation(),
             gltf: self.gltf.choice(),
             ..overrides
+        }
+    }
+}
+
+impl PresentationOptions {
+    fn presentation(&self) -> Presentation {
+        Presentation {
+            fov: self.fov,
+            orbit: self.orbit,
+            up: self.up,
+            ground: self.ground,
         }
     }
 }

@@ -29,7 +29,7 @@ struct Layout {
 impl Layout {
     fn of(key: &str, accessor: &Accessor) -> Result<Layout, Fault> {
         let (Checked::Valid(component), Checked::Valid(kind)) = (accessor.component_type, accessor.type_) else {
-            return Err(Fault::key(key, "its type must be known"));
+            return Err(Fault::key(key, "unknown type"));
         };
         let (rows, columns) = match kind {
             Type::Scalar => (1, 1),
@@ -208,7 +208,7 @@ impl Document {
         let (key, accessor) = self.accessor(index)?;
         let layout = Layout::of(&key, accessor)?;
         if layout.count() != N {
-            let rule = format!("its elements have {} numbers; here they must have {N}", layout.count());
+            let rule = format!("its elements have {} components; {N} are expected", layout.count());
             return Err(Fault::key(format!("{key}.type"), rule));
         }
         let elements = self.elements(&key, accessor, layout)?;
@@ -312,7 +312,7 @@ impl Document {
         }
         let key = format!("{key}.sparse.indices");
         let Checked::Valid(component) = sparse.indices.component_type else {
-            return Err(Fault::key(key, "its type must be known"));
+            return Err(Fault::key(key, "unknown type"));
         };
         let places = Layout {
             component: component.0,

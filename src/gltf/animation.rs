@@ -13,7 +13,52 @@ use super::node::{Pose, quaternion};
 /// The most weights of morph targets that an animation gives to nodes.
 const MOST_WEIGHTS: usize = 1 << 24;
 
+/// Maximum number of animations that a warning names.
+const MOST_NAMED: usize = 5;
+
 impl Document {
+    /// Returns those of some animations that play together: each that drives no property which an earlier one drives. The others are
+    /// named in `notes`.
+    pub(super) fn compatible(&self, animations: Vec<usize>, notes: &mut Vec<String>) -> Vec<usize> {
+        let mut driven = HashSet::new();
+        let (mut playing, mut others) = (Vec::new(), Vec::new());
+        for i in animations {
+            let channels = self.json.animations[i].channels.iter();
+            let properties = channels.filter_map(|channel| match channel.target.path {
+                Checked::Valid(path) => Some((channel.target.node.value(), path as u8)),
+                Checked::Invalid => None,
+            });
+            let own: HashSet<(usize, u8)> = properties.collect();
+            match driven.is_disjoint(&own) {
+                true => {
+                    driven.extend(own);
+                    playing.push(i);
+                }
+                false => others.push(i),
+            }
+        }
+        if !others.is_empty() {
+            let name = |i: &usize| match &self.json.animations[*i].name {
+                Some(name) => format!("{i} ({name:?})"),
+                None => i.to_string(),
+            };
+            let mut named: Vec<String> = others.iter().take(MOST_NAMED).map(name).collect();
+            if others.len() > MOST_NAMED {
+                named.push(format!("{} more", others.len() - MOST_NAMED));
+            }
+            let (what, verb) = match others.len() {
+                1 => ("animation", "drives"),
+                _ => ("animations", "drive"),
+            };
+            notes.push(format!(
+                "{what} {} {verb} properties that an earlier animation drives, and {} not play; choose one with --animation",
+                named.join(", "),
+                if others.len() == 1 { "does" } else { "do" },
+            ));
+        }
+        playing
+    }
+
     /// Puts nodes where an animation has them at a time, in seconds. Before its first key and after its last it stands.
     /// What a user should know is put into `notes`.
     pub(super) fn animate(
@@ -32,12 +77,12 @@ impl Document {
             let node = channel.target.node.value();
             let sampler = animation.samplers.get(channel.sampler.value());
             let (Some(pose), Some(sampler)) = (poses.get_mut(node), sampler) else {
-                return Err(self.fault(place(i), "names a node or a sampler that is not there".to_owned()));
+                return Err(self.fault(place(i), "refers to a node or a sampler that does not exist".to_owned()));
             };
             let times = self.vectors::<1>(sampler.input.value())?;
             let times: Vec<f64> = times.iter().map(|[time]| f64::from(*time)).collect();
             if times.is_empty() || !times.is_sorted() || !times.iter().all(|time| time.is_finite()) {
-                return Err(self.fault(place(i), "its times must be there, finite, and grow".to_owned()));
+                return Err(self.fault(place(i), "its times must be finite and increasing".to_owned()));
             }
             if times.windows(2).any(|pair| pair[0] == pair[1]) {
                 equal.get_or_insert(i);
@@ -91,13 +136,13 @@ impl Document {
         }
         if let Some(i) = equal {
             notes.push(format!(
-                "{}: some of its times are the same, and each must be later than the one before; the last of these stands",
+                "{}: some of its times are equal; the last of them is used",
                 place(i)
             ));
         }
         if let Some(i) = twice {
             notes.push(format!(
-                "{}: moves what a channel before it moves, and there must be one for each; the last one stands",
+                "{}: drives the same property as an earlier channel; the last one is used",
                 place(i)
             ));
         }

@@ -90,7 +90,7 @@ impl Buffers {
                     (Bytes::Read(bytes), has)
                 }
                 (None, Some(chunk)) if i == 0 => (Bytes::Chunk(chunk.clone()), chunk.len()),
-                (None, _) => return Err(Fault::key(key(), "it must have a uri, as views refer to it")),
+                (None, _) => return Err(Fault::key(key(), "has no uri, but buffer views refer to it")),
             };
             total = total.saturating_add(has as u64);
             if total > MOST_BYTES {
@@ -141,7 +141,7 @@ impl Buffers {
         let length = usize::try_from(buffer.byte_length.0).ok();
         bytes
             .and_then(|bytes| bytes.get(..length?))
-            .ok_or_else(|| Fault::key(key(), "its data must be there"))
+            .ok_or_else(|| Fault::key(key(), "has no data"))
     }
 
     /// The bytes of a view.

@@ -23,7 +23,7 @@ impl Document {
         };
         let place = format!("cameras[{number}]");
         let Some(camera) = self.json.cameras.get(number) else {
-            return Err(self.fault(format!("nodes[{node}].camera"), format!("{number} is no camera")));
+            return Err(self.fault(format!("nodes[{node}].camera"), format!("{number} is out of range")));
         };
         let map = UPRIGHT * *global;
         let position = map.translation;
@@ -32,7 +32,7 @@ impl Document {
         if !position.is_finite() || !(forward.cross(up).length() > 1e-6) {
             note(
                 notes,
-                format!("nodes[{node}]: its camera is left out, as it is scaled to no size"),
+                format!("nodes[{node}]: its camera is left out: its scale is zero"),
             );
             return Ok(None);
         }

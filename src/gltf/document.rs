@@ -144,7 +144,7 @@ impl Document {
             let count = self.json.images.len();
             let source = source.as_u64().and_then(|source| usize::try_from(source).ok());
             return source.filter(|source| *source < count).ok_or_else(|| {
-                let rule = format!("it must be the index of an image; there are {count}, counted from 0");
+                let rule = format!("must be the index of an image; the file has {count}");
                 Fault::key(format!("{key}.extensions.EXT_texture_webp.source"), rule)
             });
         }
@@ -153,7 +153,7 @@ impl Document {
             Some(_) => Ok(texture.source.value()),
             None => Err(match others.and_then(extension::unknown) {
                 Some(name) => extension::only_in(&key, name),
-                None => Fault::key(key, "it must have a source"),
+                None => Fault::key(key, "has no source"),
             }),
         }
     }
@@ -190,7 +190,7 @@ impl Document {
                 .and_then(|all| extension::unknown(&all.others));
             return Err(ImageFault::Refused(match others {
                 Some(name) => extension::only_in(&key, name),
-                None => Fault::key(key, "it must have a uri or a bufferView"),
+                None => Fault::key(key, "has neither a uri nor a bufferView"),
             }));
         };
         let bytes = match uri::is_data(name) {

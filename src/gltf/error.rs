@@ -156,7 +156,7 @@ pub(super) fn plain(message: &dyn std::fmt::Display) -> String {
         .strip_prefix("missing field `")
         .and_then(|rest| rest.split_once('`'))
     {
-        return format!("{} must be there", shown(name));
+        return format!("{} is required", shown(name));
     }
     let starts = ["invalid type: ", "invalid value: ", "invalid length "];
     let Some((start, rest)) = starts
@@ -185,9 +185,10 @@ pub(super) fn plain(message: &dyn std::fmt::Display) -> String {
     let digits: String = wanted.chars().filter(char::is_ascii_digit).collect();
     let wanted = match wanted {
         "f32" | "f64" => "a number".to_owned(),
-        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number from 0 on".to_owned(),
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a non-negative integer".to_owned(),
         "a boolean" => "true or false".to_owned(),
-        "a string" | "a borrowed string" | "string" => "text".to_owned(),
+        "a string" | "a borrowed string" | "string" => "a string".to_owned(),
+        _ if wanted.starts_with("index into ") => "an index".to_owned(),
         "a sequence" => "a list".to_owned(),
         "a map" | "map" => "an object".to_owned(),
         _ if wanted.starts_with("struct ") => "an object".to_owned(),
@@ -196,7 +197,7 @@ pub(super) fn plain(message: &dyn std::fmt::Display) -> String {
         }
         other => other.to_owned(),
     };
-    format!("{found} must be {wanted}")
+    format!("expected {wanted}, found {found}")
 }
 
 /// A name that a file gives, for a message: quoted, without its middle where it is long.
@@ -231,20 +232,24 @@ mod tests {
         let good = json!({ "name": "a", "length": 1, "place": [1, 2, 3], "list": [1], "is_on": true });
         serde_json::from_value::<View>(good.clone()).unwrap();
         for (key, value, told) in [
-            ("name", json!(3), "3 must be text"),
+            ("name", json!(3), "expected a string, found 3"),
             (
                 "length",
                 json!("\u{1b}[31m"),
-                "\"\\u{1b}[31m\" must be a whole number from 0 on",
+                "expected a non-negative integer, found \"\\u{1b}[31m\"",
             ),
-            ("length", json!(-1), "-1 must be a whole number from 0 on"),
-            ("length", json!(1.5), "1.5 must be a whole number from 0 on"),
-            ("length", json!({}), "an object must be a whole number from 0 on"),
-            ("place", json!([1, 2]), "a list of 2 must be a list of 3"),
-            ("place", json!({}), "an object must be a list of 3"),
-            ("list", json!(null), "null must be a list"),
-            ("list", json!(["x, expected y"]), "\"x, expected y\" must be a number"),
-            ("is_on", json!(0), "0 must be true or false"),
+            ("length", json!(-1), "expected a non-negative integer, found -1"),
+            ("length", json!(1.5), "expected a non-negative integer, found 1.5"),
+            ("length", json!({}), "expected a non-negative integer, found an object"),
+            ("place", json!([1, 2]), "expected a list of 3, found a list of 2"),
+            ("place", json!({}), "expected a list of 3, found an object"),
+            ("list", json!(null), "expected a list, found null"),
+            (
+                "list",
+                json!(["x, expected y"]),
+                "expected a number, found \"x, expected y\"",
+            ),
+            ("is_on", json!(0), "expected true or false, found 0"),
         ] {
             let mut bad = good.clone();
             bad[key] = value;
@@ -252,10 +257,10 @@ mod tests {
             assert_eq!(plain(&error), told, "{error}");
         }
         for (value, told) in [
-            (json!([1, 2, 3]), "1 must be text"),
-            (json!([]), "a list of 0 must be an object"),
-            (json!("x"), "\"x\" must be an object"),
-            (json!({}), "\"name\" must be there"),
+            (json!([1, 2, 3]), "expected a string, found 1"),
+            (json!([]), "expected an object, found a list of 0"),
+            (json!("x"), "expected an object, found \"x\""),
+            (json!({}), "\"name\" is required"),
         ] {
             let error = serde_json::from_value::<View>(value).unwrap_err();
             assert!(plain(&error).starts_with(told), "{error}");

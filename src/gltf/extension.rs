@@ -43,10 +43,10 @@ fn is_known(name: &str) -> bool {
 pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), Fault> {
     for (i, name) in root.extensions_required.iter().enumerate() {
         if !is_known(name) {
-            let rule = "is required, and it is not known";
+            let rule = "is required but not supported";
             return Err(Fault::key(
                 format!("extensionsRequired[{i}]"),
-                format!("{} {rule}", shown(name)),
+                format!("{} {rule}{}", shown(name), remedy(name)),
             ));
         }
     }
@@ -70,22 +70,28 @@ pub(super) fn check(root: &Root, notes: &mut Vec<String>) -> Result<(), Fault> {
     // A file may name any number of them.
     const MOST: usize = 20;
     for name in unknown.iter().take(MOST) {
-        notes.push(format!(
-            "the extension {} is not known, and is not looked at",
-            shown(name)
-        ));
+        notes.push(format!("the extension {} is not supported and is ignored", shown(name)));
     }
     if unknown.len() > MOST {
         let more = unknown.len() - MOST;
-        notes.push(format!("{more} more extensions are not known, and are not looked at"));
+        notes.push(format!("{more} more extensions are not supported and are ignored"));
     }
     Ok(())
 }
 
+/// Returns what to do about an extension that is not supported.
+fn remedy(name: &str) -> &'static str {
+    match name {
+        "KHR_draco_mesh_compression" => "; export without Draco compression, or run gltf-transform copy IN.glb OUT.glb",
+        "KHR_texture_basisu" => "; run gltf-transform ktxdecompress IN.glb OUT.glb",
+        _ => "",
+    }
+}
+
 /// The fault of data that nothing else has than an extension that is not known.
 pub(super) fn only_in(key: &str, name: &str) -> Fault {
-    let rule = "is the only place of its data, and this extension is not known";
-    Fault::key(key, format!("{} {rule}", shown(name)))
+    let rule = "holds its only data and is not supported";
+    Fault::key(key, format!("{} {rule}{}", shown(name), remedy(name)))
 }
 
 /// The first extension of an object that is not known.

@@ -96,10 +96,7 @@ fn long_chains_of_nodes_and_many_notes_are_nothing() {
     let imported = read(&json, &binary).unwrap();
     assert!(imported.cameras.is_empty());
     assert_eq!(imported.notes.len(), 201);
-    assert_eq!(
-        imported.notes[0],
-        "nodes[1]: its camera is left out, as it is scaled to no size"
-    );
+    assert_eq!(imported.notes[0], "nodes[1]: its camera is left out: its scale is zero");
 }
 
 #[test]

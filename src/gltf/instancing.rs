@@ -25,15 +25,15 @@ impl Document {
         self.selected("scene", wanted, &names).map(Some)
     }
 
-    /// The animation that is shown, if any is.
-    pub(super) fn animation(&self, choice: &Choice) -> Result<Option<usize>, GltfError> {
+    /// Returns the animations that are chosen: one, all if only a time is given, or none.
+    pub(super) fn animations(&self, choice: &Choice) -> Result<Vec<usize>, GltfError> {
         let animations = &self.json.animations;
         let names: Vec<Option<&str>> = animations.iter().map(|animation| animation.name.as_deref()).collect();
         match (&choice.animation, choice.time) {
-            (Some(wanted), _) => self.selected("animation", wanted, &names).map(Some),
-            (None, None) => Ok(None),
+            (Some(wanted), _) => Ok(vec![self.selected("animation", wanted, &names)?]),
+            (None, None) => Ok(Vec::new()),
             (None, Some(_)) if animations.is_empty() => Err(self.fault("animations", STILL)),
-            (None, Some(_)) => Ok(Some(0)),
+            (None, Some(_)) => Ok((0..animations.len()).collect()),
         }
     }
 
@@ -66,7 +66,7 @@ impl Document {
             let index = extension.get("attributes").and_then(|all| all.get(name));
             let index = index.map(|index| {
                 let number = index.as_u64().and_then(|number| usize::try_from(number).ok());
-                number.ok_or_else(|| self.fault(&place, format!("{name}: {index} is no accessor")))
+                number.ok_or_else(|| self.fault(&place, format!("{name}: {index} must be the index of an accessor")))
             });
             index.transpose()
         };

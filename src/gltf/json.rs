@@ -131,19 +131,19 @@ fn check_size(text: &[u8]) -> Result<(), Fault> {
 /// Checks what the file says of its version (specification, section 3.2), before anything else, as all else depends on it.
 fn check_version(top: &Map<String, Value>) -> Result<(), Fault> {
     let asset = top.get("asset").and_then(Value::as_object);
-    let asset = asset.ok_or_else(|| Fault::key("asset", "it must be there, an object with the version"))?;
+    let asset = asset.ok_or_else(|| Fault::key("asset", "is required: an object with the version"))?;
     let number = |text: &str| {
         let (major, minor) = text.split_once('.')?;
         Some((major.parse::<u32>().ok()?, minor.parse::<u32>().ok()?))
     };
     let said = |key: &str| asset.get(key).filter(|value| !value.is_null());
-    let version = said("version").ok_or_else(|| Fault::key("asset.version", "it must be there"))?;
+    let version = said("version").ok_or_else(|| Fault::key("asset.version", "is required"))?;
     match version.as_str().and_then(number) {
         Some((2, _)) => {}
         _ => {
             return Err(Fault::key(
                 "asset.version",
-                format!("{} must be \"2.x\"", told(version)),
+                format!("{} is not supported; convert the file to glTF 2.0", told(version)),
             ));
         }
     }
@@ -153,7 +153,7 @@ fn check_version(top: &Map<String, Value>) -> Result<(), Fault> {
             Some(least) if least <= (2, 0) => Ok(()),
             _ => Err(Fault::key(
                 "asset.minVersion",
-                format!("{} must be at most \"2.0\", which is what is read", told(least)),
+                format!("{} must be at most \"2.0\", the supported version", told(least)),
             )),
         },
     }
@@ -190,7 +190,7 @@ fn tidy(value: &mut Value, index: Option<&str>) -> Result<(), (String, String)> 
         Value::Number(number) => {
             if let Some(x) = number.as_f64().filter(|_| number.is_f64()) {
                 if !(x.abs() <= f64::from(f32::MAX)) {
-                    return Err((String::new(), format!("{x:e} must be a number of 32 bits")));
+                    return Err((String::new(), format!("{x:e} exceeds the range of a 32-bit number")));
                 }
                 if x.fract() == 0.0 && (0.0..9.007_199_254_740_992e15).contains(&x) {
                     *number = Number::from(x as u64);
@@ -235,7 +235,7 @@ fn repair(top: &mut Value, notes: &mut Vec<String>) {
             _ => ("channels", "move"),
         };
         notes.push(format!(
-            "animations: {left_out} {what} that {moves} something else than a node are left out"
+            "animations: {left_out} {what} that {moves} something other than a node are ignored"
         ));
     }
 }
@@ -288,7 +288,7 @@ fn check(root: &Root) -> Result<(), Fault> {
             }
             if matches!(channel.target.path, Checked::Invalid) {
                 let key = format!("animations[{i}].channels[{k}].target.path");
-                return Err(Fault::key(key, "it must be a name that is known"));
+                return Err(Fault::key(key, "must be translation, rotation, scale or weights"));
             }
         }
     }
@@ -301,7 +301,7 @@ fn check(root: &Root) -> Result<(), Fault> {
         if !is_there {
             return Err(Fault::key(
                 format!("cameras[{i}].{name}"),
-                "it must be there, as that is its type",
+                "is required by the type of the camera",
             ));
         }
     }
@@ -319,18 +319,18 @@ fn check(root: &Root) -> Result<(), Fault> {
         Some((path, error)) => Err(Fault::key(
             path,
             match error {
-                Error::IndexOutOfBounds => "nothing has this index",
-                Error::Invalid => "it must be a value that is known",
-                Error::Missing => "it must be there",
-                Error::Oversize => "it must be a size that this machine can have",
-                Error::Unsupported => "it must be an extension that is known",
+                Error::IndexOutOfBounds => "the index is out of range",
+                Error::Invalid => "unknown value",
+                Error::Missing => "is required",
+                Error::Oversize => "is too large for this machine",
+                Error::Unsupported => "unsupported extension",
             },
         )),
     }
 }
 
 pub(super) fn missing(key: impl Into<String>, index: usize, count: usize) -> Fault {
-    Fault::key(key, format!("{index} is not there; there are {count}, counted from 0"))
+    Fault::key(key, format!("{index} is out of range; the file has {count}"))
 }
 
 /// What the crate's validation says and is no error here.

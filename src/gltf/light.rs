@@ -69,7 +69,7 @@ impl Document {
         let number = of_node.get("light").and_then(serde_json::Value::as_u64);
         let found = number.and_then(|i| lights?.get(usize::try_from(i).ok()?));
         let Some((number, light)) = number.zip(found) else {
-            let rule = "names a light that is not there".to_owned();
+            let rule = "refers to a light that does not exist".to_owned();
             return Err(self.fault(format!("nodes[{node}].extensions.{NAME}.light"), rule));
         };
         let place = format!("extensions.{NAME}.lights[{number}]");
@@ -77,12 +77,12 @@ impl Document {
         if light.range.is_some() {
             note(
                 notes,
-                format!("{NAME}: range is ignored: light goes on and falls off with the square of the distance"),
+                format!("{NAME}: range is ignored; light falls off with the square of the distance"),
             );
         }
         let mut color = DVec3::from_array(light.color) * light.intensity;
         if color.min_element() < 0.0 {
-            note(notes, format!("{place}: light below 0 is none"));
+            note(notes, format!("{place}: a negative intensity counts as 0"));
             color = color.max(DVec3::ZERO);
         }
         if !color.is_finite() {
@@ -93,7 +93,7 @@ impl Document {
             return Err(self.fault(&place, rule));
         }
         if color.max_element() > BRIGHTEST {
-            note(notes, format!("{place}: it is brighter than 1e6, which stands for it"));
+            note(notes, format!("{place}: the intensity is clamped to 1e6"));
             color *= BRIGHTEST / color.max_element();
             color = color.min(DVec3::splat(BRIGHTEST));
         }
@@ -103,7 +103,7 @@ impl Document {
         if !position.is_finite() || direction == DVec3::ZERO && light.kind != "point" {
             note(
                 notes,
-                format!("nodes[{node}]: its light is left out, as it is scaled to no size"),
+                format!("nodes[{node}]: its light is left out: its scale is zero"),
             );
             return Ok(None);
         }

@@ -75,7 +75,7 @@ impl<'a> Materials<'a> {
         if let Some(index) = index
             && index >= count
         {
-            let rule = format!("{index} is no material; there are {count}");
+            let rule = format!("{index} is out of range; the file has {count} materials");
             return Err(self.document.fault(format!("{place}.material"), rule));
         }
         let number = match self.numbers.get(&index) {
@@ -300,7 +300,7 @@ impl Maker<'_> {
             of.normal_map = Some(self.normal_map(&slot, normal.scale.into())?);
         }
         if json.occlusion_texture.is_some() {
-            let rule = "occlusion textures are ignored: light that does not arrive is what is traced";
+            let rule = "occlusion textures are ignored: the path tracer computes occlusion";
             note(self.notes, rule.to_owned());
         }
         let strength = extension("KHR_materials_emissive_strength").and_then(|of| of.get("emissiveStrength")?.as_f64());
@@ -627,7 +627,7 @@ impl Maker<'_> {
         }
         let inside = color.map(|x| x.clamp(0.0, most));
         if inside != color {
-            let rule = format!("{key} must be from 0 to {most}; what is nearest to it there stands for it");
+            let rule = format!("{key} must be from 0 to {most}; it is clamped");
             note(self.notes, format!("{}: {rule}", self.told()));
         }
         Ok(inside)

@@ -7,7 +7,6 @@ use ::gltf::json::mesh::{Mode, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 
-use super::Damage;
 use super::budget::Thing;
 use super::document::Document;
 use super::error::GltfError;
@@ -16,6 +15,7 @@ use super::node::{Nodes, Pose};
 use super::skin::Skin;
 use super::tangent::{generated, unturned};
 use super::texture::LAST_SET;
+use super::{Damage, LONGEST_AXIS};
 use crate::mesh::{Draft, Group, LARGEST_COORDINATE, Mesh, unit};
 
 /// The most vertices of a mesh, those among them that no triangle has.
@@ -65,9 +65,13 @@ impl Key {
         }
     }
 
-    /// Whether it is such a mesh.
+    /// Returns whether that transform leaves so little of an axis, rather than making one too long.
     pub fn is_flat(&self) -> bool {
-        self.flat.is_some()
+        let is_small = |axis: DVec3| axis.length() <= LONGEST_AXIS;
+        self.flat().is_some_and(|map| {
+            let DMat3 { x_axis, y_axis, z_axis } = map.matrix3;
+            [x_axis, y_axis, z_axis].into_iter().all(is_small)
+        })
     }
 
     fn flat(&self) -> Option<DAffine3> {
@@ -138,7 +142,10 @@ impl<'a> Meshes<'a> {
             }
             let Some(mesh) = document.json.meshes.get(key.mesh) else {
                 let count = document.json.meshes.len();
-                return Err(document.fault("nodes", format!("{} is no mesh; there are {count}", key.mesh)));
+                return Err(document.fault(
+                    "nodes",
+                    format!("{} is out of range; the file has {count} meshes", key.mesh),
+                ));
             };
             let mut parts = Vec::new();
             for (i, primitive) in mesh.primitives.iter().enumerate() {
@@ -182,8 +189,7 @@ impl<'a> Meshes<'a> {
             )),
         };
         let bare = self.bare.as_ref().map(|(place, set)| {
-            let rule =
-                format!("{place} has no TEXCOORD_{set}, which its material needs: (0, 0) stands for it everywhere");
+            let rule = format!("{place} has no TEXCOORD_{set}, which its material needs; (0, 0) is used");
             match self.bare_count {
                 1 => rule,
                 2 => format!("{rule} (and 1 more primitive)"),
@@ -326,7 +332,7 @@ impl<'a> Meshes<'a> {
             None => (0..count as u32).collect(),
         };
         if let Some(beyond) = indices.iter().find(|index| **index as usize >= count) {
-            let rule = format!("{beyond} is no vertex; there are {count}");
+            let rule = format!("{beyond} is out of range; the primitive has {count} vertices");
             return Err(self.document.fault(format!("{}.indices", part.place), rule));
         }
         let most = match part.mode {

@@ -58,11 +58,14 @@ pub use self::error::GltfError;
 /// The most instances of meshes, and the most groups of all instances together: each takes more than a kilobyte in a scene.
 const MOST_INSTANCES: usize = 1 << 20;
 
-/// What is told where a moment is asked for of what does not move.
-pub const STILL: &str = "the file has no animation that a time could be of";
+/// The longest axis of an instance's transform.
+const LONGEST_AXIS: f64 = 1e6;
 
-/// The turn that makes +Z of +Y.
-const UPRIGHT: DAffine3 = DAffine3 {
+/// The message about a time of a file without animations.
+pub const STILL: &str = "the file has no animations";
+
+/// The rotation from the file's coordinates to the scene's: +Y becomes +Z.
+pub const UPRIGHT: DAffine3 = DAffine3 {
     matrix3: DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y),
     translation: DVec3::ZERO,
 };
@@ -183,7 +186,7 @@ impl Imported {
     }
 }
 
-/// What is told where none of these things is the one that is asked for.
+/// Returns the message about a name or number that the file does not have, with those that it has.
 pub fn unknown(what: &str, wanted: &Selection, names: &[Option<&str>]) -> String {
     const MOST: usize = 20;
     let told = |(i, name): (usize, &Option<&str>)| match name {
@@ -195,9 +198,9 @@ pub fn unknown(what: &str, wanted: &Selection, names: &[Option<&str>]) -> String
         all.push(format!("{} more", names.len() - MOST));
     }
     match all.is_empty() {
-        true => format!("{wanted} is no {what}; the file has none"),
+        true => format!("the file has no {what} {wanted}; it has none"),
         false => format!(
-            "{wanted} is no {what}; the file has {}: {}",
+            "the file has no {what} {wanted}; it has {}: {}",
             names.len(),
             all.join(", ")
         ),
@@ -273,10 +276,10 @@ fn stamp(path: &Path) -> Stamp {
 /// Reads a file.
 fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBuf>) -> Result<Imported, GltfError> {
     let document = Document::open(path, root, files)?;
-    let animation = document.animation(choice)?;
+    let animations = document.animations(choice)?;
     let mut poses: Vec<Pose> = document.json.nodes.iter().map(Pose::of).collect();
     let mut notes = Vec::new();
-    if let Some(animation) = animation {
+    for animation in document.compatible(animations, &mut notes) {
         document.animate(&mut poses, animation, choice.time.unwrap_or(0.0), &mut notes)?;
     }
     let nodes = Nodes::of(&document, &poses)?;
@@ -362,7 +365,7 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
     }
     if flat > 0 {
         notes.push(format!(
-            "{flat} of {total} instances of meshes are left out, as they are scaled to no size"
+            "{flat} of {total} instances of meshes are left out: their scale is zero"
         ));
     }
     notes.extend(meshes.notes());
@@ -398,5 +401,5 @@ fn is_placeable(map: &DAffine3) -> bool {
     let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis];
     let lengths = [x, y, z].map(DVec3::length);
     let volume = x.cross(y).dot(z).abs() / (lengths[0] * lengths[1] * lengths[2]);
-    map.is_finite() && lengths.iter().all(|length| (1e-6..=1e6).contains(length)) && volume > 1e-6
+    map.is_finite() && lengths.iter().all(|length| (1e-6..=LONGEST_AXIS).contains(length)) && volume > 1e-6
 }

@@ -68,10 +68,10 @@ impl Nodes {
             for child in node.children.iter().flatten().map(|child| child.value()) {
                 let place = || format!("nodes[{i}].children");
                 if child >= count {
-                    return Err(document.fault(place(), format!("{child} is no node; there are {count}")));
+                    return Err(document.fault(place(), format!("{child} is out of range; the file has {count} nodes")));
                 }
                 if let Some(other) = parents[child].replace(i) {
-                    let rule = format!("node {child} has two parents, {other} and {i}; it must have one");
+                    let rule = format!("node {child} has two parents, {other} and {i}; a node must have at most one");
                     return Err(document.fault(place(), rule));
                 }
                 children[i].push(child);
@@ -87,7 +87,7 @@ impl Nodes {
             open.extend(&children[i]);
         }
         if seen < count {
-            let rule = "they must be trees: some nodes are above themselves".to_owned();
+            let rule = "a node is its own ancestor; nodes must form trees".to_owned();
             return Err(document.fault("nodes", rule));
         }
         Ok(Nodes { globals, children })
@@ -106,7 +106,7 @@ impl Nodes {
         while let Some(i) = open.pop() {
             match is_shown.get_mut(i) {
                 None => {
-                    let rule = format!("{i} is no node; there are {}", is_shown.len());
+                    let rule = format!("{i} is out of range; the file has {} nodes", is_shown.len());
                     return Err(document.fault(format!("scenes[{scene}].nodes"), rule));
                 }
                 Some(true) => continue,

@@ -17,7 +17,7 @@ impl Skin {
     pub fn of(document: &Document, number: usize, nodes: &Nodes) -> Result<Skin, GltfError> {
         let Some(skin) = document.json.skins.get(number) else {
             let count = document.json.skins.len();
-            return Err(document.fault("nodes", format!("{number} is no skin; there are {count}")));
+            return Err(document.fault("nodes", format!("{number} is out of range; the file has {count} skins")));
         };
         let place = |key: &str| format!("skins[{number}].{key}");
         let bind = match skin.inverse_bind_matrices {
@@ -38,7 +38,11 @@ impl Skin {
             match nodes.globals.get(joint.value()) {
                 Some(global) => joints.push(*global * bind),
                 None => {
-                    let rule = format!("{} is no node; there are {}", joint.value(), nodes.globals.len());
+                    let rule = format!(
+                        "{} is out of range; the file has {} nodes",
+                        joint.value(),
+                        nodes.globals.len()
+                    );
                     return Err(document.fault(place("joints"), rule));
                 }
             }
@@ -81,7 +85,7 @@ impl Skin {
                         return Err(fault(format!("WEIGHTS_{set}"), rule));
                     }
                     let Some(map) = self.joints.get(*joint as usize) else {
-                        let rule = format!("{joint} is no joint of the skin, which has {}", self.joints.len());
+                        let rule = format!("{joint} is out of range; the skin has {} joints", self.joints.len());
                         return Err(fault(format!("JOINTS_{set}"), rule));
                     };
                     let weight = f64::from(*weight);

@@ -81,7 +81,7 @@ impl Slot {
         if texture >= count {
             return Err(document.fault(
                 format!("{place}.index"),
-                format!("{texture} is no texture; there are {count}"),
+                format!("{texture} is out of range; the file has {count} textures"),
             ));
         }
         let set = transform.tex_coord.unwrap_or(set);

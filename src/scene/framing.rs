@@ -1,20 +1,24 @@
-//! A camera that frames what there is: from a direction, all of it in the picture.
+//! The automatic camera: it frames a whole scene from a direction.
+
+use std::str::FromStr;
 
 use glam::DVec3;
 
 use super::PerspectiveDescription;
 
-/// Vertical field of view of pictures that are not wide, in degrees.
+/// Vertical field of view in degrees, except in wide images.
 const FOV: f64 = 35.0;
-/// Wider pictures, relative to their height, do not see more to the sides: what is there would be drawn out.
+/// Largest aspect whose horizontal field of view grows with the width: beyond it perspective would stretch the sides.
 const WIDEST: f64 = 2.0;
-/// How much of the picture from its middle to an edge is for what is framed: 5 % of the whole are free on each side.
+/// Share of the image, from the centre to an edge, that the scene fills: margins of 5 % of the image remain.
 const INSIDE: f64 = 0.9;
-/// How near the camera may come to the nearest point, relative to the extent of all: long things are not seen from their ends.
+/// Smallest distance from the camera to the nearest point, relative to the scene's extent: a long object is not seen from inside its end.
 const NEAREST: f64 = 0.1;
+/// Elevation in degrees from which on the vertical axis cannot be up in the image.
+const STEEPEST: f64 = 89.9;
 
-/// Where a scene is seen from. Its front is towards -y and its upper side towards +z, as a glTF file's is once it is upright here. In
-/// options the names are those of [`View::name`].
+/// The side that a scene is seen from. Its front is towards -y and its top towards +z, as those of an upright glTF file are. Options
+/// use the names of [`View::name`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum View {
@@ -25,20 +29,20 @@ pub enum View {
     Front,
     /// From behind.
     Back,
-    /// From the left of who looks at the front.
+    /// From the viewer's left of the front.
     Left,
-    /// From the right of who looks at the front.
+    /// From the viewer's right of the front.
     Right,
-    /// From above; the front is at the picture's lower edge.
+    /// From above; the front is at the image's lower edge.
     Top,
-    /// From below; the front is at the picture's upper edge.
+    /// From below; the front is at the image's upper edge.
     Bottom,
-    /// From the front, the right and above alike.
+    /// From the front, the right and above in equal parts.
     Iso,
 }
 
 impl View {
-    /// All of them.
+    /// All views.
     pub const ALL: [View; 8] = [
         View::Corner,
         View::Front,
@@ -50,7 +54,7 @@ impl View {
         View::Iso,
     ];
 
-    /// The name in options.
+    /// Returns the name in options.
     pub const fn name(self) -> &'static str {
         match self {
             View::Corner => "corner",
@@ -64,7 +68,7 @@ impl View {
         }
     }
 
-    /// The direction from what is seen to the camera, not of unit length, and what is up.
+    /// Returns the direction from the scene to the camera, not normalized, and the direction that is up in the image.
     fn direction(self) -> (DVec3, DVec3) {
         let from = |x: f64, y: f64, z: f64| (DVec3::new(x, y, z), DVec3::Z);
         match self {
@@ -81,25 +85,93 @@ impl View {
     }
 }
 
-/// How a scene is framed.
+/// A direction that the camera looks from, in degrees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Orbit {
+    /// The turn about the vertical axis: 0 is the front, 90 the right, from -360 to 360.
+    pub azimuth: f64,
+    /// The angle above the horizon, from -90 to 90.
+    pub elevation: f64,
+}
+
+impl Orbit {
+    /// Returns the direction from the scene to the camera, and the direction that is up in the image.
+    fn direction(self) -> (DVec3, DVec3) {
+        let (sin, cos) = self.azimuth.to_radians().sin_cos();
+        let (high, level) = self.elevation.to_radians().sin_cos();
+        let towards = DVec3::new(sin * level, -cos * level, high);
+        // Seen from straight above or below, up is where the back of the scene is, or its front.
+        match self.elevation.abs() < STEEPEST {
+            true => (towards, DVec3::Z),
+            false => (towards, DVec3::new(-sin, cos, 0.0) * high.signum()),
+        }
+    }
+}
+
+impl FromStr for Orbit {
+    type Err = String;
+
+    /// Reads `AZIMUTH,ELEVATION`.
+    fn from_str(text: &str) -> Result<Orbit, String> {
+        let rule = "must be AZIMUTH,ELEVATION in degrees, such as 30,15";
+        let (azimuth, elevation) = text.split_once(',').ok_or(rule)?;
+        let number = |text: &str| text.trim().parse::<f64>().map_err(|_| rule.to_owned());
+        let orbit = Orbit {
+            azimuth: number(azimuth)?,
+            elevation: number(elevation)?,
+        };
+        let inside = |x: f64, most: f64| (-most..=most).contains(&x);
+        match (inside(orbit.azimuth, 360.0), inside(orbit.elevation, 90.0)) {
+            (false, _) => Err(format!("the azimuth, {}, must be from -360 to 360", orbit.azimuth)),
+            (_, false) => Err(format!("the elevation, {}, must be from -90 to 90", orbit.elevation)),
+            _ => Ok(orbit),
+        }
+    }
+}
+
+/// The framing of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Framing {
-    /// Where it is seen from.
+    /// The side that it is seen from.
     pub view: View,
-    /// Width of the picture over its height.
+    /// A direction in place of that side.
+    pub orbit: Option<Orbit>,
+    /// The vertical field of view in degrees; without, 35, or less where the image is wider than twice its height.
+    pub fov: Option<f64>,
+    /// Width of the image over its height.
     pub aspect: f64,
-    /// Whether it is to be in the picture from all around, as the camera turns about its middle.
+    /// True to keep it in the image while the camera turns about its middle.
     pub turns: bool,
 }
 
-/// A camera that sees all these points, as near as that goes; what it looks at is in their middle. Without a point it is somewhere.
+impl Framing {
+    /// Frames a scene from a view.
+    pub fn new(view: View, aspect: f64) -> Framing {
+        Framing {
+            view,
+            orbit: None,
+            fov: None,
+            aspect,
+            turns: false,
+        }
+    }
+
+    fn direction(&self) -> (DVec3, DVec3) {
+        self.orbit.map_or(self.view.direction(), Orbit::direction)
+    }
+}
+
+/// Returns the nearest camera that sees all points with equal margins on opposite sides. It looks at their middle. Without a point it
+/// frames the origin.
 pub fn framed(points: impl Iterator<Item = DVec3> + Clone, framing: Framing) -> PerspectiveDescription {
-    let (towards, up) = framing.view.direction();
+    let (towards, up) = framing.direction();
     let forward = -towards.normalize();
     let right = forward.cross(up).normalize();
     let upwards = right.cross(forward);
-    let high = FOV.to_radians() / 2.0;
-    let high = high.tan() * (WIDEST / framing.aspect).min(1.0);
+    let high = match framing.fov {
+        Some(fov) => (fov.to_radians() / 2.0).tan(),
+        None => (FOV.to_radians() / 2.0).tan() * (WIDEST / framing.aspect).min(1.0),
+    };
     let wide = high * framing.aspect;
     let (low, top) = points
         .clone()
@@ -110,37 +182,24 @@ pub fn framed(points: impl Iterator<Item = DVec3> + Clone, framing: Framing) -> 
         return framed(std::iter::once(DVec3::ZERO), framing);
     }
     let middle = 0.5 * low + 0.5 * top;
-    // How far the points reach in directions, from the middle. If they turn each goes around the axis on a circle.
-    let reach = |directions: [DVec3; 6]| {
-        points.clone().fold([f64::NEG_INFINITY; 6], |most, point| {
-            let p = point - middle;
-            let radius = (p - up * p.dot(up)).length();
-            let far = directions.map(|n| match framing.turns {
-                true => radius * (n - up * n.dot(up)).length() + p.dot(up) * n.dot(up),
-                false => p.dot(n),
-            });
-            std::array::from_fn(|i| most[i].max(far[i]))
-        })
+    let extent = Extent {
+        points: &points,
+        middle,
+        axis: framing.turns.then_some(up),
     };
-    // A point is in the picture if right . (p - camera) <= w forward . (p - camera), and so on for the other sides.
+    let reach = |n: DVec3| extent.reach(n, DVec3::ZERO).0;
+    // A point is in the image if right . (p - camera) <= w forward . (p - camera), and so on for the other sides.
     let (w, h) = (INSIDE * wide, INSIDE * high);
-    let [to_right, to_left, to_top, to_bottom, behind, before] = reach([
-        right - w * forward,
-        -right - w * forward,
-        upwards - h * forward,
-        -upwards - h * forward,
-        forward,
-        -forward,
-    ]);
+    let across = reach(right - w * forward) + reach(-right - w * forward);
+    let along = reach(upwards - h * forward) + reach(-upwards - h * forward);
+    let (behind, before) = (reach(forward), reach(-forward));
     let size = (top - low).length();
     let nearest = if size > 0.0 { NEAREST * size } else { 1.0 };
-    let back = ((to_right + to_left) / (2.0 * w))
-        .max((to_top + to_bottom) / (2.0 * h))
-        .max(before + nearest);
-    let higher = (to_top - to_bottom) / 2.0;
+    let back = (across / (2.0 * w)).max(along / (2.0 * h)).max(before + nearest);
+    let higher = extent.offset(upwards, forward, back);
     let (sideways, ahead) = match framing.turns {
         true => (0.0, higher * up.dot(forward) / up.dot(upwards)), // to the axis
-        false => ((to_right - to_left) / 2.0, (behind - before) / 2.0),
+        false => (extent.offset(right, forward, back), (behind - before) / 2.0),
     };
     let aside = right * sideways + upwards * higher;
     let fov = 2.0 * high.atan().to_degrees();
@@ -150,200 +209,62 @@ pub fn framed(points: impl Iterator<Item = DVec3> + Clone, framing: Framing) -> 
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::{Camera, CameraDescription, Projection};
+/// Maximum number of steps of [`Extent::offset`], far above what any model takes.
+const MAX_STEPS: usize = 64;
 
-    /// Where a point is in the picture, from -1 at the left and lower edges to 1.
-    fn seen(camera: &Camera, aspect: f64, point: DVec3) -> [f64; 2] {
-        let Projection::Perspective { fov } = camera.projection else {
-            panic!("a perspective camera")
-        };
-        let to = point - camera.position;
-        let ahead = to.dot(camera.forward);
-        assert!(ahead > 0.0, "{point} is behind the camera");
-        let high = ahead * (fov / 2.0).tan();
-        [to.dot(camera.right) / (high * aspect), to.dot(camera.up) / high]
-    }
+/// The extent of points about the middle of their bounds.
+struct Extent<'a, I> {
+    points: &'a I,
+    middle: DVec3,
+    /// The axis that the points turn about, if they do: each stands for its circle.
+    axis: Option<DVec3>,
+}
 
-    fn camera(points: &[DVec3], framing: Framing) -> Camera {
-        let description = framed(points.iter().copied(), framing);
-        let told = format!("{framing:?} {description:?}");
-        CameraDescription::from(description)
-            .validate()
-            .unwrap_or_else(|problem| panic!("{problem}: {told}"))
-    }
-
-    fn corners(low: [f64; 3], top: [f64; 3]) -> Vec<DVec3> {
-        let side = |i: usize, axis: usize| if i >> axis & 1 == 0 { low[axis] } else { top[axis] };
-        (0..8).map(|i| DVec3::new(side(i, 0), side(i, 1), side(i, 2))).collect()
-    }
-
-    /// Boxes, flat ones, lines, a point, and points that no corner of their box is.
-    fn clouds() -> Vec<Vec<DVec3>> {
-        let mut clouds = vec![
-            corners([-1.0; 3], [1.0; 3]),
-            corners([2.0, -3.0, 0.0], [2.5, 4.0, 0.25]),
-            corners([0.0, 0.0, 1.0], [3.0, 3.0, 1.0]),
-            corners([-1.0, 0.0, 0.0], [1.0, 0.0, 7.0]),
-            corners([0.0, -50.0, 0.0], [0.0, 50.0, 0.0]),
-            corners([0.0, 0.0, -1.0], [0.0, 0.0, 1.0]),
-            vec![DVec3::new(3.0, -4.0, 5.0)],
-            vec![
-                DVec3::new(1.0, -1.0, -1.0),
-                DVec3::new(-1.0, 1.0, -1.0),
-                DVec3::new(-1.0, -1.0, 1.0),
-            ],
-            (0..500)
-                .map(|i| {
-                    let turn = f64::from(i) * 2.4;
-                    DVec3::new(
-                        turn.cos() * f64::from(i),
-                        turn.sin() * f64::from(i),
-                        f64::from(i % 7) * 30.0,
-                    )
-                })
-                .collect(),
-        ];
-        let scaled = |factor: f64| {
-            clouds[..4]
-                .iter()
-                .map(move |cloud| cloud.iter().map(|p| *p * factor).collect())
-        };
-        let scaled: Vec<_> = scaled(1e-6).chain(scaled(1e6)).collect();
-        clouds.extend(scaled);
-        clouds
-    }
-
-    const ASPECTS: [f64; 6] = [1.0, 16.0 / 9.0, 9.0 / 16.0, 6.0, 1.0 / 6.0, 10.0];
-
-    #[test]
-    fn all_is_in_the_picture_and_fills_it() {
-        for points in clouds() {
-            for view in View::ALL {
-                for aspect in ASPECTS {
-                    let framing = Framing {
-                        view,
-                        aspect,
-                        turns: false,
-                    };
-                    let camera = camera(&points, framing);
-                    let (mut most, mut ends) = (0.0_f64, [[0.0_f64; 2]; 2]);
-                    for point in &points {
-                        let at = seen(&camera, aspect, *point);
-                        assert!(
-                            at.iter().all(|x| x.abs() <= INSIDE + 1e-6),
-                            "{framing:?}: {point} at {at:?}"
-                        );
-                        most = most.max(at[0].abs()).max(at[1].abs());
-                        for (ends, x) in ends.iter_mut().zip(at) {
-                            *ends = [ends[0].min(x), ends[1].max(x)];
-                        }
-                    }
-                    // It is in the middle, and reaches the margins unless the camera would be too near.
-                    let size = (0..3).map(|i| {
-                        let along = || points.iter().map(|p| p[i]);
-                        along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
-                    });
-                    let size = size.map(|side| side * side).sum::<f64>().sqrt();
-                    let depths = || points.iter().map(|p| (*p - camera.position).dot(camera.forward));
-                    let (nearest, farthest) = (depths().fold(f64::MAX, f64::min), depths().fold(0.0, f64::max));
-                    let near = if size > 0.0 { NEAREST * size } else { 1.0 };
-                    if nearest > near * (1.0 + 1e-9) {
-                        assert!((most - INSIDE).abs() < 1e-6, "{framing:?}: {most}");
-                        let [x, y] = ends.map(|[low, top]| (low + top).abs());
-                        assert!(x.min(y) < 1e-6, "{framing:?}: {x} {y}");
-                    } else {
-                        assert!(nearest > near * (1.0 - 1e-6), "{framing:?}: {nearest}");
-                        assert!(
-                            farthest - nearest >= 0.8 * size,
-                            "only what is long may be farther away"
-                        );
-                    }
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn what_turns_stays_in_the_picture() {
-        for points in clouds() {
-            for view in View::ALL {
-                for aspect in ASPECTS {
-                    let framing = Framing {
-                        view,
-                        aspect,
-                        turns: true,
-                    };
-                    let still = camera(&points, framing);
-                    let (_, up) = view.direction();
-                    let mut most = 0.0_f64;
-                    for turn in 0..72 {
-                        let turned = glam::DQuat::from_axis_angle(up, f64::from(turn).to_radians() * 5.0);
-                        for point in &points {
-                            // The points turn, in place of the camera.
-                            let point = still.look_at + turned * (*point - still.look_at);
-                            let at = seen(&still, aspect, point);
-                            assert!(
-                                at.iter().all(|x| x.abs() <= INSIDE + 1e-6),
-                                "{framing:?}: {point} at {at:?}"
-                            );
-                            most = most.max(at[0].abs()).max(at[1].abs());
-                        }
-                    }
-                    assert!(most > 0.85 || points.len() == 1 || !(most > 0.5), "{framing:?}: {most}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn views_show_the_sides_that_they_name() {
-        // Of a unit cube's corners, which is farthest to the right, the highest and the nearest.
-        let points = corners([0.0; 3], [1.0; 3]);
-        let at = |view: View| {
-            let framing = Framing {
-                view,
-                aspect: 1.0,
-                turns: false,
+impl<I: Iterator<Item = DVec3> + Clone> Extent<'_, I> {
+    /// Returns how far the points reach in direction `n`, and the derivative of that as `n` moves by `step`.
+    fn reach(&self, n: DVec3, step: DVec3) -> (f64, f64) {
+        let of = |point: DVec3| {
+            let p = point - self.middle;
+            let Some(axis) = self.axis else {
+                return (p.dot(n), p.dot(step));
             };
-            camera(&points, framing)
+            let across = |v: DVec3| v - axis * v.dot(axis);
+            let (radius, length) = (across(p).length(), across(n).length());
+            let slope = if length > 0.0 {
+                across(n).dot(step) / length
+            } else {
+                0.0
+            };
+            let height = p.dot(axis);
+            (
+                radius * length + height * n.dot(axis),
+                radius * slope + height * step.dot(axis),
+            )
         };
-        for (view, forward, right) in [
-            (View::Front, DVec3::Y, DVec3::X),
-            (View::Back, DVec3::NEG_Y, DVec3::NEG_X),
-            (View::Left, DVec3::X, DVec3::NEG_Y),
-            (View::Right, DVec3::NEG_X, DVec3::Y),
-            (View::Top, DVec3::NEG_Z, DVec3::X),
-            (View::Bottom, DVec3::Z, DVec3::X),
-        ] {
-            let camera = at(view);
-            assert!((camera.forward - forward).length() < 1e-12, "{view:?}: {camera:?}");
-            assert!((camera.right - right).length() < 1e-12, "{view:?}: {camera:?}");
-        }
-        for view in [View::Corner, View::Iso] {
-            let towards = -at(view).forward;
-            assert!(
-                towards.x > 0.0 && towards.y < 0.0 && towards.z > 0.0,
-                "{view:?}: {towards}"
-            );
-            assert!(at(view).up.z > 0.0);
-        }
-        assert!((DVec3::new(1.0, -1.0, 1.0).normalize() + at(View::Iso).forward).length() < 1e-12);
+        let further = |a: (f64, f64), b: (f64, f64)| if b.0 > a.0 { b } else { a };
+        self.points.clone().map(of).fold((f64::NEG_INFINITY, 0.0), further)
     }
 
-    #[test]
-    fn nothing_is_framed_somewhere() {
-        for turns in [false, true] {
-            camera(
-                &[],
-                Framing {
-                    view: View::Corner,
-                    aspect: 1.0,
-                    turns,
-                },
-            );
+    /// Returns how far to move a camera, `back` from the middle, along `side` so that both margins of that axis are equal.
+    ///
+    /// Let w be the tangent of half the angle that the points then fill: they reach to the camera's planes of that angle, so
+    /// that `reach(side - w forward) + reach(-side - w forward) = 2 w back`. The difference of the two sides is convex in w and
+    /// decreasing, hence Newton's method from w = 0 converges to its root from below.
+    fn offset(&self, side: DVec3, forward: DVec3, back: f64) -> f64 {
+        let (mut w, mut offset) = (0.0, 0.0);
+        for _ in 0..MAX_STEPS {
+            let (right, right_slope) = self.reach(side - w * forward, -forward);
+            let (left, left_slope) = self.reach(-side - w * forward, -forward);
+            offset = (right - left) / 2.0;
+            let step = (right + left - 2.0 * w * back) / (2.0 * back - right_slope - left_slope);
+            if !(step > 1e-12 * w) {
+                break;
+            }
+            w += step;
         }
+        offset
     }
 }
+
+#[cfg(test)]
+mod tests;

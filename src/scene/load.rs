@@ -18,7 +18,7 @@ use super::parse::{NOT_UTF8, encoding, invalid, line_of_path, syntax_error};
 use super::turntable::turning;
 use super::validate::{LIGHT_SAMPLES, adaptive, adaptive_error, max_depth, sample_count, side};
 use super::{
-    AdaptiveDescription, Assets, CameraPath, Description, EnvironmentDescription, Integrator, Pattern,
+    AdaptiveDescription, Assets, CameraPath, Description, EnvironmentDescription, Integrator, Pattern, Presentation,
     SamplesDescription, Scene, ViewSettings, ViewTransform,
 };
 use crate::gltf::GltfError;
@@ -66,6 +66,8 @@ pub struct Overrides {
     pub turntable: Option<u32>,
     /// Whether damage to a file that the scene names is an error. Otherwise it is a warning, and a stand-in is rendered.
     pub strict: bool,
+    /// How a model file is shown without a scene.
+    pub presentation: Presentation,
     /// What is shown of a glTF file, and from where.
     pub gltf: GltfChoice,
     /// Values for any keys of the file, one after the other; the fields above go before them.
@@ -346,8 +348,9 @@ impl<'a> Draft<'a> {
     fn overridden(mut self) -> Result<Draft<'a>, SceneError> {
         let applied = self.overrides.apply(&mut self.description);
         applied.map_err(SceneError::Override)?;
-        if let Some(option) = self.overrides.gltf.first() {
-            let rule = format!("is for scenes that are glTF files, and {} is none", self.origin);
+        let gltf = self.overrides.gltf.first();
+        if let Some(option) = gltf.or(self.overrides.presentation.first()) {
+            let rule = format!("only applies to model files, and {} is a scene file", self.origin);
             return Err(SceneError::Override(Problem::of(option, rule)));
         }
         Ok(self)
@@ -489,6 +492,7 @@ light_samples = { pattern = 'random', count = 5 }
             exposure: None,
             turntable: None,
             strict: false,
+            presentation: Presentation::default(),
             gltf: GltfChoice::default(),
             define: Vec::new(),
         };

@@ -21,6 +21,7 @@ mod load;
 mod mesh_file;
 mod metals;
 mod parse;
+mod presentation;
 mod schema;
 mod sky;
 mod spline;
@@ -52,7 +53,7 @@ pub use description::*;
 pub use error::{ErrorPlace, KeyPath, Problem, SceneError};
 #[cfg(feature = "dev")]
 pub(crate) use error::{Segment, cut};
-pub use framing::{Framing, View, framed};
+pub use framing::{Framing, Orbit, View, framed};
 pub use gltf::{GltfChoice, is_gltf};
 pub use image_file::Assets;
 pub use load::Overrides;
@@ -61,6 +62,7 @@ pub(crate) use load::{Draft, folder_of, read_bytes, read_text};
 pub use metals::MetalIndex;
 #[cfg(feature = "dev")]
 pub(crate) use parse::{Pieces, Places};
+pub use presentation::{Presentation, UpAxis};
 #[cfg(all(test, feature = "dev"))]
 pub(crate) use schema::fields::Kind as FieldKind;
 #[cfg(feature = "dev")]

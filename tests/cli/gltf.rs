@@ -149,23 +149,27 @@ fn what_is_not_there_is_told_with_what_is() {
         (
             "--camera",
             "above",
-            "--camera: \"above\" is no camera; the file has 2: 0 (\"front camera\"), 1 (\"side camera\")",
+            "--camera: the file has no camera \"above\"; it has 2: 0 (\"front camera\"), 1 (\"side camera\")",
         ),
-        ("--camera", "2", "--camera: 2 is no camera; the file has 2: 0 (\"front"),
+        (
+            "--camera",
+            "2",
+            "--camera: the file has no camera 2; it has 2: 0 (\"front",
+        ),
         (
             "--gltf-scene",
             "two",
-            "--gltf-scene: \"two\" is no scene; the file has 2: 0 (\"all\"), 1 (\"one\")",
+            "--gltf-scene: the file has no scene \"two\"; it has 2: 0 (\"all\"), 1 (\"one\")",
         ),
         (
             "--animation",
             "fall",
-            "--animation: \"fall\" is no animation; the file has 1: 0 (\"rise\")",
+            "--animation: the file has no animation \"fall\"; it has 1: 0 (\"rise\")",
         ),
         (
             "--variant",
             "red",
-            "--variant: \"red\" is no variant; the file has 1: 0 (\"golden\")",
+            "--variant: the file has no variant \"red\"; it has 1: 0 (\"golden\")",
         ),
         ("--time", "-1", "--time: -1 must be from 0 to 1e9 seconds"),
         ("--time", "nan", "--time: NaN must be from 0 to 1e9 seconds"),
@@ -194,8 +198,11 @@ fn what_is_not_there_is_told_with_what_is() {
         ("--gltf-scene", "0"),
         ("--animation", "0"),
         ("--variant", "0"),
+        ("--orbit", "0,0"),
+        ("--fov", "40"),
+        ("--up", "z"),
     ] {
-        let told = format!("error: {option}: is for scenes that are glTF files, and small.toml is none");
+        let told = format!("error: {option}: only applies to model files, and small.toml is a scene file");
         refused(&place, &["render", "small.toml", option, value], 2, &told);
     }
     let still = Model {
@@ -207,7 +214,7 @@ fn what_is_not_there_is_told_with_what_is() {
         &place,
         &["render", "still.glb", "--time", "1"],
         2,
-        "--time: the file has no animation that a time could be of",
+        "--time: the file has no animations",
     );
     refused(
         &place,
@@ -299,6 +306,8 @@ fn a_converted_scene_has_the_same_bits() {
         &["--background", "1,0,0.5"],
         &["--environment", "sky", "--background", "none"],
         &["-D", "render.max_depth=1"],
+        &["--ground"],
+        &["--orbit", "200,40", "--fov", "50", "--up", "x"],
     ] {
         place.quietly(
             &[

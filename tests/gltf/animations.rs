@@ -200,6 +200,32 @@ fn an_animation_is_chosen_by_its_name_or_number() {
 }
 
 #[test]
+fn animations_of_different_properties_play_together() {
+    let mut builder = Builder::new();
+    let mesh = builder.quad(None);
+    let node = builder.root_node(json!({ "mesh": mesh }));
+    let mut step = |path: &str, value: [f64; 3], name: &str| {
+        animate(&mut builder, node, path, "STEP", &[0.0], &[value], name);
+    };
+    step("translation", [1.0, 0.0, 0.0], "walk");
+    step("scale", [2.0, 2.0, 2.0], "grow");
+    step("translation", [5.0, 0.0, 0.0], "run");
+    step("scale", [7.0, 7.0, 7.0], "swell");
+    let scene = scene_by(&builder, "together", "time = 0");
+    assert_corners(&scene, &quad_by(|p| 2.0 * p + DVec3::X));
+    assert_eq!(
+        scene.notes,
+        [
+            "together.glb: animations 2 (\"run\"), 3 (\"swell\") drive properties that an earlier animation drives, and do not play; \
+             choose one with --animation"
+        ]
+    );
+    let scene = scene_by(&builder, "together-one", "time = 0\nanimation = \"swell\"");
+    assert_corners(&scene, &quad_by(|p| 7.0 * p));
+    assert!(scene.notes.is_empty(), "{:?}", scene.notes);
+}
+
+#[test]
 fn weights_of_targets_may_be_animated() {
     let mut builder = Builder::new();
     let attributes = builder.quad_attributes();

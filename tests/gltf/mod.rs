@@ -11,5 +11,6 @@ mod lights;
 mod materials;
 mod nodes;
 mod page;
+mod presentation;
 mod read;
 mod textures;

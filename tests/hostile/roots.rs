@@ -97,7 +97,7 @@ fn a_scene_names_nothing_outside() {
     for (ending, text) in texts {
         for name in names(outer.path(), ending) {
             fs::write(folder.join("a.toml"), START.to_owned() + &text.replace("FILE", &name)).unwrap();
-            is_refused(&render(&folder, "a.toml"), &name);
+            is_refused(&render_with(&folder, "a.toml", &["--strict"]), &name);
         }
     }
     // With another root it may, for whom shares files among scenes.
@@ -130,14 +130,14 @@ fn a_gltf_file_names_nothing_outside() {
                 }
             }
             fs::write(folder.join("a.gltf"), json.to_string()).unwrap();
-            is_refused(&render(&folder, "a.gltf"), &name);
+            is_refused(&render_with(&folder, "a.gltf", &["--strict"]), &name);
             // As a part of a scene too.
             fs::write(
                 folder.join("a.toml"),
                 format!("{START}[[shapes]]\ntype = 'gltf'\nfile = 'a.gltf'\n"),
             )
             .unwrap();
-            is_refused(&render(&folder, "a.toml"), &name);
+            is_refused(&render_with(&folder, "a.toml", &["--strict"]), &name);
         }
     }
 }

@@ -114,6 +114,7 @@ impl<'a> Job<'a> {
             overrides.gltf.time = Some(f64::from(number) / fps);
             let moment = super::load(&self.args.scene, &overrides)?;
             let before = std::mem::replace(&mut self.scene, moment);
+            self.scene.keep_ground(&before);
             if self.args.options.is_framed(&self.scene) {
                 // The automatic camera frames the model at rest, so that a frame does not depend on the other frames.
                 (self.scene.camera, self.scene.camera_path) = (before.camera, before.camera_path);

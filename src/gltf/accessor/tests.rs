@@ -98,11 +98,11 @@ fn every_type_is_read() {
     }
     assert_eq!(
         told(accessor(&bytes, of("VEC4")).vectors::<3>(0)),
-        "accessors[0].type: its elements have 4 numbers; here they must have 3"
+        "accessors[0].type: its elements have 4 components; 3 are expected"
     );
     assert_eq!(
         told(accessor(&bytes, of("VEC4")).vectors::<3>(1)),
-        "accessors: 1 is not there; there are 1, counted from 0"
+        "accessors: 1 is out of range; the file has 1"
     );
 }
 
@@ -261,7 +261,7 @@ fn an_accessor_without_bytes_is_zero() {
     let hidden = json!({ "componentType": 5126, "count": 2, "type": "VEC2", "extensions": { "X_bytes": {} } });
     assert_eq!(
         told(accessor(&[0], hidden).vectors::<2>(0)),
-        "accessors[0]: \"X_bytes\" is the only place of its data, and this extension is not known"
+        "accessors[0]: \"X_bytes\" holds its only data and is not supported"
     );
 }
 

@@ -125,12 +125,12 @@ fn other_files_are_read_and_listed() {
         "{}",
         told(2)
     );
-    assert_eq!(told(3), "images[3]: it must have a uri or a bufferView");
+    assert_eq!(told(3), "images[3]: has neither a uri nor a bufferView");
     assert_eq!(
         told(4),
-        "images[4]: \"X_image\" is the only place of its data, and this extension is not known"
+        "images[4]: \"X_image\" holds its only data and is not supported"
     );
-    assert_eq!(told(5), "images: 5 is not there; there are 5, counted from 0");
+    assert_eq!(told(5), "images: 5 is out of range; the file has 5");
     let names: Vec<_> = files.iter().filter_map(|path| path.file_name()?.to_str()).collect();
     assert_eq!(names.len(), 3);
     for name in ["the data.bin", "a.png", "small.txt"] {
@@ -184,12 +184,12 @@ fn buffers_may_be_data_uris() {
     assert!(told(&json).starts_with("a: buffers[0].uri: the data URI must be base64"));
     // The chunk of a container is the first buffer alone.
     json["buffers"] = json!([{ "byteLength": 3 }]);
-    assert_eq!(told(&json), "a: buffers[0]: it must have a uri, as views refer to it");
+    assert_eq!(told(&json), "a: buffers[0]: has no uri, but buffer views refer to it");
     json["buffers"] = json!([{ "byteLength": 4 }, { "byteLength": 4 }]);
     assert!(read(container(&json, b"1234")).is_ok());
     json["bufferViews"][1]["buffer"] = json!(1);
     let fault = read(container(&json, b"1234")).map(|_| ()).unwrap_err();
-    assert_eq!(fault.message, "it must have a uri, as views refer to it");
+    assert_eq!(fault.message, "has no uri, but buffer views refer to it");
 }
 
 #[test]
@@ -202,17 +202,26 @@ fn what_is_no_gltf_is_told() {
     assert_eq!(json(""), "a:1:1: EOF while parsing a value");
     assert_eq!(json("{\n  x"), "a:2:3: key must be a string");
     assert_eq!(json("[]"), "a:1:1: the JSON must be an object");
-    assert_eq!(json("{}"), "a: asset: it must be there, an object with the version");
-    assert_eq!(json("{\"asset\":{}}"), "a: asset.version: it must be there");
+    assert_eq!(json("{}"), "a: asset: is required: an object with the version");
+    assert_eq!(json("{\"asset\":{}}"), "a: asset.version: is required");
     for (version, rule) in [
-        ("\"1.0\"", "a: asset.version: \"1.0\" must be \"2.x\""),
-        ("\"2\"", "a: asset.version: \"2\" must be \"2.x\""),
-        ("2.0", "a: asset.version: 2.0 must be \"2.x\""),
+        (
+            "\"1.0\"",
+            "a: asset.version: \"1.0\" is not supported; convert the file to glTF 2.0",
+        ),
+        (
+            "\"2\"",
+            "a: asset.version: \"2\" is not supported; convert the file to glTF 2.0",
+        ),
+        (
+            "2.0",
+            "a: asset.version: 2.0 is not supported; convert the file to glTF 2.0",
+        ),
         ("\"2.1\"", "fine"),
         ("\"2.0\",\"minVersion\":\"2.0\"", "fine"),
         (
             "\"2.1\",\"minVersion\":\"2.1\"",
-            "a: asset.minVersion: \"2.1\" must be at most \"2.0\", which is what is read",
+            "a: asset.minVersion: \"2.1\" must be at most \"2.0\", the supported version",
         ),
     ] {
         assert_eq!(json(&format!("{{\"asset\":{{\"version\":{version}}}}}")), rule);
@@ -228,9 +237,9 @@ fn what_is_no_gltf_is_told() {
         "[".repeat(1 << 20),
         "]".repeat(1 << 20)
     );
-    assert!(json(&deep).ends_with("at most 127 deep"), "{}", json(&deep));
+    assert!(json(&deep).ends_with("at most 127 levels deep"), "{}", json(&deep));
     let deep = format!("{{\"a\":{}", "[{\"a\":".repeat(1 << 16));
-    assert!(json(&deep).ends_with("at most 127 deep"), "{}", json(&deep));
+    assert!(json(&deep).ends_with("at most 127 levels deep"), "{}", json(&deep));
     let wide = format!("{{\"nodes\":[{}{{}}]}}", "{},".repeat(3 << 20));
     assert_eq!(
         json(&wide),
@@ -315,7 +324,7 @@ fn every_index_and_word_is_checked() {
             assert!(told.starts_with(&format!("a: {place}")), "{key}: {value}: {told}");
         }
     }
-    assert!(with("/nodes/0/translation/0", json!(1e39)).starts_with("a: nodes[0].translation[0]: 1e39 must be"));
+    assert!(with("/nodes/0/translation/0", json!(1e39)).starts_with("a: nodes[0].translation[0]: 1e39 exceeds"));
     assert_eq!(with("/accessors/0/min", json!("none")), "fine true");
     assert_eq!(with("/meshes/0/primitives/0/attributes", json!({})), "fine true");
 }
@@ -346,15 +355,15 @@ fn what_writers_get_wrong_is_understood() {
     assert_eq!(document.json.animations[0].channels.len(), 1);
     assert_eq!(
         document.notes,
-        ["animations: 2 channels that move something else than a node are left out"]
+        ["animations: 2 channels that move something other than a node are ignored"]
     );
     json["animations"] = animation(json!([channel(json!(1), "translation")]));
-    assert!(told(&json).starts_with("a: animations[0].channels[0].target.node: 1 is not there"));
+    assert!(told(&json).starts_with("a: animations[0].channels[0].target.node: 1 is out of range"));
     let camera = |camera: Value| with("cameras", json!([camera])).map(|_| ());
     assert!(camera(json!({ "type": "perspective", "perspective": { "yfov": 1, "znear": 0.1 } })).is_ok());
     assert_eq!(
         camera(json!({ "type": "orthographic", "perspective": { "yfov": 1, "znear": 0.1 } })).unwrap_err(),
-        "a: cameras[0].orthographic: it must be there, as that is its type"
+        "a: cameras[0].orthographic: is required by the type of the camera"
     );
     assert!(camera(json!({ "type": "fisheye", "perspective": { "yfov": 1, "znear": 0.1 } })).is_err());
     assert!(with("extras", json!({ "a": [1e300] })).is_ok());
@@ -370,15 +379,17 @@ fn extensions_are_refused_or_told_by_their_names() {
     };
     let known = ["KHR_materials_sheen", "KHR_mesh_quantization", "EXT_texture_webp"];
     assert_eq!(with(&known, &known).unwrap(), [""; 0]);
-    for name in ["KHR_draco_mesh_compression", "KHR_texture_basisu"] {
-        assert_eq!(
-            with(&["KHR_mesh_quantization", name], &[]).unwrap_err(),
-            format!("a: extensionsRequired[1]: \"{name}\" is required, and it is not known")
-        );
+    for (name, command) in [
+        ("KHR_draco_mesh_compression", "gltf-transform copy"),
+        ("KHR_texture_basisu", "gltf-transform ktxdecompress"),
+    ] {
+        let message = with(&["KHR_mesh_quantization", name], &[]).unwrap_err();
+        let start = format!("a: extensionsRequired[1]: \"{name}\" is required but not supported; ");
+        assert!(message.starts_with(&start) && message.contains(command), "{message}");
     }
     assert_eq!(
         with(&[], &["X_a", "KHR_materials_sheen", "X_a"]).unwrap(),
-        ["the extension \"X_a\" is not known, and is not looked at"]
+        ["the extension \"X_a\" is not supported and is ignored"]
     );
     let many: Vec<String> = (0..1000).map(|i| format!("X_{i}")).collect();
     let many: Vec<&str> = many.iter().map(String::as_str).collect();
@@ -392,7 +403,8 @@ fn extensions_are_refused_or_told_by_their_names() {
     let fault = read(container(&json, &binary)).map(|_| ()).unwrap_err();
     assert_eq!(
         fault.of(Path::new("a")).to_string(),
-        "a: meshes[0].primitives[0]: \"KHR_draco_mesh_compression\" is the only place of its data, and this extension is not known"
+        "a: meshes[0].primitives[0]: \"KHR_draco_mesh_compression\" holds its only data and is not supported; \
+         export without Draco compression, or run gltf-transform copy IN.glb OUT.glb"
     );
 }
 
@@ -412,21 +424,22 @@ fn a_texture_without_an_image_is_refused() {
         Ok(image) => image.to_string(),
         Err(error) => error.to_string().replace("/none/a.gltf: ", ""),
     };
-    assert_eq!(told(0), "textures[0]: it must have a source");
+    assert_eq!(told(0), "textures[0]: has no source");
     assert_eq!(
         told(1),
-        "textures[1]: \"KHR_texture_basisu\" is the only place of its data, and this extension is not known"
+        "textures[1]: \"KHR_texture_basisu\" holds its only data and is not supported; \
+         run gltf-transform ktxdecompress IN.glb OUT.glb"
     );
     assert_eq!(told(2), "1");
     for texture in [3, 4] {
         let key = format!("textures[{texture}].extensions.EXT_texture_webp.source");
         assert_eq!(
             told(texture),
-            format!("{key}: it must be the index of an image; there are 2, counted from 0")
+            format!("{key}: must be the index of an image; the file has 2")
         );
     }
     assert_eq!(told(5), "0");
-    assert_eq!(told(6), "textures: 6 is not there; there are 6, counted from 0");
+    assert_eq!(told(6), "textures: 6 is out of range; the file has 6");
 }
 
 #[test]

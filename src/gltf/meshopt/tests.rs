@@ -382,11 +382,11 @@ fn a_compressed_view_is_as_any_other() {
     let key = format!("bufferViews[0].extensions.{name}");
     assert_eq!(
         told("buffer", json!(2)),
-        "a: bufferViews[0]: 2 is not there; there are 2, counted from 0"
+        "a: bufferViews[0]: 2 is out of range; the file has 2"
     );
     assert_eq!(
         told("buffer", json!(1)),
-        "a: buffers[1]: it must have a uri, as views refer to it"
+        "a: buffers[1]: has no uri, but buffer views refer to it"
     );
     assert!(told("buffer", json!(-1)).starts_with(&format!("a: {key}.buffer: ")));
     assert!(told("count", json!(99)).starts_with(&format!("a: {key}.count: 99 elements")));

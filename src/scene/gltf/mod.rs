@@ -16,7 +16,7 @@ use super::{
     Description, EnvironmentDescription, EnvironmentName, Framing, GltfDescription, ImageDescription, Integrator,
     RenderDescription, SamplesDescription, Scene, Selection, View, ViewTransform, framed,
 };
-use crate::gltf::{Choice, GltfError, Imported, ImportedCamera, STILL, load};
+use crate::gltf::{Choice, GltfError, Imported, ImportedCamera, STILL, UPRIGHT, load};
 
 pub(super) use self::expand::Expanded;
 
@@ -72,11 +72,17 @@ impl GltfChoice {
         if key == "animations" && is_still && self.time.is_some() && self.animation.is_none() {
             return SceneError::Override(Problem::of("time", message.as_str()));
         }
-        let is_it = |wanted: &Option<Selection>| {
-            let start = wanted.as_ref().map(|wanted| format!("{wanted} is no "));
+        let is_it = |list: &str, wanted: &Option<Selection>| {
+            let what = list.trim_end_matches('s');
+            let start = wanted
+                .as_ref()
+                .map(|wanted| format!("the file has no {what} {wanted};"));
             start.is_some_and(|start| message.starts_with(&start))
         };
-        match chosen.iter().find(|(list, _, wanted)| list == key && is_it(wanted)) {
+        match chosen
+            .iter()
+            .find(|(list, _, wanted)| list == key && is_it(list, wanted))
+        {
             Some((_, option, _)) => SceneError::Override(Problem::of(option, message.as_str())),
             None => SceneError::Gltf(error),
         }
@@ -116,7 +122,7 @@ pub(super) fn describe(
         variant,
     } = overrides.gltf.clone();
     let file = path.file_name().unwrap_or_default().to_string_lossy();
-    let shape = GltfDescription {
+    let mut shape = GltfDescription {
         scene,
         time,
         animation,
@@ -131,21 +137,36 @@ pub(super) fn describe(
     })?;
     let choice = Choice::of(&shape).map_err(SceneError::Override)?;
     let imported = load(&whole, &root, &choice, files).map_err(|error| overrides.gltf.told(error))?;
-    let camera = match view {
-        Some(_) => None,
-        None => chosen(&imported.cameras, camera.as_ref()).map_err(SceneError::Override)?,
+    let presentation = &overrides.presentation;
+    let camera = match view.is_some() || presentation.orbit.is_some() {
+        true => None,
+        false => chosen(&imported.cameras, camera.as_ref()).map_err(SceneError::Override)?,
     };
     let (width, height) = overrides
         .size
         .unwrap_or_else(|| size(camera.and_then(|camera| camera.aspect)));
+    if let (Some(_), Some(option)) = (camera, presentation.of_camera()) {
+        let rule = "only applies to the automatic camera, and the file has its own camera; add --view or --orbit";
+        return Err(SceneError::Override(Problem::of(option, rule)));
+    }
+    let upright = |axis: DVec3| UPRIGHT.transform_vector3(axis);
+    let turn = presentation.up.and_then(|up| up.rotation(upright));
+    let mut points = Vec::new();
+    if camera.is_none() || presentation.ground {
+        points = imported.points();
+    }
+    if let Some((rotation, turn)) = turn {
+        shape.rotate = Some(rotation);
+        points.iter_mut().for_each(|point| *point = turn * *point);
+    }
+    let aspect = f64::from(width.max(1)) / f64::from(height.max(1));
     let framing = Framing {
-        view: view.unwrap_or_default(),
-        aspect: f64::from(width.max(1)) / f64::from(height.max(1)),
         turns: overrides.turntable.is_some(),
+        ..presentation.framing(view, aspect).map_err(SceneError::Override)?
     };
     let camera = match camera {
         Some(camera) => camera.description.clone(),
-        None => framed(imported.points().iter().copied(), framing).into(),
+        None => framed(points.iter().copied(), framing).into(),
     };
     let render = RenderDescription {
         integrator: Some(Integrator::Path),
@@ -155,6 +176,7 @@ pub(super) fn describe(
     let mut description = Description::new(width, height, camera)
         .with_render(render)
         .with_shape(shape);
+    presentation.add_ground(&mut description, &points);
     description.image = ImageDescription {
         view_transform: ViewTransform::KhronosPbrNeutral,
         ..description.image

@@ -1,0 +1,155 @@
+//! Options for a model file that is rendered without a scene: what points up, the automatic camera, and a ground.
+
+use std::fmt;
+use std::str::FromStr;
+
+use glam::{DMat3, DVec3};
+
+use super::error::Problem;
+use super::{
+    Description, DiffuseDescription, DiskDescription, Framing, Orbit, Rotation, RotationAbout, Scene, ShapeDescription,
+    View,
+};
+
+/// The fields of view that the automatic camera may have, in degrees.
+const FOVS: (f64, f64) = (1.0, 170.0);
+/// The name of the material of the ground.
+const GROUND: &str = "ground";
+/// The share of light that the ground reflects.
+const GRAY: [f64; 3] = [0.5; 3];
+/// The radius of the ground, relative to the diagonal of the model's bounds: the shadows of low lights stay on it.
+const RADIUS: f64 = 5.0;
+/// The gap between the model and the ground, relative to that diagonal. A face at the bottom would otherwise coincide with it.
+const GAP: f64 = 1e-4;
+
+/// Options for a model file that is rendered without a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Presentation {
+    /// The vertical field of view of the automatic camera, from 1 to 170 degrees.
+    pub fov: Option<f64>,
+    /// The direction that the automatic camera looks from, in place of a [`View`].
+    pub orbit: Option<Orbit>,
+    /// The axis of the file that points up, in place of the one that its format defines.
+    pub up: Option<UpAxis>,
+    /// True to put a disk below the model.
+    pub ground: bool,
+}
+
+impl Presentation {
+    /// Returns the name of the first option that is given.
+    pub(super) fn first(&self) -> Option<&'static str> {
+        let camera = self.of_camera();
+        camera
+            .or(self.orbit.map(|_| "orbit"))
+            .or(self.ground.then_some("ground"))
+    }
+
+    /// Returns the name of the first option that is given and only adjusts the automatic camera.
+    pub(super) fn of_camera(&self) -> Option<&'static str> {
+        self.fov.map(|_| "fov").or(self.up.map(|_| "up"))
+    }
+
+    /// Returns the framing of a model.
+    pub(super) fn framing(&self, view: Option<View>, aspect: f64) -> Result<Framing, Problem> {
+        if let Some(fov) = self.fov
+            && !(FOVS.0..=FOVS.1).contains(&fov)
+        {
+            let (low, high) = FOVS;
+            return Err(Problem::of(
+                "fov",
+                format!("{fov} must be from {low} to {high} degrees"),
+            ));
+        }
+        Ok(Framing {
+            orbit: self.orbit,
+            fov: self.fov,
+            ..Framing::new(view.unwrap_or_default(), aspect)
+        })
+    }
+
+    /// Adds the ground below these points, if it is asked for.
+    pub(super) fn add_ground(&self, description: &mut Description, points: &[DVec3]) {
+        if !self.ground {
+            return;
+        }
+        let (low, high) = points
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| {
+                (low.min(*point), high.max(*point))
+            });
+        let size = (high - low).length();
+        if !(size > 0.0) {
+            return;
+        }
+        let center = (0.5 * (low + high)).with_z(low.z - GAP * size);
+        let disk = DiskDescription::new(GROUND, center, RADIUS * size, DVec3::Z);
+        description.shapes.push(ShapeDescription::Disk(disk));
+        let material = DiffuseDescription::new(GRAY);
+        description.materials.insert(GROUND.to_owned(), material.into());
+    }
+}
+
+impl Scene {
+    /// Takes the ground of another moment of the same model: it stands still while the model moves.
+    pub fn keep_ground(&mut self, before: &Scene) {
+        let find = |scene: &Scene| {
+            let is_ground = |material: usize| scene.material_names.get(material).is_some_and(|name| name == GROUND);
+            scene.shapes.iter().position(|shape| is_ground(shape.material))
+        };
+        if let (Some(now), Some(then)) = (find(self), find(before)) {
+            self.shapes[now].geometry = before.shapes[then].geometry.clone();
+        }
+    }
+}
+
+/// An axis of a model file, in one of its two directions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UpAxis {
+    /// 0 is x, 1 is y, 2 is z.
+    axis: usize,
+    is_negative: bool,
+}
+
+impl UpAxis {
+    /// Returns the rotation that turns this axis upwards, where `to_scene` takes the file's directions to the scene's. None
+    /// if it points up already. A model that stands on its head is turned about the axis from its front to its back.
+    pub(super) fn rotation(self, to_scene: impl Fn(DVec3) -> DVec3) -> Option<(Rotation, DMat3)> {
+        let sign = if self.is_negative { -1.0 } else { 1.0 };
+        let up = to_scene(DVec3::AXES[self.axis] * sign);
+        let (axis, degrees) = match (up.x.round(), up.y.round(), up.z.round()) {
+            (1.0, ..) => (DVec3::Y, -90.0),
+            (-1.0, ..) => (DVec3::Y, 90.0),
+            (_, 1.0, _) => (DVec3::X, 90.0),
+            (_, -1.0, _) => (DVec3::X, -90.0),
+            (.., -1.0) => (DVec3::Y, 180.0),
+            _ => return None,
+        };
+        let turn = DMat3::from_axis_angle(axis, f64::to_radians(degrees));
+        // The elements are 0, 1 and -1.
+        let turn = DMat3::from_cols(turn.x_axis.round(), turn.y_axis.round(), turn.z_axis.round());
+        Some((Rotation::About(RotationAbout { axis, degrees }), turn))
+    }
+}
+
+impl FromStr for UpAxis {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<UpAxis, String> {
+        let (is_negative, name) = match text.strip_prefix('-') {
+            Some(name) => (true, name),
+            None => (false, text.strip_prefix('+').unwrap_or(text)),
+        };
+        let axis = ["x", "y", "z"]
+            .iter()
+            .position(|known| name.eq_ignore_ascii_case(known));
+        let axis = axis.ok_or("must be x, y, z, -x, -y or -z")?;
+        Ok(UpAxis { axis, is_negative })
+    }
+}
+
+impl fmt::Display for UpAxis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sign = if self.is_negative { "-" } else { "" };
+        write!(f, "{sign}{}", ["x", "y", "z"][self.axis])
+    }
+}
