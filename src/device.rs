@@ -311,14 +311,14 @@ impl<'a> Renderer<'a> {
 
 /// The device that a render would use, and the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Foreseen {
+pub struct DevicePlan {
     /// The device.
     pub info: DeviceInfo,
     /// The reason.
     pub why: String,
     /// The adapter and its plan, unless it is the CPU.
     #[cfg(feature = "gpu")]
-    pub adapter: Option<(gpu::Info, gpu::Foreseen)>,
+    pub adapter: Option<(gpu::Info, gpu::KernelPlan)>,
 }
 
 /// Returns the device that a render would use, without opening it. A render uses the next device, or the CPU, if that one cannot be opened
@@ -327,8 +327,8 @@ pub struct Foreseen {
 /// # Errors
 ///
 /// [`RenderError::NoDevice`] if no device fits.
-pub fn foresee(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError> {
-    let on_cpu = |why: String| Foreseen {
+pub fn plan_device(scene: &Packed, device: &Device) -> Result<DevicePlan, RenderError> {
+    let on_cpu = |why: String| DevicePlan {
         info: cpu_info(),
         why,
         #[cfg(feature = "gpu")]
@@ -353,7 +353,7 @@ pub fn foresee(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError>
 }
 
 #[cfg(feature = "gpu")]
-fn preferred(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError> {
+fn preferred(scene: &Packed, device: &Device) -> Result<DevicePlan, RenderError> {
     let info = gpu::preferred(&choice_of(device))?;
     let why = match (device, info.kind) {
         (Device::Named(_), _) => "requested",
@@ -366,20 +366,20 @@ fn preferred(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError> {
         Device::Gpu if info.kind == "software" => "no hardware GPU found",
         _ => why,
     };
-    let foreseen = gpu::foresee(scene, &info);
-    Ok(Foreseen {
+    let kernel = gpu::plan_kernel(scene, &info);
+    Ok(DevicePlan {
         info: DeviceInfo {
             name: info.name.clone(),
             driver: info.driver.clone(),
             interface: info.backend.clone(),
         },
         why: why.to_owned(),
-        adapter: Some((info, foreseen)),
+        adapter: Some((info, kernel)),
     })
 }
 
 #[cfg(not(feature = "gpu"))]
-fn preferred(scene: &Packed, device: &Device) -> Result<Foreseen, RenderError> {
+fn preferred(scene: &Packed, device: &Device) -> Result<DevicePlan, RenderError> {
     match adapter(scene, device, false, &|_, _| true) {
         Err(Error::Render(error)) => Err(error),
         _ => Err(RenderError::NoDevice("only the CPU is available".to_owned())),

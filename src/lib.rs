@@ -94,6 +94,7 @@ mod picture;
 #[doc(hidden)]
 pub mod render;
 pub mod scene;
+mod shader_files;
 #[doc(hidden)]
 pub mod visible;
 mod waiting;

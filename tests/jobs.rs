@@ -346,26 +346,26 @@ fn another_job_has_another_identity() {
     let this = of(&|_| ());
     assert_eq!(this, of(&|_| ()), "of the same scene the same");
     let changes: [Change<wgray::Description>; 6] = [
-        ("another size", &|scene| scene.image.width += 1),
-        ("another number of samples", &|scene| {
+        ("its size is", &|scene| scene.image.width += 1),
+        ("its number of samples is", &|scene| {
             scene.render.pixel_samples.count = 1
         }),
-        ("another scene", &|scene| scene.render.seed += 1),
-        ("another scene", &|scene| scene.render.ambient.x += 1e-3),
-        ("another scene", &|scene| scene.shapes.truncate(3)),
-        ("another scene", &|scene| scene.lights.truncate(0)),
+        ("its scene or an option", &|scene| scene.render.seed += 1),
+        ("its scene or an option", &|scene| scene.render.ambient.x += 1e-3),
+        ("its scene or an option", &|scene| scene.shapes.truncate(3)),
+        ("its scene or an option", &|scene| scene.lights.truncate(0)),
     ];
     for (what, change) in changes {
         let told = this.difference(&of(change)).unwrap_or_default();
         assert!(told.starts_with(what), "{what}: {told}");
     }
     let changes: [Change<Identity>; 6] = [
-        ("another version", &|job| job.version.push('1')),
-        ("another crop", &|job| job.region[0] = 1),
-        ("another kind of sampling", &|job| job.adaptive = true),
-        ("another form", &|job| job.layers = true),
-        ("another rounding", &|job| job.exact_rounding = true),
-        ("other shaders", &|job| job.shaders.push('1')),
+        ("its version", &|job| job.version.push('1')),
+        ("its crop is", &|job| job.region[0] = 1),
+        ("its sampling is adaptive, not uniform", &|job| job.adaptive = true),
+        ("its layers are means over the samples, not", &|job| job.layers = true),
+        ("its rounding is with, not without", &|job| job.exact_rounding = true),
+        ("its shaders differ", &|job| job.shaders.push('1')),
     ];
     for (what, change) in changes {
         let mut other = this.clone();

@@ -390,6 +390,6 @@ fn the_program_without_the_feature_gpu_renders_on_the_cpu() {
     );
     let (code, good, told) = run(&["check", "s.toml"]);
     assert_eq!((code, told.as_str()), (Some(0), ""));
-    assert!(good.starts_with("s.toml: good; 24 x 16 pixels"), "{good}");
+    assert!(good.starts_with("s.toml: ok: 24 x 16 pixels"), "{good}");
     assert_eq!(run(&["dev", "s.toml"]).0, Some(2));
 }

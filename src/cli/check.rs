@@ -1,4 +1,4 @@
-//! `wgray check`: scenes and, with the feature `gpu`, shaders; without a device.
+//! `wgray check`: validates scenes and, with the feature `gpu`, shaders, without a device.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -7,8 +7,8 @@ use std::process::ExitCode;
 use clap::ValueHint;
 #[cfg(feature = "gpu")]
 use wgray::gpu::{Forms, check_kernels, compose::Shaders};
-use wgray::pack::pack;
-use wgray::scene::{CameraPath, Define, Overrides, Projection, Scene, SceneError};
+use wgray::pack::{Packed, pack};
+use wgray::scene::{CameraPath, Define, Integrator, Overrides, Projection, Scene, SceneError};
 use wgray::visible::visible;
 
 use super::log::{self, Level};
@@ -21,16 +21,16 @@ pub struct Args {
     #[arg(value_name = "SCENE", required = true)]
     scenes: Vec<PathBuf>,
 
-    /// Folder of the shaders to check, with the files of the project's own, in place of those in the program
+    /// Check the shaders in DIR, which has the same files as the project's shaders/
     #[cfg(feature = "gpu")]
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     shaders: Option<PathBuf>,
 
-    /// Folder that files named by the scenes, their textures and meshes, must lie in, in place of the scenes' own
+    /// Allow the files of the scenes to lie anywhere in DIR instead of only in each scene's folder
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 
-    /// Puts a value in place of each scene's: -D render.seed=3
+    /// Override a value of each scene: -D render.seed=3
     #[arg(short = 'D', long, value_name = "KEY=VALUE")]
     define: Vec<Define>,
 
@@ -38,10 +38,10 @@ pub struct Args {
     options: SceneOptions,
 }
 
-/// The most frames of a path that are looked at.
-const MOST_FRAMES: f64 = 100_000.0;
+/// Maximum number of frames of a camera path to check.
+const MAX_FRAMES: f64 = 100_000.0;
 
-/// Checks all files, whatever is wrong with some; the exit code is that of the first bad one.
+/// Checks all files. The exit code is that of the first invalid one.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     #[cfg(feature = "gpu")]
     let shaders = match &args.shaders {
@@ -67,10 +67,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                 printed = writeln!(
                     io::stdout().lock(),
                     "{}",
-                    visible(&format!("{}: {summary}", path.display()))
+                    visible(&format!("{}: ok: {summary}", path.display()))
                 );
             }
-            Ok(_) => {} // nobody reads any more
+            Ok(_) => {} // the reader of standard output has gone
             Err(error) => {
                 super::report(&error, super::exit_code(&error));
                 code.get_or_insert(ExitCode::from(super::exit_code(&error)));
@@ -85,58 +85,93 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &Shaders) -> anyhow::Result<String> {
     let scene = super::load(path, overrides)?;
-    for note in &scene.notes {
+    for note in scene.notes.iter().chain(&scene.visibility_warnings()) {
         log::say(Level::Warning, &format!("{}: {note}", path.display()));
     }
     let frames = check_path(&scene)?;
     let packed = pack(&scene);
     #[cfg(feature = "gpu")]
     check_kernels(&packed, shaders, Forms::All)?;
-    let triangles = packed.meshes.iter().map(|mesh| mesh.triangles.len());
-    let bytes = packed.meshes.iter().map(|mesh| mesh.bytes()).sum::<u64>();
-    let meshes = match packed.instances.len() {
-        0 => String::new(),
-        instances => format!(
-            "; meshes: {} of {} triangles in {:.1} MiB, instances of them: {instances}",
-            packed.meshes.len(),
-            triangles.sum::<usize>(),
-            bytes as f64 / f64::from(1 << 20),
-        ),
-    };
-    let camera = match (scene.camera.projection, scene.camera.lens) {
-        (Projection::Panorama, _) => "; a panorama".to_owned(),
-        (_, Some(lens)) => format!(
-            "; a lens {} wide, sharp at {}",
-            short(2.0 * lens.radius),
-            short(lens.focus)
-        ),
-        _ => String::new(),
-    };
-    Ok(format!(
-        "good; {} x {} pixels, {} samples each, {} of light{camera}; shapes: {} of {} primitives{meshes}; lights: {}{frames}",
-        scene.width,
-        scene.height,
-        packed.pixel_samples,
-        packed.light_samples(),
-        scene.shapes.len() - packed.instances.len(),
-        packed.primitives.len(),
-        scene.lights.len(),
-    ))
+    Ok([
+        Some(image(&scene, &packed)),
+        Some(shapes(&scene, &packed)),
+        Some(count(scene.lights.len(), "light")),
+        camera(&scene),
+        frames,
+    ]
+    .into_iter()
+    .flatten()
+    .collect::<Vec<_>>()
+    .join("; "))
 }
 
-/// Checks the camera at all frames from its path's first key to its last, and says which these are.
-fn check_path(scene: &Scene) -> Result<String, SceneError> {
-    let Some((first, last)) = scene.camera_path.as_ref().map(CameraPath::frames) else {
-        return Ok(String::new());
+fn image(scene: &Scene, packed: &Packed) -> String {
+    let integrator = scene.render.integrator;
+    let lights = match packed.light_samples() {
+        0 => String::new(),
+        _ if integrator == Integrator::Path => String::new(),
+        lights => format!(", {}", count(lights as usize, "light sample")),
     };
-    let count = (last.floor() - first.ceil() + 1.0).clamp(0.0, MOST_FRAMES) as u32;
+    let samples = count(packed.pixel_samples as usize, "sample");
+    format!(
+        "{} x {} pixels, {samples} per pixel{lights}, {}",
+        scene.width,
+        scene.height,
+        integrator.name()
+    )
+}
+
+/// Returns the number of shapes, and of these the instances of meshes with their memory use.
+fn shapes(scene: &Scene, packed: &Packed) -> String {
+    let all = count(scene.shapes.len(), "shape");
+    if packed.instances.is_empty() {
+        return all;
+    }
+    let triangles: usize = packed.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
+    let bytes: u64 = packed.meshes.iter().map(|mesh| mesh.bytes()).sum();
+    format!(
+        "{all}, including {} of {} ({}, {:.1} MiB)",
+        count(packed.instances.len(), "instance"),
+        count(packed.meshes.len(), "mesh"),
+        count(triangles, "triangle"),
+        bytes as f64 / f64::from(1 << 20),
+    )
+}
+
+/// Returns what is special about the camera, if anything.
+fn camera(scene: &Scene) -> Option<String> {
+    match (scene.camera.projection, scene.camera.lens) {
+        (Projection::Panorama, _) => Some("panorama".to_owned()),
+        (_, Some(lens)) => {
+            let (width, focus) = (short(2.0 * lens.radius), short(lens.focus));
+            Some(format!("lens {width} wide, focused at {focus}"))
+        }
+        _ => None,
+    }
+}
+
+/// Checks the camera at all frames from the first key of its path to the last, and returns which these are.
+fn check_path(scene: &Scene) -> Result<Option<String>, SceneError> {
+    let Some((first, last)) = scene.camera_path.as_ref().map(CameraPath::frames) else {
+        return Ok(None);
+    };
+    let count = (last.floor() - first.ceil() + 1.0).clamp(0.0, MAX_FRAMES) as u32;
     for i in 0..count {
         scene.camera_at(first.ceil() + f64::from(i))?;
     }
-    Ok(format!("; the camera moves from frame {first} to {last}"))
+    Ok(Some(format!("the camera moves from frame {first} to {last}")))
 }
 
-/// A length with four digits.
+/// Returns a number with a noun in the singular or plural.
+fn count(n: usize, noun: &str) -> String {
+    match (n, noun.ends_with("sh")) {
+        (1, _) => format!("1 {noun}"),
+        (_, true) => format!("{n} {noun}es"),
+        (_, false) => format!("{n} {noun}s"),
+    }
+}
+
+/// Returns a length with four digits.
 fn short(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }

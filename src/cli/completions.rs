@@ -1,4 +1,4 @@
-//! `wgray completions`: what a shell needs to complete the command line.
+//! `wgray completions`: prints a completion script for a shell.
 
 use std::io::{self, Write as _};
 use std::process::ExitCode;
@@ -9,7 +9,7 @@ use clap_complete::Shell;
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The shell; docs/command-line.md says where each looks for it
+    /// The shell; docs/command-line.md documents where to install the script
     #[arg(value_name = "SHELL")]
     shell: Shell,
 }
@@ -20,7 +20,7 @@ pub fn run(args: &Args) -> ExitCode {
     super::ended(io::stdout().lock().write_all(&text), ExitCode::SUCCESS)
 }
 
-/// The command line, with more of what may be offered than the options themselves take or refuse.
+/// Returns the command line with values to complete that the options themselves do not list.
 fn command() -> Command {
     let all = below(super::Cli::command());
     let names: Vec<String> = all
@@ -33,12 +33,12 @@ fn command() -> Command {
     })
 }
 
-/// The arguments of a command and of those below it.
+/// Adds the values of a command and of its subcommands.
 fn below(command: Command) -> Command {
     command.mut_args(offered).mut_subcommands(below)
 }
 
-/// Files are offered for paths alone, and for a device the words that are no adapter's name.
+/// Limits file names to options that are paths, and adds the fixed names of devices.
 fn offered(arg: Arg) -> Arg {
     if arg.get_id() == "device" {
         return arg.value_parser(PossibleValuesParser::new(["auto", "gpu", "cpu"]));

@@ -1,4 +1,4 @@
-//! `wgray convert`: a scene of any kind as a TOML file that renders the same picture.
+//! `wgray convert`: writes a scene of any format as a TOML file that renders the same image.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -8,8 +8,9 @@ use anyhow::anyhow;
 use clap::ValueHint;
 use wgray::error::RenderError;
 use wgray::image::{Output, Pending};
-use wgray::scene::{Define, Overrides, Scene};
+use wgray::scene::{Define, Description, Overrides, Scene};
 
+use super::farm::text::word;
 use super::log::{self, Level};
 use super::outputs::keep_inputs;
 use super::render::parse_size;
@@ -22,23 +23,27 @@ pub struct Args {
     /// Scene file: .gltf or .glb, .json or .toml
     scene: PathBuf,
 
-    /// File to write. It refers to the model, images and meshes that the scene names
+    /// File to write. It refers to the model, images and meshes of the scene
     #[arg(short, long, value_name = "SCENE.toml")]
     output: PathBuf,
 
-    /// Size of the picture in pixels
+    /// Overwrite an existing file
+    #[arg(short, long)]
+    force: bool,
+
+    /// Set the image size in pixels
     #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
     size: Option<(u32, u32)>,
 
-    /// Samples of every pixel
+    /// Set the number of samples per pixel
     #[arg(long, visible_alias = "spp", value_name = "N")]
     pixel_samples: Option<u32>,
 
-    /// Folder that files named by the scene must lie in, in place of the scene's own
+    /// Allow the files of the scene to lie anywhere in DIR instead of only in the scene's own folder
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 
-    /// Puts a value in place of the scene's: -D render.seed=3
+    /// Override a scene value: -D render.seed=3
     #[arg(short = 'D', long, value_name = "KEY=VALUE")]
     define: Vec<Define>,
 
@@ -46,10 +51,10 @@ pub struct Args {
     options: SceneOptions,
 }
 
-/// Checks the scene, so that what is written can be rendered.
+/// Validates the scene first, so that the file can be rendered.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let ends = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"));
-    if !ends(&args.output) {
+    let is_toml = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("toml"));
+    if !is_toml(&args.output) {
         let rule = format!("--output: {}: must end in .toml", args.output.display());
         return Err(Usage(rule).into());
     }
@@ -68,7 +73,14 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let inputs = [std::slice::from_ref(&args.scene), &scene.files].concat();
     keep_inputs("--output", &output, &inputs, "choose another name")?;
-    // Where the file will be, behind links.
+    if !args.force && output.path().is_some_and(Path::exists) {
+        let name = args.output.display();
+        return Err(Usage(format!(
+            "--output: {name}: already exists; pass --force to overwrite it"
+        ))
+        .into());
+    }
+    // The folder of the file behind links.
     let folder = (output.path().and_then(Path::parent))
         .unwrap_or(Path::new("."))
         .to_owned();
@@ -78,30 +90,54 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         .map_err(|error| anyhow!("{}: {error}", args.scene.display()))?;
     let text = description.to_toml()?;
     let root = folder.canonicalize().map_err(RenderError::Output)?;
-    let is_outside =
-        (description.files(&folder)).any(|file| file.canonicalize().is_ok_and(|file| !file.starts_with(&root)));
+    let needed_root = common_root(&description, &root);
     let mut file = Pending::start(output).map_err(RenderError::Output)?;
     let head = format!(
-        "# {}, as a scene. What is not said here has its default.\n\n",
+        "# {}, as a scene. Absent keys have their defaults.\n\n",
         name_of(&args.scene)
     );
     let written = file
         .write_all(head.as_bytes())
         .and_then(|()| file.write_all(text.as_bytes()));
     written.and_then(|()| file.finish()).map_err(RenderError::Output)?;
-    if is_outside {
+    if let Some(needed) = needed_root {
         let (name, folder) = (args.output.display(), folder.display());
-        log::say(
-            Level::Note,
-            &format!(
-                "{name} names files outside of {folder}: it is rendered with --asset-root, a folder that they lie in"
-            ),
-        );
+        let option = word(&from_here(&needed).to_string_lossy());
+        let text = format!("{name}: names files outside of {folder}; to use it, pass --asset-root {option}");
+        log::say(Level::Note, &text);
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// A file's name, in one line.
+/// Returns the folder that holds all files of a scene in `folder`, if `folder` itself does not.
+fn common_root(description: &Description, folder: &Path) -> Option<PathBuf> {
+    let files = description.files(folder).filter_map(|file| file.canonicalize().ok());
+    let outside: Vec<PathBuf> = files.filter(|file| !file.starts_with(folder)).collect();
+    if outside.is_empty() {
+        return None;
+    }
+    let holds_all = |root: &&Path| outside.iter().all(|file| file.starts_with(root));
+    folder.ancestors().find(holds_all).map(Path::to_owned)
+}
+
+/// Returns a folder as typed in the current one: relative if it is the current folder, below it or above it.
+fn from_here(folder: &Path) -> PathBuf {
+    let Ok(here) = std::env::current_dir().and_then(|here| here.canonicalize()) else {
+        return folder.to_owned();
+    };
+    if folder == here {
+        return PathBuf::from(".");
+    }
+    if let Ok(below) = folder.strip_prefix(&here) {
+        return below.to_owned();
+    }
+    match here.strip_prefix(folder) {
+        Ok(rest) => rest.components().map(|_| "..").collect(),
+        Err(_) => folder.to_owned(),
+    }
+}
+
+/// Returns the name of a file on one line.
 fn name_of(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()

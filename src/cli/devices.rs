@@ -1,4 +1,4 @@
-//! `wgray devices`: what there is to render on.
+//! `wgray devices`: lists the devices that can render.
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -29,7 +29,7 @@ fn list(out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "auto chooses: cpu")?;
     writeln!(
         out,
-        "this program was built without its feature \"gpu\": it looks for no adapter"
+        "this program was built without the feature \"gpu\" and cannot use GPUs"
     )
 }
 
@@ -48,29 +48,29 @@ fn list_adapters(out: &mut impl Write, adapters: &[Info]) -> io::Result<()> {
             largest_buffer,
         } = info;
         writeln!(out, "{number}: {name}")?;
-        writeln!(out, "    type            {kind}, by {backend}")?;
+        writeln!(out, "    type            {kind} ({backend})")?;
         writeln!(out, "    driver          {driver}")?;
         writeln!(
             out,
             "    arithmetic      {}",
             if *exact {
-                "exactly as written"
+                "IEEE 754 as written"
             } else {
-                "as the driver likes it"
+                "driver-dependent (--exact-rounding makes it exact)"
             }
         )?;
         if *exact {
             writeln!(out, "    float controls  {}", names(*float_controls))?;
         }
         writeln!(out, "    largest binding {}", mebibytes(*largest_binding))?;
-        writeln!(out, "    buffers         {storage_buffers} in a shader")?;
+        writeln!(out, "    buffers         {storage_buffers} per shader")?;
         writeln!(out, "    largest buffer  {}", mebibytes(*largest_buffer))?;
     }
     Ok(())
 }
 
 #[cfg(feature = "gpu")]
-/// What a device's arithmetic is asked to keep to, in words.
+/// Names the float controls that a device supports.
 fn names(controls: FloatControls) -> String {
     let FloatControls {
         rounding,
@@ -92,7 +92,7 @@ fn names(controls: FloatControls) -> String {
 
 fn list_cpu(out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "cpu")?;
-    writeln!(out, "    type            this program's own, without a driver")?;
+    writeln!(out, "    type            built in, needs no driver")?;
     writeln!(out, "    threads         {}", rayon::current_num_threads())
 }
 

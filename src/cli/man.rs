@@ -1,4 +1,4 @@
-//! `wgray man`: the manual pages, made of the same definitions as the help.
+//! `wgray man`: manual pages, generated from the same definitions as the help.
 
 mod text;
 
@@ -17,11 +17,11 @@ use super::{Cli, Usage};
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The command whose page is printed, as render or farm slurm; if absent, the program's own
+    /// The command to document, such as render or farm slurm [default: the program]
     #[arg(value_name = "COMMAND", conflicts_with = "output")]
     command: Vec<String>,
 
-    /// Folder to write all pages into, wgray.1, wgray-render.1 and so on, in place of printing one. It is made if it is not there
+    /// Write all pages (wgray.1, wgray-render.1, ...) to DIR, which is created if it does not exist
     #[arg(short, long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     output: Option<PathBuf>,
 }
@@ -51,8 +51,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 fn not_written(path: &Path, error: &io::Error) -> RenderError {
     let message = match error.to_string() {
-        told if told.contains(&*path.to_string_lossy()) => told,
-        told => format!("{}: {told}", path.display()),
+        text if text.contains(&*path.to_string_lossy()) => text,
+        text => format!("{}: {text}", path.display()),
     };
     RenderError::Output(io::Error::new(error.kind(), message))
 }
@@ -63,16 +63,16 @@ fn write(path: &Path, text: &[u8]) -> io::Result<()> {
     file.finish()
 }
 
-/// The program, and each of its subcommands.
+/// Returns the program and each of its subcommands.
 fn commands() -> Vec<clap::Command> {
     let mut program = super::with_all_options(Cli::command()).disable_help_subcommand(true);
-    program.build(); // which gives the subcommands their whole names
+    program.build(); // sets the full names of the subcommands
     let mut all = Vec::new();
     add(program, &mut all);
     all
 }
 
-/// Adds a command and those below it.
+/// Adds a command and its subcommands.
 fn add(command: clap::Command, all: &mut Vec<clap::Command>) {
     let below: Vec<_> = command
         .get_subcommands()
@@ -83,17 +83,17 @@ fn add(command: clap::Command, all: &mut Vec<clap::Command>) {
     below.into_iter().for_each(|command| add(command, all));
 }
 
-/// `wgray-render`
+/// Returns the name of a page: `wgray-render`.
 fn name_of(command: &clap::Command) -> &str {
     command.get_display_name().unwrap_or(command.get_name())
 }
 
-/// A page in the language of man.
+/// Returns a page in roff.
 fn page(command: &clap::Command) -> io::Result<Vec<u8>> {
     let name = name_of(command);
     let is_program = name == "wgray";
     let man = Man::new(command.clone());
-    // By hand: without a date, which a build has none of that stays, the next words would stand in its place.
+    // Written by hand with an empty date, for reproducible builds; `clap_mangen` would shift the next words into its place.
     let (title, version) = (name.to_uppercase(), env!("CARGO_PKG_VERSION"));
     let mut text = format!(".TH {title} 1 \"\" \"wgray {version}\" \"User Commands\"\n").into_bytes();
     man.render_name_section(&mut text)?;
@@ -109,7 +109,7 @@ fn page(command: &clap::Command) -> io::Result<Vec<u8>> {
     }
     rest.control("SH", ["EXIT STATUS"]);
     match own_exit_codes(command) {
-        Some(told) => paragraphs(&mut rest, &told),
+        Some(text) => paragraphs(&mut rest, &text),
         None => entries(&mut rest, EXIT_CODES.iter().copied()),
     }
     let of_all = is_program || name == "wgray-render";
@@ -151,11 +151,11 @@ fn page(command: &clap::Command) -> io::Result<Vec<u8>> {
     Ok(text)
 }
 
-/// What a command's help says of its exit codes, if it is not what all say.
+/// Returns a command's own text on exit codes, if it has one.
 fn own_exit_codes(command: &clap::Command) -> Option<String> {
-    let told = command.get_after_help()?.to_string();
-    let own = told.strip_prefix("Exit codes: ")?;
-    (told != super::EXIT_CODES).then(|| own.to_owned())
+    let text = command.get_after_help()?.to_string();
+    let own = text.strip_prefix("Exit codes: ")?;
+    (text != super::EXIT_CODES).then(|| own.to_owned())
 }
 
 fn section(roff: &mut Roff, title: &str, text: &str) {
@@ -172,7 +172,7 @@ fn paragraphs(roff: &mut Roff, text: &str) {
     }
 }
 
-/// Terms, and what each means.
+/// Writes terms with their meanings.
 fn entries<'a>(roff: &mut Roff, all: impl Iterator<Item = (&'a str, &'a str)>) {
     for (term, meaning) in all {
         roff.control("TP", []);

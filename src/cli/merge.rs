@@ -1,4 +1,4 @@
-//! `wgray merge`: parts of a picture, joined.
+//! `wgray merge`: joins the parts of an image.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -17,25 +17,25 @@ use super::{Interrupted, Usage, signal};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = super::EXIT_CODES)]
-#[command(allow_negative_numbers = true)] // so that a number out of range is told as such
+#[command(allow_negative_numbers = true)] // so that a number out of range is reported as such
 pub struct Args {
-    /// All parts of one picture, which wgray render --tile has written, in any order; a folder stands for the parts in it
+    /// All parts of an image, written by wgray render --tile, or folders of parts
     #[arg(value_name = "PART", required = true)]
     parts: Vec<PathBuf>,
 
-    /// The number that # in names of outputs stand for: out.####.png is out.0007.png
+    /// Replace # in output names by N: out.####.png becomes out.0007.png
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=i64::from(frames::MAX_NUMBER)))]
     frame: Option<u32>,
 
     #[command(flatten)]
     pictures: PictureOptions,
 
-    /// Says nothing but errors
+    /// Suppress all output except errors
     #[arg(short, long)]
     quiet: bool,
 }
 
-/// Writes the picture that the parts make, with their layers: the same bytes as those of one render.
+/// Writes the image and the layers of the parts: the same bytes as a single render.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let frame = Frame::one(args.frame);
     let named = args.pictures.output.iter().map(|output| frame.name("--output", output));
@@ -44,7 +44,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         ..args.pictures.clone()
     };
     let [first, ..] = pictures.output.as_slice() else {
-        return Err(Usage("--output: must be there: -o NAME.exr".to_owned()).into());
+        return Err(Usage("--output: is required: -o NAME.exr".to_owned()).into());
     };
     let files = files(&args.parts)?;
     let parts = Parts::open(
@@ -59,7 +59,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let begun = outputs.begin().map_err(RenderError::Output)?;
     let stop = signal::stop().context("signal handler")?;
     let Files::Pictures(targets) = begun.files else {
-        return Ok(ExitCode::SUCCESS); // a part is found by `find_part` alone
+        return Ok(ExitCode::SUCCESS); // `Outputs::find` returns no part
     };
     let options = args.pictures.save_options(parts.told());
     let written = image::save(targets, &layout, &options, &mut |sink| {
@@ -80,7 +80,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// The parts, with those that lie in folders. What another process is still writing there has a hidden name.
+/// Returns the parts, including those in folders. Files that another process is writing have hidden names.
 fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in paths {
@@ -98,7 +98,7 @@ fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
         let before = files.len();
         files.extend(entries.iter().filter(|entry| is_part(entry)).map(fs::DirEntry::path));
         if files.len() == before {
-            bail!("{name}: is a folder without parts, NAME.part, which wgray render --tile writes");
+            bail!("{name}: contains no parts (NAME.part, written by wgray render --tile)");
         }
         files[before..].sort();
     }

@@ -22,9 +22,7 @@ impl RenderMetadata {
         )];
         let mut add = |name: &str, text: String| pairs.push((name.to_owned(), text));
         add("scene_hash", hash_of_scene(packed));
-        if cfg!(feature = "gpu") {
-            add("shader_hash", hash_of_shaders());
-        }
+        add("shader_hash", hash_of_shaders());
         let render = &scene.render;
         add("integrator", render.integrator.name().to_owned());
         let samples = render.pixel_samples;

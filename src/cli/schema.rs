@@ -1,4 +1,4 @@
-//! `wgray schema`: what editors complete and check scene files by.
+//! `wgray schema`: prints the JSON Schema of scene files.
 
 use std::io::{self, Write as _};
 use std::process::ExitCode;

@@ -12,6 +12,6 @@ mod ssim;
 pub(crate) use color_map::color;
 pub use flip::{Flip, Map, PIXELS_PER_DEGREE, flip};
 pub use picture::{Channel, Kind, Picture, Plane, Unreadable};
-pub use plain::{COLOR, Difference, Largest, Layer, Place, Values, layer_of, layers};
+pub use plain::{COLOR, Difference, Largest, Layer, PixelCoord, Values, layer_of, layers};
 pub use show::{Shown, show, step};
 pub use ssim::ssim;

@@ -23,7 +23,7 @@ pub struct Layer<'a> {
 
 /// A pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct PixelCoord {
     /// The column, from the left, 0 the first.
     pub x: u32,
     /// The row, from the top, 0 the first.
@@ -57,7 +57,7 @@ pub struct Largest {
     /// How large it is.
     pub difference: f64,
     /// The pixel, the first in reading order if there are several.
-    pub place: Place,
+    pub pixel: PixelCoord,
     /// The channel.
     pub channel: String,
     /// The first picture's value.
@@ -73,7 +73,7 @@ pub struct Difference {
     /// Pixels of which a value has not the same bits, signed zeros told apart.
     pub different: u64,
     /// The first of them.
-    pub first: Option<Place>,
+    pub first: Option<PixelCoord>,
     /// Pixels of which a value differs by more than the threshold, or by no number.
     pub beyond: u64,
     /// The largest difference, if it is above 0.
@@ -90,7 +90,7 @@ pub struct Difference {
     /// Those of the second.
     pub b: Values,
     /// The first pixel with such a value in either picture.
-    pub odd: Option<Place>,
+    pub odd: Option<PixelCoord>,
 }
 
 /// The layers that both pictures have, colours first, and the channels that only the first or only the second has.
@@ -183,7 +183,7 @@ impl<'a> Layer<'a> {
         for found in found.collect::<Vec<_>>() {
             all.join(&found);
         }
-        let place = |pixel: usize| Place {
+        let coord = |pixel: usize| PixelCoord {
             x: (pixel % width as usize) as u32,
             y: (pixel / width as usize) as u32,
         };
@@ -195,13 +195,13 @@ impl<'a> Layer<'a> {
         };
         Difference {
             different: all.different,
-            first: all.first.map(place),
+            first: all.first.map(coord),
             beyond: all.beyond,
             largest: all.largest.and_then(|(difference, pixel, channel)| {
                 let (name, a, b) = self.channels.get(channel)?;
                 Some(Largest {
                     difference,
-                    place: place(pixel),
+                    pixel: coord(pixel),
                     channel: (*name).to_owned(),
                     a: a.value(pixel),
                     b: b.value(pixel),
@@ -212,7 +212,7 @@ impl<'a> Layer<'a> {
             psnr: 20.0 * (peak / rmse).log10(),
             a: all.a,
             b: all.b,
-            odd: all.odd.map(place),
+            odd: all.odd.map(coord),
         }
     }
 

@@ -9,6 +9,7 @@ mod buffer;
 mod camera;
 #[cfg(test)]
 mod changed;
+mod contents;
 mod document;
 mod error;
 #[cfg(test)]
@@ -53,6 +54,7 @@ use crate::scene::{
     CameraDescription, GltfDescription, LightDescription, MaterialDescription, Problem, Selection, TextureDescription,
 };
 
+pub use self::contents::ModelContents;
 pub use self::error::GltfError;
 
 /// The most instances of meshes, and the most groups of all instances together: each takes more than a kilobyte in a scene.
@@ -108,6 +110,8 @@ pub struct Imported {
     pub materials: Vec<ImportedMaterial>,
     pub lights: Vec<LightDescription>,
     pub cameras: Vec<ImportedCamera>,
+    /// Names of its parts.
+    pub contents: ModelContents,
     /// How many animations it has.
     pub animations: usize,
     /// What a user should know of it.
@@ -331,6 +335,7 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
     let built: Vec<Option<mesh::Built>> = built.collect::<Result<_, GltfError>>()?;
     let mut places = vec![None; keys.len()];
     let mut imported = Imported {
+        contents: ModelContents::of(&document),
         animations: document.json.animations.len(),
         ..Imported::default()
     };
@@ -387,6 +392,7 @@ fn import(path: &Path, root: &Path, choice: &Choice, files: &mut BTreeSet<PathBu
             .extend(document.camera(number, &nodes.globals[number], (low, high), &mut notes)?);
     }
     notes.extend(light::brightness(&imported.lights, (low + high) / 2.0));
+    imported.contents.cameras = imported.cameras.iter().map(|camera| camera.name.clone()).collect();
     let (materials, images) = materials.finish(&mut notes)?;
     imported.materials = materials;
     imported.images = images.read;

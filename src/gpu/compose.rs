@@ -7,114 +7,14 @@ use super::bake::{tables, tree_tables};
 use super::functions::is_same_code;
 use crate::pack::{self, Specialization};
 use crate::scene::Integrator;
+use crate::shader_files::{
+    ADAPTIVE_FILE, FIRST_HITS_FILE, FROM_BUFFERS, KERNEL, PATH, PHONG, RENDER_FILE, ROUNDING_FILE, SAMPLES, TEXELS,
+};
+pub use crate::shader_files::{File, SHARED, built_in};
 use crate::waiting;
 
 /// The file of quotients and square roots by software.
 pub const ROUNDING: &str = "rounding.wgsl";
-
-/// A shader file: its name in `shaders/`, and its text as it was when the program was built.
-pub type File = (&'static str, &'static str);
-
-macro_rules! files {
-    ($($name:literal),* $(,)?) => {
-        &[$(($name, include_str!(concat!("../../shaders/", $name)))),*]
-    };
-}
-
-/// The files of the shared mathematics: pure functions and records, each with a twin in `src/cpu/`.
-pub static SHARED: &[File] = files![
-    "math.wgsl",
-    "rng.wgsl",
-    "sampling.wgsl",
-    "sequence.wgsl",
-    "warp.wgsl",
-    "ray.wgsl",
-    "rectangle.wgsl",
-    "triangle.wgsl",
-    "ellipsoid.wgsl",
-    "plane.wgsl",
-    "disk.wgsl",
-    "primitive.wgsl",
-    "camera.wgsl",
-    "lens.wgsl",
-    "panorama.wgsl",
-    "surface.wgsl",
-    "light.wgsl",
-    "light_tree.wgsl",
-    "shadow.wgsl",
-    "phong.wgsl",
-    "differential.wgsl",
-    "specular.wgsl",
-    "path.wgsl",
-    "diffuse.wgsl",
-    "modified_phong.wgsl",
-    "principled.wgsl",
-    "dielectric.wgsl",
-    "ggx.wgsl",
-    "lobe.wgsl",
-    "metal.wgsl",
-    "rough_dielectric.wgsl",
-    "thin.wgsl",
-    "light_sample.wgsl",
-    "surroundings.wgsl",
-    "footprint.wgsl",
-    "procedural.wgsl",
-    "texel.wgsl",
-    "normal_map.wgsl",
-    "filter.wgsl",
-    "adaptive.wgsl",
-    "slab.wgsl",
-    "node.wgsl",
-    "mesh.wgsl",
-];
-/// What may take the place of quotients and square roots. It comes first, as naga wants functions before their calls.
-static ROUNDING_FILE: &[File] = files!["rounding.wgsl"];
-/// What every kernel adds to [`SHARED`]: its buffers, and the way through the scene.
-static KERNEL: &[File] = files![
-    "bindings.wgsl",
-    "receipt.wgsl",
-    "traverse.wgsl",
-    "meshes.wgsl",
-    "tree.wgsl",
-    "geometry.wgsl",
-    "vertices.wgsl",
-    "texture.wgsl",
-    "alpha.wgsl",
-];
-/// What takes samples of a pixel.
-static SAMPLES: &[File] = files!["pixel.wgsl"];
-static PHONG: &[File] = files!["integrators/whole.wgsl", "integrators/phong.wgsl"];
-static PATH: &[File] = files![
-    "environment.wgsl",
-    "light_choice.wgsl",
-    "emitter.wgsl",
-    "energy.wgsl",
-    "scattering.wgsl",
-    "integrators/path.wgsl"
-];
-/// The scene read from buffers, by loops. `bake` writes the same functions with the scene's records as constants.
-static FROM_BUFFERS: &[File] = files!["buffers.wgsl"];
-/// The texels in one buffer.
-static TEXELS: &[File] = files!["texels.wgsl"];
-static RENDER_FILE: &[File] = files!["film.wgsl", "kernels/render.wgsl"];
-static ADAPTIVE_FILE: &[File] = files!["film.wgsl", "kernels/adaptive.wgsl"];
-static FIRST_HITS_FILE: &[File] = files!["kernels/first_hits.wgsl"];
-
-/// Every file of `shaders/`.
-pub fn built_in() -> impl Iterator<Item = File> {
-    let scene = [
-        ROUNDING_FILE,
-        SHARED,
-        KERNEL,
-        SAMPLES,
-        PHONG,
-        PATH,
-        FROM_BUFFERS,
-        TEXELS,
-    ];
-    let kernels = [RENDER_FILE, &ADAPTIVE_FILE[1..], FIRST_HITS_FILE];
-    scene.into_iter().chain(kernels).flatten().copied()
-}
 
 /// A compute shader.
 #[derive(Debug, PartialEq, Eq)]

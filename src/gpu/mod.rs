@@ -7,9 +7,9 @@ mod controls;
 mod depth;
 mod device;
 mod failure;
-mod foresee;
 mod functions;
 mod interface;
+mod kernel_plan;
 mod live;
 pub mod marks;
 mod memory;
@@ -32,7 +32,7 @@ pub use controls::FloatControls;
 pub use device::{
     Choice, Choice as AdapterChoice, Device, HOW_TO_GET_VULKAN, Info, adapters, choose, choose_among, preferred,
 };
-pub use foresee::{Foreseen, foresee};
+pub use kernel_plan::{KernelPlan, plan_kernel};
 pub use live::{Live, with_edits, without_values};
 pub use renderer::{Call, Gpu, Options};
 pub use rounding::Rounding;

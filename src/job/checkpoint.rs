@@ -1,5 +1,5 @@
-//! A checkpoint: a file that gets every finished piece of a picture, and now and then the one that is being rendered, so that
-//! a job that ended early can go on. One process writes it at a time; others wait.
+//! Checkpoints: a file that receives every finished piece of an image, and at intervals the unfinished one, so that an
+//! interrupted job can resume. One process writes it at a time; others wait.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
@@ -20,55 +20,55 @@ use crate::image::Output;
 /// Why a checkpoint cannot be used.
 #[derive(Debug, Error)]
 pub enum CheckpointError {
-    /// There is one, and nobody asked to go on from it.
-    #[error("{}: is there already; --resume goes on from it, another name starts anew", .0.display())]
+    /// The file exists, and resuming was not requested.
+    #[error("{}: already exists; pass --resume to continue it, or choose another name", .0.display())]
     Exists(PathBuf),
-    /// It is of another job.
-    #[error("{}: is of {what}; choose another name, or remove it", path.display())]
+    /// The checkpoint belongs to another job.
+    #[error("{}: {what}; choose another name or delete it", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What it is of.
+        /// Description of the difference.
         what: String,
     },
-    /// It is no checkpoint that this program can read.
-    #[error("{}: cannot be gone on from: {what}; choose another name, or remove it", path.display())]
+    /// The file is not a checkpoint that this program can read.
+    #[error("{}: cannot resume from this file: {what}; choose another name or delete it", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the error.
         what: String,
     },
-    /// Somebody gave up waiting for the process that writes it.
-    #[error("{}: another process writes it still", .0.display())]
+    /// The caller stopped waiting for the process that writes the file.
+    #[error("{}: still in use by another process", .0.display())]
     Busy(PathBuf),
-    /// It cannot be read or written.
+    /// The file cannot be read or written.
     #[error("{}: {error}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The system's error.
         error: io::Error,
     },
 }
 
-/// How a checkpoint is opened.
+/// Options for opening a checkpoint.
 pub struct Opening<'a> {
-    /// Where it is; in a folder each job has one of its own.
+    /// Path of the file, or of a folder in which each job has its own file.
     pub path: PathBuf,
-    /// Whether to go on from one that is there.
+    /// Whether to resume from an existing file.
     pub resume: bool,
-    /// How often the piece that is being rendered is written.
+    /// Interval at which the unfinished piece is written.
     pub interval: Duration,
-    /// Called now and then while another process writes it: whether to wait on.
+    /// Called at intervals while another process writes the file; returns whether to keep waiting.
     pub wait: Box<dyn FnMut() -> bool + 'a>,
-    /// RenderMetadata what went wrong where the work goes on.
+    /// Reports problems that do not end the work.
     pub tell: Box<dyn FnMut(&str) + 'a>,
 }
 
 /// An open checkpoint.
 pub struct Checkpoint<'a> {
-    /// What messages call it.
+    /// Name in messages.
     name: PathBuf,
     path: PathBuf,
     file: File,
@@ -76,27 +76,27 @@ pub struct Checkpoint<'a> {
     key: Key,
     form: Form,
     entries: Vec<Entry>,
-    /// By their first rows, the pieces that no later one stands in for.
+    /// Pieces that no later one replaces, by their first rows.
     latest: BTreeMap<u32, usize>,
-    /// One past the last whole piece.
+    /// End of the last complete piece.
     end: u64,
     interval: Duration,
     tell: Box<dyn FnMut(&str) + 'a>,
-    /// The length up to which the file is not written anew, after that has failed.
+    /// Length below which rewriting the file is not tried again after a failure.
     untidy: u64,
-    /// Whether somebody was told that pieces could not be written, and that the file has gone.
-    told: [bool; 2],
+    /// Whether a failed write and a lost file have been reported.
+    reported: [bool; 2],
 }
 
-/// What is no longer needed of a file is left in it until it is more than what is, and more than this.
+/// Replaced pieces stay in the file until they take more bytes than this and than the pieces in use.
 const WASTE: u64 = 64 << 20;
-/// How long to wait between two looks at a file that another process writes.
-const PATIENCE: Duration = Duration::from_millis(50);
-/// So many looks are made before somebody is told.
-const MOMENT: u32 = 20;
+/// Interval between two attempts to lock a file that another process writes.
+const RETRY_INTERVAL: Duration = Duration::from_millis(50);
+/// Number of attempts before waiting is reported.
+const QUIET_RETRIES: u32 = 20;
 
 impl<'a> Checkpoint<'a> {
-    /// Starts a checkpoint of a job, or goes on with one that is there, once no other process writes it.
+    /// Creates a checkpoint for a job, or resumes an existing one as soon as no other process writes it.
     ///
     /// # Errors
     ///
@@ -117,11 +117,11 @@ impl<'a> Checkpoint<'a> {
             path: name.clone(),
             error,
         };
-        // Links stay: what they lead to is the file.
+        // Links are followed and stay in place.
         let found = Output::find(&name).map_err(failed)?;
         let no_file = || CheckpointError::Unreadable {
             path: name.clone(),
-            what: "it is no file".to_owned(),
+            what: "it is not a regular file".to_owned(),
         };
         let path = found.path().ok_or_else(no_file)?;
         let header = Header {
@@ -150,10 +150,10 @@ impl<'a> Checkpoint<'a> {
                                 interval,
                                 tell,
                                 untidy: 0,
-                                told: [false; 2],
+                                reported: [false; 2],
                             });
                         }
-                        // Somebody else was faster.
+                        // Another process was faster.
                         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
                         Err(error) => return Err(failed(error)),
                     }
@@ -167,37 +167,37 @@ impl<'a> Checkpoint<'a> {
             };
             match file.try_lock() {
                 Err(TryLockError::WouldBlock) => {
-                    // A process that is just being killed is gone in a moment.
+                    // A process that is being killed ends within a second; that is not worth a message.
                     rounds += 1;
-                    if rounds == MOMENT {
+                    if rounds == QUIET_RETRIES {
                         tell(&format!(
-                            "{}: another process writes it; waiting for its end",
+                            "{}: in use by another process; waiting until it ends",
                             name.display()
                         ));
                     }
                     if !wait() {
                         return Err(CheckpointError::Busy(name));
                     }
-                    std::thread::sleep(PATIENCE);
+                    std::thread::sleep(RETRY_INTERVAL);
                     continue;
                 }
                 // Some file systems have no locks.
                 Err(TryLockError::Error(_)) | Ok(()) => {}
             }
-            // Whoever had the lock may have put another file in its place.
+            // The process that held the lock may have replaced the file.
             if !is_at(&file, path) {
                 continue;
             }
-            return Checkpoint::go_on(name, path, file, header, form, interval, tell);
+            return Checkpoint::continue_from(name, path, file, header, form, interval, tell);
         }
     }
 
-    /// What messages call it.
+    /// Returns the name in messages.
     pub fn name(&self) -> &Path {
         &self.name
     }
 
-    fn go_on(
+    fn continue_from(
         name: PathBuf,
         path: &Path,
         mut file: File,
@@ -214,12 +214,12 @@ impl<'a> Checkpoint<'a> {
             path: name.clone(),
             error,
         };
-        // A process that was killed while it wrote the file anew.
+        // Left by a process that was killed while it rewrote the file.
         crate::image::remove_stale_beside(path);
         let (found, key, start) = pieces_file::read_header(&mut file).map_err(unreadable)?;
         let what = match found.part {
-            Some(_) => Some("a part of a picture, which wgray merge takes".to_owned()),
-            None => header.identity.difference(&found.identity),
+            Some(_) => Some("is a part of an image, which wgray merge reads, and not a checkpoint".to_owned()),
+            None => (header.identity.difference(&found.identity)).map(|what| format!("belongs to another job: {what}")),
         };
         if let Some(what) = what {
             return Err(CheckpointError::Foreign { path: name, what });
@@ -227,7 +227,7 @@ impl<'a> Checkpoint<'a> {
         let contents = pieces_file::scan(&file, &header.identity, &key, start).map_err(failed)?;
         if contents.damaged > 0 {
             tell(&format!(
-                "{}: {} bytes from byte {} on are damaged, or were not written to their end; they are dropped",
+                "{}: dropped {} bytes after byte {}, which are damaged or incomplete",
                 name.display(),
                 contents.damaged,
                 contents.end
@@ -249,7 +249,7 @@ impl<'a> Checkpoint<'a> {
             interval,
             tell,
             untidy: 0,
-            told: [false; 2],
+            reported: [false; 2],
         })
     }
 
@@ -267,7 +267,7 @@ impl<'a> Checkpoint<'a> {
         Ok(())
     }
 
-    /// Writes the file anew without the pieces that later ones stand in for, where these are the greater part.
+    /// Rewrites the file without replaced pieces if these are the greater part.
     fn tidy(&mut self) {
         let lengths = self
             .latest
@@ -275,14 +275,14 @@ impl<'a> Checkpoint<'a> {
             .map(|i| self.entries[*i].end - self.entries[*i].start);
         let needed: u64 = lengths.sum();
         let bound = (2 * needed + WASTE).max(self.untidy);
-        if self.end > bound && self.write_anew(|temporary, path| temporary.persist(path)).is_err() {
-            // There is no room for both, or the file must stay the same one. Nothing is lost; it is tried again later.
+        if self.end > bound && self.rewrite(|temporary, path| temporary.persist(path)).is_err() {
+            // The disk may be full, or the file may not be replaceable. Nothing is lost; a later call tries again.
             self.untidy = 2 * self.end;
         }
     }
 
-    /// Writes the file anew, with the pieces that are needed, and gives it its name.
-    fn write_anew(
+    /// Rewrites the file with the pieces in use, and renames it into place.
+    fn rewrite(
         &mut self,
         name: impl Fn(NamedTempFile, &Path) -> Result<File, tempfile::PersistError>,
     ) -> io::Result<()> {
@@ -310,7 +310,7 @@ impl<'a> Checkpoint<'a> {
         Ok(())
     }
 
-    /// Puts the file back where somebody has removed it; where there is another one, that stays, and somebody is told.
+    /// Restores the file if it was deleted. If another file is in its place, keeps that one and reports it.
     fn still_there(&mut self) -> io::Result<()> {
         if is_at(&self.file, &self.path) && self.file.metadata()?.len() >= self.end {
             return Ok(());
@@ -318,30 +318,33 @@ impl<'a> Checkpoint<'a> {
         let is_gone = fs::symlink_metadata(&self.path).is_err_and(|error| error.kind() == io::ErrorKind::NotFound);
         if is_gone
             && self
-                .write_anew(|temporary, path| temporary.persist_noclobber(path))
+                .rewrite(|temporary, path| temporary.persist_noclobber(path))
                 .is_ok()
         {
             return Ok(());
         }
         self.tell_once(
             1,
-            "is changed or replaced by somebody else: what this render keeps is lost with it",
+            "was changed or replaced by another program; this render can no longer be resumed from it",
         );
         Ok(())
     }
 
     fn tell_once(&mut self, which: usize, what: &str) {
-        if !std::mem::replace(&mut self.told[which], true) {
+        if !std::mem::replace(&mut self.reported[which], true) {
             (self.tell)(&format!("{}: {what}", self.name.display()));
         }
     }
 
-    /// Tells of a piece that could not be written; not of each, as the next ones are tried too.
+    /// Reports the first piece that could not be written. Later ones are still tried.
     fn noted(&mut self, result: io::Result<()>) {
         if let Err(error) = result {
-            // Half a piece at the end would be dropped when the file is read; it may fill the disk until then.
+            // Readers drop an incomplete piece, but it takes space on the disk.
             let _ = self.file.set_len(self.end);
-            self.tell_once(0, &format!("a piece could not be written, the work goes on: {error}"));
+            self.tell_once(
+                0,
+                &format!("a piece could not be written; rendering continues: {error}"),
+            );
         }
     }
 }
@@ -390,7 +393,7 @@ impl CheckpointStore for Checkpoint<'_> {
     }
 }
 
-/// Starts the file where there is none: with its whole header, and locked, from the moment that it is there.
+/// Creates the file, which is locked and has its whole header from the moment it exists.
 fn start(path: &Path, header: &Header) -> io::Result<(File, Key, u64)> {
     let (temporary, key, end) = temporary(path, header)?;
     temporary.as_file().sync_data()?;
@@ -398,14 +401,14 @@ fn start(path: &Path, header: &Header) -> io::Result<(File, Key, u64)> {
     Ok((file, key, end))
 }
 
-/// A file beside another one, locked, with a header.
+/// Creates a locked temporary file with a header beside `path`.
 fn temporary(path: &Path, header: &Header) -> io::Result<(NamedTempFile, Key, u64)> {
     let mut temporary = crate::image::beside(path)?;
     let (key, end) = pieces_file::write_header(temporary.as_file_mut(), header)?;
     Ok((temporary, key, end))
 }
 
-/// Whether a path leads to an open file.
+/// Returns whether a path leads to an open file.
 fn is_at(file: &File, path: &Path) -> bool {
     #[cfg(unix)]
     {
@@ -417,7 +420,7 @@ fn is_at(file: &File, path: &Path) -> bool {
     }
     #[cfg(not(unix))]
     {
-        // A file that is open cannot be replaced there.
+        // Other systems do not replace open files.
         let _ = (file, path);
         true
     }

@@ -1,4 +1,4 @@
-//! What a picture is of: two jobs with the same identity make the same bits, so that one may go on with what another left.
+//! Identity of a job: two jobs with the same identity produce the same bits, so one can resume what another left.
 
 use bytemuck::{bytes_of, cast_slice};
 use serde::{Deserialize, Serialize};
@@ -6,35 +6,35 @@ use serde::{Deserialize, Serialize};
 use crate::film::Region;
 use crate::pack::{Packed, PackedMesh, Specialization};
 
-/// The longest side of a picture, and the most samples of a pixel: those of scenes.
-const LARGEST: u32 = 65_536;
+/// Maximum side of an image in pixels, and maximum samples per pixel, as in scenes.
+const MAX_COUNT: u32 = 65_536;
 
-/// All that decides on the bits of a film, and not the device that renders it.
+/// Everything that determines the bits of a film. The device is not part of it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
-    /// The program's version.
+    /// Version of the program.
     pub version: String,
-    /// The hash of the shaders' files; empty without the feature `gpu`, which has none.
+    /// Hash of the shader files.
     pub shaders: String,
-    /// The hash of the scene as backends read it: what it is made of, and the values of the options that stand in for its own.
+    /// Hash of the packed scene, which includes the values of overriding options.
     pub scene: String,
-    /// Width and height of the whole picture in pixels.
+    /// Width and height of the whole image in pixels.
     pub picture: [u32; 2],
-    /// The pixels that are rendered: x0, y0, x1, y1.
+    /// Rendered pixels: x0, y0, x1, y1.
     pub region: [u32; 4],
-    /// Samples of every pixel; under adaptive sampling the most of one.
+    /// Samples per pixel; under adaptive sampling the maximum.
     pub pixel_samples: u32,
-    /// Whether sampling is adaptive.
+    /// True if sampling is adaptive.
     pub adaptive: bool,
-    /// Whether the film has layers that are means over the samples.
+    /// True if the film has layers that are means over the samples.
     pub layers: bool,
-    /// Whether rounding is done in software.
+    /// True if rounding is done in software.
     pub exact_rounding: bool,
 }
 
 impl Identity {
-    /// That of a scene and the pixels of it that are rendered.
+    /// Returns the identity of rendering `region` of a scene.
     pub fn of(scene: &Packed, region: Region, exact_rounding: bool) -> Identity {
         let form = scene.form();
         Identity {
@@ -50,7 +50,7 @@ impl Identity {
         }
     }
 
-    /// The name of a file that is of this job alone.
+    /// Returns a file name that is unique to this job.
     pub fn file_name(&self) -> String {
         let Identity {
             version,
@@ -74,97 +74,97 @@ impl Identity {
         format!("{}.checkpoint", &hasher.finalize().to_hex()[..16])
     }
 
-    /// The pixels that are rendered.
+    /// Returns the rendered pixels.
     pub fn region(&self) -> Region {
         let [x0, y0, x1, y1] = self.region;
         Region { x0, y0, x1, y1 }
     }
 
-    /// Refuses what no job of this program has: sizes and regions that are none, of a file that somebody made.
+    /// Rejects sizes and regions that this program never writes, as an untrusted file may contain them.
     pub fn check(&self) -> Result<(), String> {
         let [width, height] = self.picture;
-        let sides = 1..=LARGEST;
+        let sides = 1..=MAX_COUNT;
         if !sides.contains(&width) || !sides.contains(&height) {
             return Err(format!(
-                "its picture of {width} x {height} pixels must have from 1 to {LARGEST} along a side"
+                "its image size, {width} x {height}, must be from 1 to {MAX_COUNT} pixels along each side"
             ));
         }
         let region = self.region();
         if region.is_empty() || region.within(Region::whole(width, height)) != region {
             return Err(format!(
-                "its pixels, {region}, must lie in its picture of {width} x {height}"
+                "its region, {region}, must lie within its image of {width} x {height} pixels"
             ));
         }
         match sides.contains(&self.pixel_samples) {
             true => Ok(()),
             false => Err(format!(
-                "its {} samples of a pixel must be from 1 to {LARGEST}",
+                "its samples per pixel, {}, must be from 1 to {MAX_COUNT}",
                 self.pixel_samples
             )),
         }
     }
 
-    /// In what another job differs from this one, in words that end "it is of ..."; `None` if it is the same.
+    /// Describes the first difference of another job from this one: "its size is A, not B". Returns `None` if they are equal.
     pub fn difference(&self, other: &Identity) -> Option<String> {
-        let told = |what: &str, this: &dyn std::fmt::Display, that: &dyn std::fmt::Display| {
-            Some(format!("another {what}: {that}, and this is {this}"))
-        };
         let size = |[width, height]: [u32; 2]| format!("{width} x {height}");
-        let with = |there: bool| if there { "with" } else { "without" };
         let short = |hash: &str| hash.get(..16).unwrap_or(hash).to_owned();
-        if self.version != other.version {
-            told("version of wgray", &self.version, &other.version)
+        let either = |other: bool, set: &str, unset: &str| match other {
+            true => format!("{set}, not {unset}"),
+            false => format!("{unset}, not {set}"),
+        };
+        Some(if self.version != other.version {
+            format!("its version of wgray is {}, not {}", other.version, self.version)
         } else if self.picture != other.picture {
-            told("size", &size(self.picture), &size(other.picture))
+            format!("its size is {}, not {}", size(other.picture), size(self.picture))
         } else if self.region != other.region {
-            told("crop", &self.region(), &other.region())
+            format!("its crop is {}, not {}", other.region(), self.region())
         } else if self.pixel_samples != other.pixel_samples {
-            told("number of samples", &self.pixel_samples, &other.pixel_samples)
+            format!(
+                "its number of samples is {}, not {}",
+                other.pixel_samples, self.pixel_samples
+            )
         } else if self.adaptive != other.adaptive {
-            let [this, that] = [self, other].map(|job| format!("{} adaptive sampling", with(job.adaptive)));
-            told("kind of sampling", &this, &that)
+            format!("its sampling is {}", either(other.adaptive, "adaptive", "uniform"))
         } else if self.layers != other.layers {
-            let [this, that] = [self, other].map(|job| format!("{} layers of the samples", with(job.layers)));
-            told("form", &this, &that)
+            format!(
+                "its layers are {}",
+                either(other.layers, "means over the samples", "first hits only")
+            )
         } else if self.exact_rounding != other.exact_rounding {
-            let [this, that] = [self, other].map(|job| format!("{} --exact-rounding", with(job.exact_rounding)));
-            told("rounding", &this, &that)
+            let text = either(other.exact_rounding, "with", "without");
+            format!("its rounding is {text} --exact-rounding")
         } else if self.shaders != other.shaders {
-            let rule = "other shaders: their hash is";
-            let [this, that] = [self, other].map(|job| short(&job.shaders));
-            Some(format!("{rule} {that}, and this program's is {this}"))
+            format!(
+                "its shaders differ: their hash is {}, not {}",
+                short(&other.shaders),
+                short(&self.shaders)
+            )
         } else if self.scene != other.scene {
-            let [this, that] = [self, other].map(|job| short(&job.scene));
-            Some(format!(
-                "another scene, or of other options in place of its own (seed, integrator ...): its hash is {that}, and this \
-                 one's is {this}"
-            ))
+            format!(
+                "its scene or an option (seed, integrator, ...) differs: the hash is {}, not {}",
+                short(&other.scene),
+                short(&self.scene)
+            )
         } else {
-            None
-        }
+            return None;
+        })
     }
 }
 
-/// The hash of all shaders of the program, their names with them.
+/// Returns the hash of the names and texts of all shader files. It does not depend on the feature `gpu`, as the bits
+/// do not.
 pub fn hash_of_shaders() -> String {
-    #[cfg(feature = "gpu")]
-    {
-        let mut hasher = blake3::Hasher::new();
-        for (name, text) in crate::gpu::compose::built_in() {
-            list(&mut hasher, name.as_bytes());
-            list(&mut hasher, text.as_bytes());
-        }
-        hasher.finalize().to_hex().to_string()
+    let mut hasher = blake3::Hasher::new();
+    for (name, text) in crate::shader_files::built_in() {
+        list(&mut hasher, name.as_bytes());
+        list(&mut hasher, text.as_bytes());
     }
-    #[cfg(not(feature = "gpu"))]
-    {
-        String::new()
-    }
+    hasher.finalize().to_hex().to_string()
 }
 
-/// The hash of a scene as backends read it.
+/// Returns the hash of a packed scene.
 pub fn hash_of_scene(scene: &Packed) -> String {
-    // Every field, so that a new one cannot be forgotten.
+    // Destructures every field, so that a new one cannot be forgotten.
     let Packed {
         origin,
         camera,
@@ -224,7 +224,7 @@ pub fn hash_of_scene(scene: &Packed) -> String {
     }
     hasher.update(&pixel_samples.to_le_bytes());
     hasher.update(&[u8::from(*adaptive)]);
-    // With layers and without, the scene is the same.
+    // Layers do not change the scene.
     let specialization = Specialization {
         layers: 0,
         ..*specialization
@@ -266,7 +266,7 @@ fn hash_mesh(hasher: &mut blake3::Hasher, mesh: &PackedMesh) {
     }
 }
 
-/// Bytes and how many they are, so that no two lists of lists are the same bytes.
+/// Hashes bytes with their length in front, so that no two lists of lists hash alike.
 fn list(hasher: &mut blake3::Hasher, bytes: &[u8]) {
     hasher.update(&(bytes.len() as u64).to_le_bytes());
     hasher.update(bytes);
@@ -274,7 +274,35 @@ fn list(hasher: &mut blake3::Hasher, bytes: &[u8]) {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
     use super::*;
+
+    /// Runs with and without the feature `gpu` (`scripts/test-features`): both hash the files themselves, so they agree.
+    #[test]
+    fn the_shader_hash_is_that_of_the_files_with_every_feature() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+        let names: Vec<&str> = crate::shader_files::built_in().map(|(name, _)| name).collect();
+        let hash_with = |more: &str| {
+            let mut hasher = blake3::Hasher::new();
+            for name in &names {
+                let text = std::fs::read_to_string(folder.join(name)).unwrap() + more;
+                list(&mut hasher, name.as_bytes());
+                list(&mut hasher, text.as_bytes());
+            }
+            hasher.finalize().to_hex().to_string()
+        };
+        assert_eq!(hash_of_shaders(), hash_with(""));
+        assert_ne!(hash_of_shaders(), hash_with(" "));
+        let files = ["", "kernels", "integrators"].into_iter().flat_map(|below| {
+            let entries = std::fs::read_dir(folder.join(below)).unwrap().map(Result::unwrap);
+            let files = entries.filter(|entry| entry.file_type().unwrap().is_file());
+            files.map(move |entry| Path::new(below).join(entry.file_name()).to_str().unwrap().to_owned())
+        });
+        let all: BTreeSet<String> = files.collect();
+        assert_eq!(names.into_iter().map(str::to_owned).collect::<BTreeSet<_>>(), all);
+    }
 
     #[test]
     fn headers_of_jobs_that_cannot_be_are_refused() {

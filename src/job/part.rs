@@ -39,15 +39,15 @@ pub struct PartHeader {
 }
 
 impl PartHeader {
-    /// In what another part is not one of the same picture, in words that end "than NAME"; `None` if it is.
+    /// Describes why another part does not belong to the same image, or returns `None` if it does.
     fn difference(&self, other: &PartHeader, view_is_given: bool) -> Option<&'static str> {
         let view = |header: &PartHeader| (header.view_transform.clone(), header.exposure);
         if (&self.aovs, self.alpha) != (&other.aovs, other.alpha) {
-            Some("has other layers")
+            Some("has different layers")
         } else if !view_is_given && view(self) != view(other) {
-            Some("is shown by another view transform or exposure")
+            Some("has a different view transform or exposure")
         } else if self.middle_depth != other.middle_depth || self.told != other.told {
-            Some("was rendered in another way")
+            Some("was rendered with different settings")
         } else {
             None
         }
@@ -62,7 +62,7 @@ impl PartHeader {
         } in entries
         {
             if film != region || reached.pass != (samples..samples) {
-                return Err(format!("the piece of the pixels {region} is not a finished one"));
+                return Err(format!("its piece of the pixels {region} is not finished"));
             }
         }
         let known = |name: &String| Aov::ALL.into_iter().find(|aov| aov.name() == name);
@@ -75,12 +75,12 @@ impl PartHeader {
                 }
             };
             if !is_there {
-                return Err(format!("has the layer {}, and no values for it", aov.name()));
+                return Err(format!("has no values for its layer {}", aov.name()));
             }
         }
         let depth = f32::from_bits(self.middle_depth);
         if !(depth > 0.0 && depth.is_finite()) {
-            return Err(format!("the depth {depth} must be finite and greater than 0"));
+            return Err(format!("its depth, {depth}, must be finite and greater than 0"));
         }
         let exposure = ViewSettings::check_exposure(f64::from_bits(self.exposure));
         exposure.map(drop).map_err(|rule| format!("its exposure {rule}"))
@@ -234,7 +234,7 @@ impl Parts {
             });
             let first = || all.files.first().map_or(path, |(first, _)| first).display();
             if let Some(what) = all.identity.difference(&header.identity) {
-                return Err(bad(format!("is of {what}, as {} is", first())));
+                return Err(bad(format!("belongs to another image than {}: {what}", first())));
             }
             if let Some(what) = all.header.difference(&part, view_is_given) {
                 return Err(bad(format!("{what} than {}", first())));
@@ -245,13 +245,13 @@ impl Parts {
                 if let Some((_, (number, other))) = above.filter(|(_, (_, other))| other.region.y1 > y0) {
                     let (from, to) = (y0.max(other.region.y0), y1.min(other.region.y1) - 1);
                     let other = all.files.get(*number).map_or(path, |(other, _)| other).display();
-                    return Err(bad(format!("has rows {from} to {to}, which {other} has too")));
+                    return Err(bad(format!("overlaps {other} in rows {from} to {to}")));
                 }
                 all.pieces.insert(y0, (all.files.len(), entry));
             }
             all.files.push((path.clone(), key));
         }
-        let parts = parts.ok_or_else(|| PartError::Gap("there are no parts".to_owned()))?;
+        let parts = parts.ok_or_else(|| PartError::Gap("no parts were given".to_owned()))?;
         match parts.gap() {
             None => Ok(parts),
             Some((from, to)) => Err(PartError::Gap(missing(from, to, &tiles))),
@@ -351,7 +351,7 @@ fn missing(from: u32, to: u32, tiles: &[Tile]) -> String {
     let dots = if names.len() > MOST { " ..." } else { "" };
     names.truncate(MOST);
     let listed = names.join(", ");
-    format!("{rows}: there is no part {listed}{dots}")
+    format!("{rows}: add part {listed}{dots}")
 }
 
 fn open(path: &Path) -> Result<(Key, Header, PartHeader, Vec<Entry>), PartError> {
@@ -365,15 +365,15 @@ fn open(path: &Path) -> Result<(Key, Header, PartHeader, Vec<Entry>), PartError>
     let data = file.metadata().map_err(io)?;
     if !data.is_file() {
         let what = if data.is_dir() {
-            "it is a folder"
+            "it is a directory"
         } else {
-            "it is no file, and parts are read twice"
+            "it is not a regular file, and parts are read twice"
         };
         return Err(bad(what.to_owned()));
     }
     let (header, key, start) = pieces_file::read_header(&mut file).map_err(io)?;
     let Some(part) = header.part.clone() else {
-        let what = "is a checkpoint; wgray render --resume goes on from it, and wgray merge takes what --tile writes";
+        let what = "is a checkpoint, not a part; wgray merge reads the files that wgray render --tile writes";
         return Err(bad(what.to_owned()));
     };
     let contents = pieces_file::scan(&file, &header.identity, &key, start).map_err(io)?;
@@ -387,7 +387,7 @@ fn open(path: &Path) -> Result<(Key, Header, PartHeader, Vec<Entry>), PartError>
     let is_whole = rows.is_some_and(|rows| u64::from(rows.height()) == height);
     if contents.damaged > 0 || !is_whole {
         return Err(bad(format!(
-            "is damaged or cut short at byte {}; part {} must be rendered again",
+            "is damaged or truncated at byte {}; render part {} again",
             contents.end, part.tile
         )));
     }
@@ -459,12 +459,12 @@ mod tests {
         assert_eq!(told(|_, _| ()), "");
         for aov in ["normal", "shading_normal", "albedo", "variance", "sample_count"] {
             let without = told(|header, _| part(header).aovs = vec![aov.to_owned()]);
-            assert_eq!(without, format!("has the layer {aov}, and no values for it"));
+            assert_eq!(without, format!("has no values for its layer {aov}"));
         }
         assert_eq!(told(|header, _| part(header).aovs = vec!["other".to_owned()]), "");
         for (depth, exposure, wanted) in [
-            (f32::NAN, 0.0, "the depth NaN must be"),
-            (0.0, 0.0, "the depth 0 must be"),
+            (f32::NAN, 0.0, "its depth, NaN, must be"),
+            (0.0, 0.0, "its depth, 0, must be"),
             (1.0, f64::INFINITY, "its exposure "),
         ] {
             let told = told(|header, _| {
@@ -474,9 +474,9 @@ mod tests {
             assert!(told.starts_with(wanted), "{told}");
         }
         let unfinished = told(|_, piece| piece.reached.pass = 8..16);
-        assert_eq!(unfinished, "the piece of the pixels 0,0,4,3 is not a finished one");
+        assert_eq!(unfinished, "its piece of the pixels 0,0,4,3 is not finished");
         let rows = told(|_, piece| piece.region.y1 = 2);
-        assert_eq!(rows, "the piece of the pixels 0,0,4,2 is not a finished one");
+        assert_eq!(rows, "its piece of the pixels 0,0,4,2 is not finished");
         let huge = told(|header, _| {
             header.identity.picture = [1, u32::MAX];
             header.identity.region = [0, 0, 1, u32::MAX];
@@ -484,7 +484,7 @@ mod tests {
         });
         assert_eq!(
             huge,
-            "its picture of 1 x 4294967295 pixels must have from 1 to 65536 along a side"
+            "its image size, 1 x 4294967295, must be from 1 to 65536 pixels along each side"
         );
     }
 }

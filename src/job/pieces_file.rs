@@ -185,8 +185,8 @@ pub fn write_header(out: &mut impl Write, header: &Header) -> io::Result<(Key, u
 /// Reads the start of a file, and tells its hash and its length. Of what is no such file, or a damaged one, the error says so.
 pub fn read_header(input: &mut impl Read) -> io::Result<(Header, Key, u64)> {
     let bad = |what: &str| io::Error::new(io::ErrorKind::InvalidData, what.to_owned());
-    let none = |_| bad("it is no file of pieces that wgray made");
-    let cut = |_| bad("its header is damaged or cut short");
+    let none = |_| bad("it is not a part or checkpoint that wgray wrote");
+    let cut = |_| bad("its header is damaged or truncated");
     let mut magic = [0; MAGIC.len()];
     input.read_exact(&mut magic).map_err(none)?;
     if magic != *MAGIC {
@@ -211,12 +211,12 @@ pub fn read_header(input: &mut impl Read) -> io::Result<(Header, Key, u64)> {
             Some(version.to_owned())
         });
         let version = version.unwrap_or("an unknown version".to_owned());
-        bad(&format!("it is of another version of wgray, {version}"))
+        bad(&format!("it was written by another version of wgray: {version}"))
     })?;
     if header.format != FORMAT {
         let (found, version) = (header.format, header.identity.version);
         return Err(bad(&format!(
-            "its format is {found}, of wgray {version}, and this program reads {FORMAT}"
+            "it has format {found} (wgray {version}); this program reads format {FORMAT}"
         )));
     }
     header.identity.check().map_err(|rule| bad(&rule))?;
@@ -399,7 +399,7 @@ pub fn read_piece(file: &File, key: &Key, entry: &Entry, form: Form) -> io::Resu
     if !input.is_whole()? {
         return Err(io::Error::new(
             io::ErrorKind::InvalidData,
-            "a piece has changed since it was read",
+            "a piece has changed since the file was opened",
         ));
     }
     let piece = Piece {

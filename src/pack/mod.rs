@@ -116,6 +116,13 @@ impl Packed {
         u64::from(area_lights) * u64::from(self.specialization.light_samples) + u64::from(lights - area_lights)
     }
 
+    /// Returns the number of emitters that the path tracer samples: lights, emissive surfaces, the environment.
+    pub fn emitter_count(&self) -> u64 {
+        // A light tree is a single entry of the table.
+        let in_tree = self.light_leaves.iter().filter(|leaf| **leaf != NOTHING).count();
+        self.emitters.len().saturating_sub(usize::from(in_tree > 0)) as u64 + in_tree as u64
+    }
+
     /// The same scene, and a film that has layers. Without effect under another integrator than `path`, which alone has them.
     #[must_use]
     pub fn with_layers(mut self) -> Packed {

@@ -13,6 +13,11 @@ macro_rules! specialization {
                 vec![$(($name, self.$field)),*]
             }
 
+            /// Returns whether the scene has an environment map.
+            pub fn has_environment_map(&self) -> bool {
+                self.surroundings & super::IMAGE_AROUND != 0
+            }
+
             /// The overrides in WGSL.
             pub fn declarations() -> String {
                 concat!($("override ", $name, ": u32;\n"),*).to_string()

@@ -241,16 +241,16 @@ impl Assets {
         let path = path.map_err(|error| Problem::damage(unreadable(file, &error)))?;
         let root = self.root.canonicalize().map_err(|error| {
             let root = self.root.display();
-            format!("{file:?} must lie in {root}, the asset root, which cannot be found: {error}")
+            format!("{file:?} must lie in the asset root, {root}, which cannot be found: {error}; check --asset-root")
         })?;
         if !path.starts_with(&root) && !self.elsewhere.contains(Path::new(file)) {
             let root = self.root.display();
             return Err(Problem::new(match self.root == self.folder {
                 true => format!(
-                    "{file:?} must not leave the scene's folder, {root}, unless another asset root is given that it lies in"
+                    "{file:?} lies outside of the scene's folder, {root}; pass --asset-root with a folder that contains both"
                 ),
                 false => format!(
-                    "{file:?} is {}, which must lie in {root}, the asset root",
+                    "{file:?} is {}, which lies outside of the asset root, {root}; pass another --asset-root",
                     path.display()
                 ),
             }));

@@ -31,6 +31,7 @@ pub(crate) mod texture;
 mod turntable;
 mod validate;
 mod view;
+mod visibility;
 mod write;
 
 use std::path::PathBuf;
@@ -41,6 +42,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::gltf::Imported;
+pub use crate::gltf::ModelContents;
 use crate::mesh::Mesh;
 
 pub use around::Background;

@@ -25,11 +25,28 @@ fn good_scenes_pass_the_check_without_a_device() {
     let lines: Vec<&str> = ran.stdout.lines().collect();
     assert_eq!(lines.len(), 2);
     assert!(
-        lines[0].starts_with("small.toml: good; 10 x 6 pixels, 3 samples each, 4 of light"),
+        lines[0].starts_with(
+            "small.toml: ok: 10 x 6 pixels, 3 samples per pixel, 4 light samples, phong; 2 shapes; 1 light"
+        ),
         "{}",
         lines[0]
     );
     assert!(place.files().is_empty());
+}
+
+#[test]
+fn a_check_warns_of_scenes_that_render_black() {
+    let place = Place::new();
+    let (start, lit) = super::SCENE.split_once("[[lights]]").unwrap();
+    let (_, shapes) = lit.split_once("[[shapes]]").unwrap();
+    let dark = format!("{start}[[shapes]]{shapes}").replace("[0.1, 0.1, 0.1]", "[0, 0, 0]");
+    place.write("dark.toml", &dark.replace("[0.2, 0.3, 2]", "[0, 0, 0]"));
+    let ran = place.run(&["check", "dark.toml"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert_eq!(
+        ran.stderr,
+        "warning: dark.toml: the scene has no light, emission or environment; every surface renders black\n"
+    );
 }
 
 #[test]

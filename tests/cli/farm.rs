@@ -307,15 +307,12 @@ fn tiles_are_as_long_as_was_asked() {
     let (all, warned, text) = tiles("1h", 30);
     assert_eq!((all, warned.as_str()), (1, ""));
     assert!(
-        text.contains("# A task takes some ") && text.contains("by a trial on cpu"),
+        text.contains("# A task takes about ") && text.contains("by a trial on cpu"),
         "{text}"
     );
     assert!(text.contains("#SBATCH --time=10 "), "{text}");
     let (_, warned, _) = tiles("0", 30);
-    assert!(
-        warned.starts_with("warning: --task-time: of 0 ms each task needs "),
-        "{warned}"
-    );
+    assert!(warned.starts_with("warning: --task-time: each task needs "), "{warned}");
 }
 
 #[test]
@@ -326,13 +323,13 @@ fn why_tasks_are_not_as_long_as_was_asked_is_told() {
         (
             "64x1",
             "65536",
-            "a part is a row at least, and takes longer than 0 ms\n",
+            "a part has at least one row, which takes longer than 0 ms\n",
         ),
-        ("1x1", "1", " to begin; the picture is one task\n"),
+        ("1x1", "1", " to start; the image is a single task\n"),
         (
             "16x2000",
             "64",
-            " to begin; tasks are longer, so that it is half of them at most\n",
+            " to start; tasks are made longer, so that this is at most half of them\n",
         ),
     ] {
         let more = [
@@ -439,48 +436,48 @@ fn arrays_are_no_larger_than_the_cluster_has_them() {
 fn what_is_not_for_farms_is_refused() {
     let place = Place::new();
     for (more, code, told) in [
-        (&["small.toml"][..], 2, "error: --output: must be there: -o NAME.exr\n"),
+        (&["small.toml"][..], 2, "error: --output: is required: -o NAME.exr\n"),
         (
             &["small.toml", "-o", "-"],
             2,
-            "error: --output: -: must be a file, which the tasks' machines reach\n",
+            "error: --output: -: must be a file that the machines of the farm can write\n",
         ),
         #[cfg(unix)]
         (
             &["small.toml", "-o", "x.png", "-o", "/dev/stdout", "--tiles", "1"],
             2,
-            "error: --output: /dev/stdout: must be a file, which the tasks' machines reach\n",
+            "error: --output: /dev/stdout: must be a file that the machines of the farm can write\n",
         ),
         #[cfg(unix)]
         (
             &["small.toml", "-o", "/dev/null", "--tiles", "1"],
             2,
-            "error: --output: /dev/null: must be a file, which the tasks' machines reach\n",
+            "error: --output: /dev/null: must be a file that the machines of the farm can write\n",
         ),
         (
             &["small.toml", "-o", "x.png", "--tile", "1/2"],
             2,
-            "error: --tile: is not for farms, whose tasks have their own\n",
+            "error: --tile: does not apply to farms, whose tasks set it\n",
         ),
         (
             &["small.toml", "-o", "x.png", "--resume"],
             2,
-            "error: --resume: is not for farms, whose tasks have their own\n",
+            "error: --resume: does not apply to farms, whose tasks set it\n",
         ),
         (
             &["small.toml", "-o", "x.png", "--quiet"],
             2,
-            "error: --quiet: is not for farms",
+            "error: --quiet: does not apply to farms",
         ),
         (
             &["small.toml", "-o", "x.png", "--tiles", "7"],
             2,
-            "error: --tiles: 7: parts are whole rows, and the picture has 6 of them\n",
+            "error: --tiles: 7: must be at most 6, the number of rows of the image\n",
         ),
         (
             &["small.toml", "-o", "x.png", "--size", "1x1", "--tiles", "10"],
             2,
-            "error: --tiles: 10: parts are whole rows",
+            "error: --tiles: 10: must be at most ",
         ),
         (
             &["small.toml", "-o", "x.png", "--tiles", "0"],
@@ -558,8 +555,9 @@ fn files_that_are_there_stay() {
         written(&place, engine, &options);
         fs::write(place.path(file), "mine").expect("a file");
         let ran = farm(&place, engine, &options);
-        let told =
-            format!("error: --to: {file}: is there already; --overwrite replaces it, --to names another place\n");
+        let told = format!(
+            "error: --to: {file}: already exists; pass --overwrite to replace it, or choose another name by --to\n"
+        );
         assert_eq!((ran.code, ran.stderr), (2, told));
         assert_eq!(place.read(file), b"mine");
         written(&place, engine, &[&options[..], &["--overwrite"]].concat());
@@ -593,11 +591,11 @@ fn a_folder_stands_for_its_parts() {
     let ran = place.run(&["merge", "parts", "-o", "x.png"]);
     assert_eq!(
         (ran.code, ran.stderr.as_str()),
-        (1, "error: rows 2 to 3 are missing: there is no part 2/3\n")
+        (1, "error: rows 2 to 3 are missing: add part 2/3\n")
     );
     fs::create_dir(place.path("empty")).expect("a folder");
     let ran = place.run(&["merge", "empty", "-o", "x.png"]);
-    let told = "error: empty: is a folder without parts, NAME.part, which wgray render --tile writes\n";
+    let told = "error: empty: contains no parts (NAME.part, written by wgray render --tile)\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (1, told));
     let ran = place.run(&["merge", "parts", "-o", "x.png", "--frame", "1000000000"]);
     assert_eq!(ran.code, 2, "{}", ran.stderr);

@@ -56,8 +56,14 @@ fn a_model_by_itself_is_a_picture() {
     let ran = place.run(&["check", "box.glb", "box.gltf"]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     for line in ran.stdout.lines() {
-        assert!(line.contains(": good; 1024 x 1024 pixels, 64 samples each"), "{line}");
-        assert!(line.contains("instances of them: 2"), "{line}");
+        assert!(
+            line.contains(": ok: 1024 x 1024 pixels, 64 samples per pixel"),
+            "{line}"
+        );
+        assert!(
+            line.contains("2 shapes, including 2 instances of 2 meshes (24 triangles"),
+            "{line}"
+        );
     }
     // The picture is the model's in any form, and reaches its margins: 5 % of 24 x 16 pixels are less than one.
     quietly(
@@ -180,7 +186,7 @@ fn what_is_not_there_is_told_with_what_is() {
         }
         refused(
             &place,
-            &["convert", "box.glb", "-o", "box.toml", option, value],
+            &["convert", "box.glb", "-o", "box.toml", "--force", option, value],
             2,
             told,
         );
@@ -316,6 +322,7 @@ fn a_converted_scene_has_the_same_bits() {
                     model,
                     "-o",
                     "scenes/box.toml",
+                    "--force",
                     "--size",
                     "24x16",
                     "--spp",
@@ -365,7 +372,8 @@ fn a_conversion_keeps_what_it_reads_and_names_files_from_where_it_is() {
     ]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(
-        ran.stderr.contains("note: sub/box.toml names files outside of"),
+        ran.stderr.starts_with("note: sub/box.toml: names files outside of ")
+            && ran.stderr.ends_with("/sub; to use it, pass --asset-root .\n"),
         "{}",
         ran.stderr
     );
@@ -385,13 +393,97 @@ fn a_conversion_keeps_what_it_reads_and_names_files_from_where_it_is() {
         &place,
         &["render", "sub/box.toml"],
         3,
-        "must not leave the scene's folder",
+        "lies outside of the scene's folder",
     );
-    // A scene in TOML is written anew.
+    // A scene in TOML is written again.
     place.quietly(&["convert", "small.toml", "-o", "other.toml"]);
     place.quietly(&["render", "small.toml", "-o", "a.exr", "--device", "cpu"]);
     place.quietly(&["render", "other.toml", "-o", "b.exr", "--device", "cpu"]);
     assert_eq!(pixels(&place, "a.exr"), pixels(&place, "b.exr"));
+}
+
+#[test]
+fn info_lists_what_options_select() {
+    let place = place(&with_cameras());
+    let ran = place.run(&["info", "box.glb", "--device", "cpu"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    for row in [
+        "    glTF file   box.glb\n",
+        "                cameras    2: 0 ",
+        "                animations ",
+        " \"rise\"",
+        "                variants   1: 0 \"golden\"\n",
+        "                materials  3: 0 ",
+    ] {
+        assert!(ran.stdout.contains(row), "{row}: {}", ran.stdout);
+    }
+    let ran = place.run(&["info", "box.glb", "--json"]);
+    let info: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    let model = &info["models"][0];
+    assert_eq!(
+        (&model["file"], &model["variants"]),
+        (&"box.glb".into(), &serde_json::json!(["golden"]))
+    );
+    assert_eq!(model["cameras"].as_array().map(Vec::len), Some(2));
+    // Each number and name that is listed can be selected.
+    for (list, option) in [
+        ("cameras", "--camera"),
+        ("animations", "--animation"),
+        ("variants", "--variant"),
+        ("scenes", "--gltf-scene"),
+    ] {
+        let names = model[list].as_array().unwrap();
+        assert!(!names.is_empty(), "{list}: {model}");
+        for (i, name) in names.iter().enumerate() {
+            for wanted in [Some(i.to_string().as_str()), name.as_str()].into_iter().flatten() {
+                let ran = place.run(&["check", "box.glb", option, wanted]);
+                assert_eq!(ran.code, 0, "{option} {wanted}: {}", ran.stderr);
+            }
+        }
+        let beyond = names.len().to_string();
+        assert_eq!(
+            place.run(&["check", "box.glb", option, &beyond]).code,
+            2,
+            "{option} {beyond}"
+        );
+    }
+}
+
+#[test]
+fn a_conversion_overwrites_a_file_only_by_force() {
+    let place = place(&Model::default());
+    place.write("mine.toml", "# a scene of many hours\n");
+    let convert = ["convert", "box.glb", "-o", "mine.toml"];
+    refused(
+        &place,
+        &convert,
+        2,
+        "--output: mine.toml: already exists; pass --force to overwrite it",
+    );
+    assert_eq!(place.read("mine.toml"), b"# a scene of many hours\n");
+    place.quietly(&[&convert[..], &["--force"]].concat());
+    assert!(place.read("mine.toml").starts_with(b"# box.glb, as a scene. "));
+    refused(&place, &convert, 2, "already exists");
+    // Force does not replace an input.
+    let same = ["convert", "mine.toml", "-o", "./mine.toml", "--force"];
+    refused(&place, &same, 2, "is a file that the scene is made of");
+}
+
+#[test]
+fn a_conversion_prints_the_asset_root_to_pass() {
+    let place = place(&Model::default());
+    fs::create_dir_all(place.path("a dir/models")).unwrap();
+    fs::create_dir_all(place.path("a dir/scenes/new")).unwrap();
+    fs::rename(place.path("box.glb"), place.path("a dir/models/box.glb")).unwrap();
+    let ran = place.run(&["convert", "a dir/models/box.glb", "-o", "a dir/scenes/new/box.toml"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stderr.ends_with("pass --asset-root 'a dir'\n"), "{}", ran.stderr);
+    let check = ["check", "a dir/scenes/new/box.toml"];
+    refused(&place, &check, 3, "pass --asset-root with a folder that contains both");
+    let ran = place.run(&[&check[..], &["--asset-root", "a dir"]].concat());
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    let ran = place.run(&["convert", "a dir/models/box.glb", "-o", "a dir/models/box.toml"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
 }
 
 #[test]

@@ -1,10 +1,10 @@
-//! `wgray info`: what is in a scene, and what would render it.
+//! `wgray info`.
 
 use serde_json::Value;
 
 use super::{NO_DRIVER, Place, SCENE, project_scene};
 
-/// What is told of a scene as JSON.
+/// The JSON of a scene.
 fn info(place: &Place, arguments: &[&str]) -> Value {
     let all = [&["info", "--json"], arguments].concat();
     let ran = place.run(&all);
@@ -65,35 +65,53 @@ fn things_are_counted() {
     let shapes = &tube["shapes"];
     assert!(
         shapes["triangles"].as_u64() > shapes["mesh_triangles"].as_u64(),
-        "a mesh is defined twice: {shapes}"
+        "a mesh has two instances: {shapes}"
     );
     assert_eq!(
-        shapes["triangles"], shapes["placed_mesh_triangles"],
-        "there are no others: {shapes}"
+        shapes["triangles"], shapes["instanced_triangles"],
+        "only meshes have triangles: {shapes}"
+    );
+    assert_eq!(shapes["instanced_triangles"], shapes["placed_mesh_triangles"]);
+    assert_eq!(tube["picture"]["max_samples"], tube["picture"]["most_samples"]);
+    assert!(tube["picture"]["max_samples"].as_u64() > Some(0));
+    let memory = &tube["memory"];
+    assert_eq!(
+        memory["total"].as_u64(),
+        memory["scene"]
+            .as_u64()
+            .zip(memory["film"].as_u64())
+            .map(|(scene, film)| scene + film)
     );
     // Four triangles, five rectangles, an ellipsoid and a light.
     let box_of_all = info(&place, &[&project_scene("cornell.toml"), "--device", "cpu"]);
     let shapes = &box_of_all["shapes"];
     assert_eq!(
-        ["triangles", "mesh_triangles", "placed_mesh_triangles", "primitives"].map(|key| shapes[key].as_u64()),
+        ["triangles", "mesh_triangles", "instanced_triangles", "primitives"].map(|key| shapes[key].as_u64()),
         [Some(4), Some(0), Some(0), Some(11)]
     );
     assert_eq!(shapes["by_type"]["ellipsoid"], 1);
-    let ran = place.run(&["info", &project_scene("cornell.toml"), "--device", "cpu"]);
-    assert!(
-        ran.stdout
-            .contains("primitives  11: rectangles of lights among them, 1\n"),
-        "{}",
-        ran.stdout
-    );
+    let cornell = ["info", &project_scene("cornell.toml"), "--device", "cpu"];
+    let details = [
+        "    primitives  11, including 1 area light\n",
+        "    kernel      none",
+        "    sampling    pattern ",
+    ];
+    let brief = place.run(&cornell).stdout;
+    let verbose = place.run(&[&cornell[..], &["--verbose"]].concat()).stdout;
+    for text in details {
+        assert!(verbose.contains(text) && !brief.contains(text), "{text}: {verbose}");
+    }
+    for text in [
+        "    materials   ",
+        "    bounds      [",
+        "    memory      ",
+        "    camera      perspective at [",
+    ] {
+        assert!(verbose.contains(text) && brief.contains(text), "{text}: {brief}");
+    }
     assert_eq!(tube["textures"][0]["type"], "checker");
-    assert!(
-        tube["kernel"]["uses"]
-            .as_array()
-            .unwrap()
-            .contains(&"trees of boxes".into())
-    );
-    assert!(place.files().is_empty(), "nothing is written");
+    assert!(tube["kernel"]["uses"].as_array().unwrap().contains(&"BVH".into()));
+    assert!(place.files().is_empty(), "no file is written");
 }
 
 #[test]
@@ -137,14 +155,18 @@ fn the_device_is_that_of_a_render() {
 }
 
 #[test]
-fn scenes_of_nothing_and_of_much_are_told_and_bad_ones_refused() {
+fn empty_and_large_scenes_are_described_and_invalid_ones_refused() {
     let place = Place::new();
     let head = SCENE.split("[materials.gray]").next().unwrap();
     place.write("empty.toml", head);
     let ran = place.run(&["info", "empty.toml"]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     assert!(
-        ran.stdout.contains("shapes      0\n") && ran.stdout.contains("bounds      none"),
+        ran.stdout.contains("shapes      0\n")
+            && ran.stdout.contains("bounds      none")
+            && ran
+                .stdout
+                .contains("warning     the scene has no shapes; the image shows only the background\n"),
         "{}",
         ran.stdout
     );

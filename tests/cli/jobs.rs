@@ -251,30 +251,36 @@ fn checkpoints_of_other_jobs_are_refused() {
     };
     refused(
         &["--checkpoint", "c"],
-        "--checkpoint: c: is there already; --resume goes on from it",
+        "--checkpoint: c: already exists; pass --resume to continue it",
     );
     let resume = ["--checkpoint", "c", "--resume"];
     for (option, value, rule) in [
-        ("--seed", "7", "another scene"),
-        ("--spp", "4", "another number of samples"),
-        ("--size", "11x6", "another size"),
-        ("--crop", "0,0,5,5", "another crop"),
-        ("--light-samples", "9", "another scene"),
+        ("--seed", "7", "its scene or an option"),
+        ("--spp", "4", "its number of samples is 3, not 4"),
+        ("--size", "11x6", "its size is 10 x 6, not 11 x 6"),
+        ("--crop", "0,0,5,5", "its crop is"),
+        ("--light-samples", "9", "its scene or an option"),
     ] {
         refused(
             &[&resume[..], &[option, value]].concat(),
-            &format!("--checkpoint: c: is of {rule}"),
+            &format!("--checkpoint: c: belongs to another job: {rule}"),
         );
     }
-    refused(&[&resume[..], &["--exact-rounding"]].concat(), "another rounding");
+    refused(
+        &[&resume[..], &["--exact-rounding"]].concat(),
+        "its rounding is without",
+    );
     place.write("small.toml", &super::SCENE.replace("0.8, 0.8, 0.8", "0.8, 0.8, 0.9"));
-    refused(&resume, "another scene");
+    refused(&resume, "its scene or an option");
     place.write("small.toml", &super::SCENE.replace("# ", "#  "));
     assert_eq!(run(&resume).code, 0, "a comment is no part of the scene");
     for (bytes, rule) in [
-        (Vec::new(), "it is no file of pieces that wgray made"),
-        (b"width = 3\n".repeat(20), "it is no file of pieces that wgray made"),
-        (good[..40].to_vec(), "its header is damaged or cut short"),
+        (Vec::new(), "it is not a part or checkpoint that wgray wrote"),
+        (
+            b"width = 3\n".repeat(20),
+            "it is not a part or checkpoint that wgray wrote",
+        ),
+        (good[..40].to_vec(), "its header is damaged or truncated"),
     ] {
         fs::write(place.path("c"), &bytes).expect("a file");
         refused(&resume, rule);
@@ -349,7 +355,7 @@ fn a_folder_has_a_checkpoint_for_each_job() {
         let [new] = &new[..] else { panic!("{more:?}: {new:?}") };
         // It is there now, as any other would be.
         let ran = run(more);
-        let told = format!("error: --checkpoint: kept/{new}: is there already; --resume goes on from it");
+        let told = format!("error: --checkpoint: kept/{new}: already exists; pass --resume to continue it");
         assert!(
             ran.code == 2 && ran.stderr.starts_with(&told),
             "{more:?}: {}",
@@ -421,7 +427,7 @@ fn a_checkpoint_that_goes_away_is_put_back_or_told_of() {
     let ran = ended(child);
     assert_eq!(ran.code, 0);
     assert!(
-        ran.stderr.contains("is changed or replaced by somebody else"),
+        ran.stderr.contains("was changed or replaced by another program"),
         "{}",
         ran.stderr
     );
@@ -511,7 +517,7 @@ fn full_and_read_only_file_systems() {
     assert_eq!(full.stdout, "0\nc\n", "{}", full.stderr);
     assert!(
         full.stderr
-            .contains("warning: disk/c: a piece could not be written, the work goes on"),
+            .contains("warning: disk/c: a piece could not be written; rendering continues"),
         "{}",
         full.stderr
     );
@@ -576,13 +582,13 @@ fn parts_make_the_same_picture() {
             place.files()
         );
     };
-    refused(&shuffled[1..], "rows 9 to 12 are missing: there is no part 4/7");
+    refused(&shuffled[1..], "rows 9 to 12 are missing: add part 4/7");
     refused(
         &[&shuffled[..], &["p2.part"]].concat(),
-        "p2.part: has rows 3 to 5, which p2.part has too",
+        "p2.part: overlaps p2.part in rows 3 to 5",
     );
     render(&["--tile", "2/3", "-o", "other.part"]);
-    refused(&[&shuffled[..], &["other.part"]].concat(), "other.part: has rows");
+    refused(&[&shuffled[..], &["other.part"]].concat(), "other.part: overlaps");
     // Parts of several divisions that fit.
     render(&["--tile", "1/1", "-o", "all.part"]);
     assert_eq!(merge(&["all.part"]).code, 0);
@@ -590,7 +596,10 @@ fn parts_make_the_same_picture() {
         fs::remove_file(place.path(&format!("out.{end}"))).expect("a file");
     }
     render(&["--tile", "1/7", "--seed", "3", "-o", "seed.part"]);
-    refused(&["seed.part", "p2.part"], "p2.part: is of another scene");
+    refused(
+        &["seed.part", "p2.part"],
+        "p2.part: belongs to another image than seed.part: its scene or an option",
+    );
     place.quietly(&[
         "render",
         "small.toml",
@@ -603,7 +612,10 @@ fn parts_make_the_same_picture() {
         "-o",
         "bare.part",
     ]);
-    refused(&["bare.part", "p2.part"], "p2.part: has other layers than bare.part");
+    refused(
+        &["bare.part", "p2.part"],
+        "p2.part: has different layers than bare.part",
+    );
     render(&["--tile", "1/7", "-D", "image.exposure=1", "-o", "bright.part"]);
     let bright: Vec<&str> = ["bright.part"]
         .into_iter()
@@ -611,7 +623,7 @@ fn parts_make_the_same_picture() {
         .collect();
     refused(
         &bright,
-        "p2.part: is shown by another view transform or exposure than bright.part",
+        "p2.part: has a different view transform or exposure than bright.part",
     );
     let mut given = [&["merge"], &bright[..], &["-o", "given.png", "--reproducible"]].concat();
     given.extend(["--exposure", "0", "--view-transform", "gamma22"]);
@@ -622,7 +634,10 @@ fn parts_make_the_same_picture() {
         fs::write(place.path("cut.part"), &place.read("p2.part")[..length]).expect("a file");
         refused(&["p1.part", "cut.part"], "cut.part: ");
     }
-    refused(&["small.toml"], "small.toml: it is no file of pieces that wgray made");
+    refused(
+        &["small.toml"],
+        "small.toml: it is not a part or checkpoint that wgray wrote",
+    );
     refused(&["nowhere.part"], "nowhere.part: ");
     render(&["--checkpoint", "c", "-o", "whole.png"]);
     fs::copy(place.path("c"), place.path("c.part")).expect("a copy");
@@ -677,7 +692,7 @@ fn a_part_goes_on_from_its_own_checkpoint() {
         "--resume",
     ]);
     assert_eq!(ran.code, 2);
-    assert!(ran.stderr.contains("another crop"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("its crop is"), "{}", ran.stderr);
 }
 
 #[test]

@@ -317,7 +317,7 @@ fn files_that_would_wait_or_never_end_are_none() {
         folder,
         "\"$0\" check <(cat plain.toml) && \"$0\" check /dev/stdin < plain.toml && cat plain.toml | \"$0\" check /dev/stdin",
     );
-    assert_eq!(ran.matches("good; 8 x 6 pixels").count(), 3, "{ran}");
+    assert_eq!(ran.matches("ok: 8 x 6 pixels").count(), 3, "{ran}");
 }
 
 fn shell(folder: &Path, script: &str) -> String {

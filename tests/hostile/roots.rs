@@ -61,7 +61,7 @@ fn is_refused(ran: &Ran, name: &str) {
         ran.said
     );
     let rules = [
-        "must not leave",
+        "lies outside of",
         "cannot be read",
         "must be a relative path",
         "it must be a relative path",

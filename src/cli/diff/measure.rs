@@ -1,11 +1,11 @@
-//! One layer of two pictures by all metrics that are wanted.
+//! Measurement of a layer by all requested metrics.
 
 use wgray::compare::{self, COLOR, Flip, Layer, Picture};
 
 use super::metric::Metric;
 use super::report::{LayerReport, Number};
 
-/// What there is to tell, and the map of errors if `step` asks for one and FLIP is wanted.
+/// Returns the report on a layer, and the error map of FLIP if it is requested and `step` is given.
 pub fn measure(
     layer: &Layer,
     a: &Picture,
@@ -18,7 +18,7 @@ pub fn measure(
     let found = layer.difference(b.width, b.height, threshold);
     let has_colors = layer.name == COLOR && a.colors().is_some() && b.colors().is_some();
     let is_wanted = |metric: Metric| metrics.contains(&metric) && has_colors;
-    // what is the same to the bit needs no looking at
+    // Identical layers have known values.
     let is_same = found.different == 0;
     let ssim = match (is_wanted(Metric::Ssim), is_same) {
         (true, true) => Some(1.0),

@@ -1,8 +1,8 @@
-//! What is measured, and what is too much.
+//! Metrics and their limits.
 
 use std::fmt;
 
-/// A measure of how far two pictures are apart.
+/// A measure of the difference of two images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Metric {
     Different,
@@ -15,7 +15,7 @@ pub enum Metric {
     Flip,
 }
 
-/// All, in the order in which they are told.
+/// All metrics, in the order in which they are printed.
 pub const METRICS: [Metric; 8] = [
     Metric::Different,
     Metric::Largest,
@@ -28,7 +28,7 @@ pub const METRICS: [Metric; 8] = [
 ];
 
 impl Metric {
-    /// The name in options, text and JSON.
+    /// Returns the name in options, text and JSON.
     pub fn name(self) -> &'static str {
         match self {
             Metric::Different => "different",
@@ -47,17 +47,17 @@ impl Metric {
         found.ok_or_else(|| format!("must be one of {}", METRICS.map(Metric::name).join(", ")))
     }
 
-    /// Whether it is of red, green and blue together.
+    /// Returns whether the metric needs red, green and blue.
     pub fn is_of_colors(self) -> bool {
         matches!(self, Metric::Ssim | Metric::Flip)
     }
 
-    /// Whether less is worse.
+    /// Returns whether smaller values are worse.
     fn is_likeness(self) -> bool {
         matches!(self, Metric::Psnr | Metric::Ssim)
     }
 
-    /// The values that it can have.
+    /// Returns the smallest and the largest value, and the rule in messages.
     fn range(self) -> (f64, f64, &'static str) {
         match self {
             Metric::Different | Metric::Largest | Metric::Rmse | Metric::RelMse => (0.0, f64::MAX, "of 0 or more"),
@@ -74,7 +74,7 @@ impl fmt::Display for Metric {
     }
 }
 
-/// What a metric may be at the worst.
+/// The worst value of a metric that passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
     pub metric: Metric,
@@ -82,18 +82,18 @@ pub struct Limit {
 }
 
 impl Limit {
-    /// `rmse=0.01`
+    /// Parses a limit: `rmse=0.01`.
     pub fn parse(text: &str) -> Result<Limit, String> {
-        let (name, value) = text.split_once('=').ok_or("must be METRIC=X, as rmse=0.01")?;
+        let (name, value) = text.split_once('=').ok_or("must be METRIC=X, such as rmse=0.01")?;
         let metric = Metric::parse(name).map_err(|rule| format!("the metric {rule}"))?;
-        let (least, most, rule) = metric.range();
+        let (min, max, rule) = metric.range();
         match value.parse() {
-            Ok(worst) if (least..=most).contains(&worst) => Ok(Limit { metric, worst }),
+            Ok(worst) if (min..=max).contains(&worst) => Ok(Limit { metric, worst }),
             _ => Err(format!("{name} must be a number {rule}")),
         }
     }
 
-    /// Whether a value is worse, and in which word.
+    /// Returns "above" or "below" if a value is worse than the limit.
     pub fn exceeded(self, value: f64) -> Option<&'static str> {
         match self.metric.is_likeness() {
             true => (!(value >= self.worst)).then_some("below"),

@@ -1,4 +1,4 @@
-//! `wgray diff`: how far two pictures are apart, and whether that is too far.
+//! `wgray diff`: measures the difference of two images, and fails if it exceeds a limit.
 
 mod measure;
 mod metric;
@@ -21,55 +21,61 @@ use metric::{Limit, METRICS, Metric};
 use report::Report;
 
 const EXIT_CODES: &str = "\
-Exit codes: 0 the same bits, or within every --fail; 1 a file is no picture or cannot be read; 2 wrong command line; 5 the \
-pictures differ; 7 a picture does not fit memory; 8 the picture of --out could not be written.\n\n\
-docs/golden-pictures.md says what each metric is.";
+Exit codes: 0 identical, or within every --fail limit; 1 a file cannot be read as an image; 2 wrong command line; 5 the images \
+differ; 7 an image does not fit into memory; 8 the image of --out could not be written.\n\n\
+docs/golden-pictures.md defines the metrics.";
 
-/// The exit code of pictures that differ.
+/// Exit code if the images differ.
 const DIFFER: u8 = 5;
-/// Pixels up to which FLIP is computed without being asked for: it takes a microsecond for each, linear ones several.
-const QUICK: u64 = 1 << 24;
+/// Maximum number of pixels for which FLIP is computed by default. It takes a microsecond per pixel, several for linear images.
+const MAX_FLIP_PIXELS: u64 = 1 << 24;
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
-#[command(allow_negative_numbers = true)] // so that a number out of range is told as such
+#[command(allow_negative_numbers = true)] // so that a number out of range is reported as such
 pub struct Args {
-    /// Picture to look at: PNG, EXR, JPEG, WebP; - is standard input
+    /// Image to test: PNG, EXR, JPEG or WebP; - reads standard input
     #[arg(value_name = "A")]
     a: PathBuf,
 
-    /// Reference that it is compared with; an EXR beside a PNG is shown as a PNG first
+    /// Reference image. An EXR is converted to display values before it is compared with a PNG
     #[arg(value_name = "B")]
     b: PathBuf,
 
-    /// Fails only what is worse than this: different, largest, share, rmse, rel_mse and flip are worse above it, psnr and ssim
-    /// below. May be repeated. If absent, any other bit fails; NaN, infinities and missing channels always do
+    /// Fail only if a metric is worse than X; may be repeated
+    ///
+    /// Larger values are worse, except for psnr and ssim. Without this option any difference fails. NaN, infinite values and
+    /// missing channels always fail.
     #[arg(long, value_name = "METRIC=X", value_parser = Limit::parse)]
     fail: Vec<Limit>,
 
-    /// What is computed, with commas between: different, largest, share, rmse, rel_mse, psnr, ssim, flip. If absent all, flip up
-    /// to 16.7 million pixels
+    /// Compute only these metrics: different, largest, share, rmse, rel_mse, psnr, ssim, flip
+    ///
+    /// Separate them by commas. By default all are computed, flip only up to 16.7 million pixels.
     #[arg(long, value_name = "METRICS", value_delimiter = ',', value_parser = Metric::parse)]
     metrics: Vec<Metric>,
 
-    /// What is compared, with commas between: color is R, G, B, A and Y, normal is normal.X and so on. If absent all
+    /// Compare only these layers: color is R, G, B, A and Y; normal is normal.X, normal.Y and normal.Z
+    ///
+    /// Separate them by commas. By default all layers are compared.
     #[arg(long, value_name = "LAYERS", value_delimiter = ',')]
     layers: Vec<String>,
 
-    /// Difference of a value that must be surpassed for its pixel to be in the share
+    /// Count a pixel in share only if one of its values differs by more than X
     #[arg(long, value_name = "X", default_value_t = 0.0, value_parser = threshold)]
     threshold: f64,
 
-    /// Pixels per degree of what is seen, for FLIP: how far away the screen is. If absent 67.02, a screen 0.7 m wide with 3840
-    /// columns at 0.7 m
+    /// Set the pixels per degree of visual angle for FLIP [default: 67.02]
+    ///
+    /// The default is a screen 0.7 m wide with 3840 columns at a distance of 0.7 m.
     #[arg(long, value_name = "PIXELS", value_parser = ppd)]
     ppd: Option<f64>,
 
-    /// Picture to write: A, B and where they differ, with a line around what does
+    /// Write an image that shows A, B and their difference, outlined
     #[arg(long, value_name = "DIFF.png")]
     out: Option<PathBuf>,
 
-    /// Prints one JSON object in place of the text
+    /// Print one JSON object
     #[arg(long)]
     json: bool,
 }
@@ -82,19 +88,19 @@ fn ppd(text: &str) -> Result<f64, String> {
     number(text, 1.0, 1000.0).map_err(|()| "must be a number from 1 to 1000".to_owned())
 }
 
-fn number(text: &str, least: f64, most: f64) -> Result<f64, ()> {
+fn number(text: &str, min: f64, max: f64) -> Result<f64, ()> {
     let number: f64 = text.parse().map_err(|_| ())?;
-    if (least..=most).contains(&number) {
+    if (min..=max).contains(&number) {
         Ok(number)
     } else {
         Err(())
     }
 }
 
-/// Compares, says what was found, and returns 0 or 5.
+/// Compares two images, prints a report, and returns exit code 0 or 5.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.a.as_os_str() == "-" && args.b.as_os_str() == "-" {
-        return Err(Usage("-: only one of the pictures may be standard input".to_owned()).into());
+        return Err(Usage("-: only one of the images can be standard input".to_owned()).into());
     }
     let out = args.out.as_deref().map(|path| find_out(path, &args)).transpose()?;
     let (a, b) = (read(&args.a)?, read(&args.b)?);
@@ -115,13 +121,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             && !(has_colors(&a) && has_colors(&b))
         {
             return Err(Usage(format!(
-                "{metric}: needs colours, which are R, G and B, or Y, in both pictures"
+                "{metric}: requires color channels (R, G and B, or Y) in both images"
             ))
             .into());
         }
         let ppd = args.ppd.unwrap_or(compare::PIXELS_PER_DEGREE);
         let metrics = wanted(&args, &b, &asked, &mut report);
-        // the first that differs
+        // The first layer that differs.
         let mut best: Option<(usize, Option<Flip>)> = None;
         for (i, layer) in layers.iter().enumerate() {
             let step = out.is_some().then(|| compare::step(&b));
@@ -139,7 +145,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         (Some((output, _)), Some((layer, flip))) => Some((output, layer, flip)),
         (Some((_, path)), None) => {
             report.notes.push(format!(
-                "{}: is not written, as there is nothing to lay side by side",
+                "{}: not written: the images cannot be shown side by side",
                 path.display()
             ));
             None
@@ -183,21 +189,20 @@ fn has_colors(picture: &Picture) -> bool {
     picture.colors().is_some()
 }
 
-/// Brings two pictures of different kinds to one: what is linear is shown as the other one is. A screen's picture without alpha
-/// covers all.
+/// Converts a linear image to display values if the other has those. Without an alpha channel, a display image is opaque.
 fn alike(a: Picture, b: Picture, report: &mut Report) -> anyhow::Result<(Picture, Picture)> {
     let mut shown = |linear: Picture, bits: u8, name: String| -> anyhow::Result<Picture> {
-        let displayed = linear.displayed(bits).ok_or_else(|| {
-            anyhow::anyhow!("{name}: has no colours, which are R, G and B, or Y; only such are compared with a PNG")
-        })?;
+        let displayed = linear
+            .displayed(bits)
+            .ok_or_else(|| anyhow::anyhow!("{name}: has no color channels (R, G and B, or Y) to compare with a PNG"))?;
         let left: Vec<&str> = linear.channels.iter().map(|channel| channel.name.as_str()).collect();
         let left: Vec<&str> = left.into_iter().filter(|name| layer_of(name) != COLOR).collect();
         let left = match left.is_empty() {
             true => String::new(),
-            false => format!("; {} are not compared", left.join(" ")),
+            false => format!("; not compared: {}", left.join(" ")),
         };
         report.notes.push(format!(
-            "{name}: is linear, and compared as wgray render writes it to a PNG of {bits} bits by gamma22{left}"
+            "{name}: linear; compared after conversion to a PNG of {bits} bits with gamma22{left}"
         ));
         Ok(displayed)
     };
@@ -220,7 +225,7 @@ fn alike(a: Picture, b: Picture, report: &mut Report) -> anyhow::Result<(Picture
     })
 }
 
-/// Leaves only the layers that are asked for.
+/// Removes layers that were not requested.
 fn choose(layers: &[String], a: &mut Picture, b: &mut Picture) -> Result<(), Usage> {
     if layers.is_empty() {
         return Ok(());
@@ -235,7 +240,7 @@ fn choose(layers: &[String], a: &mut Picture, b: &mut Picture) -> Result<(), Usa
     if let Some(unknown) = layers.iter().find(|layer| !known.contains(layer)) {
         let known = known.join(", ");
         return Err(Usage(format!(
-            "--layers: {unknown}: must be a layer of the pictures: {known}"
+            "--layers: {unknown}: must be a layer of the images: {known}"
         )));
     }
     for picture in [a, b] {
@@ -245,9 +250,9 @@ fn choose(layers: &[String], a: &mut Picture, b: &mut Picture) -> Result<(), Usa
     Ok(())
 }
 
-/// What is computed.
+/// Returns the metrics to compute.
 fn wanted(args: &Args, picture: &Picture, asked: &[Metric], report: &mut Report) -> Vec<Metric> {
-    let is_large = picture.pixels() as u64 > QUICK;
+    let is_large = picture.pixels() as u64 > MAX_FLIP_PIXELS;
     let is_wanted = |metric: &Metric| match args.metrics.is_empty() {
         false => asked.contains(metric),
         true => asked.contains(metric) || *metric != Metric::Flip || !is_large,
@@ -256,21 +261,21 @@ fn wanted(args: &Args, picture: &Picture, asked: &[Metric], report: &mut Report)
     if args.metrics.is_empty() && !wanted.contains(&Metric::Flip) {
         report
             .notes
-            .push("flip: is left out of so large a picture; --metrics names it to have it".to_owned());
+            .push("flip: omitted for an image this large; pass --metrics flip to compute it".to_owned());
     }
     wanted
 }
 
-/// The place of the picture, which must be a PNG and replace neither of the others.
+/// Returns the output, which must be a PNG and replace neither input.
 fn find_out<'a>(path: &'a Path, args: &Args) -> anyhow::Result<(Output, &'a Path)> {
     let name = path.display();
     if path.as_os_str() == "-" {
-        return Err(Usage("--out: -: standard output gets the figures; choose a file".to_owned()).into());
+        return Err(Usage("--out: -: standard output receives the report; choose a file".to_owned()).into());
     }
     let output = Output::find(path).map_err(RenderError::Output)?;
     if output.is_same(&Output::standard()) {
         return Err(Usage(format!(
-            "--out: {name}: standard output gets the figures; choose a file"
+            "--out: {name}: standard output receives the report; choose a file"
         ))
         .into());
     }
@@ -280,10 +285,7 @@ fn find_out<'a>(path: &'a Path, args: &Args) -> anyhow::Result<(Output, &'a Path
     for input in [&args.a, &args.b] {
         if output.is_input(input) {
             let input = input.display();
-            return Err(Usage(format!(
-                "--out: {name}: is the picture {input}, which must stay; choose another name"
-            ))
-            .into());
+            return Err(Usage(format!("--out: {name}: is the input {input}; choose another name")).into());
         }
     }
     Ok((output, path))

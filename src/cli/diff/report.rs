@@ -1,31 +1,31 @@
-//! What `wgray diff` tells, as text and as JSON, with the same names.
+//! The report of `wgray diff`, as text and as JSON with the same names.
 
 use std::fmt;
 
 use serde::{Serialize, Serializer};
-use wgray::compare::{Largest, Picture, Place, Values};
+use wgray::compare::{Largest, Picture, PixelCoord, Values};
 
 use super::metric::{Limit, METRICS, Metric};
 
-/// All that is told.
+/// The whole report.
 #[derive(Debug, Serialize)]
 pub struct Report {
-    /// The picture's name.
+    /// Name of the tested image.
     pub a: String,
-    /// The reference's.
+    /// Name of the reference.
     pub b: String,
     size_a: [u32; 2],
     size_b: [u32; 2],
-    /// Where the first pixel is.
+    /// Positions of the first pixels.
     #[serde(skip)]
     positions: [(i32, i32); 2],
-    /// Whether the exit code is 0.
+    /// True if the exit code is 0.
     pub passes: bool,
-    /// Why not.
+    /// Reasons for failing.
     fails: Vec<String>,
-    /// What was done to compare the pictures.
+    /// Conversions and omissions.
     pub notes: Vec<String>,
-    /// Channels that only one of the pictures has.
+    /// Channels that only one of the images has.
     only_a: Vec<String>,
     only_b: Vec<String>,
     pub layers: Vec<LayerReport>,
@@ -33,14 +33,14 @@ pub struct Report {
     pub metrics: Vec<Metric>,
 }
 
-/// What is told of a layer; what was not asked for is absent.
+/// The report on a layer. Metrics that were not requested are absent.
 #[derive(Debug, Serialize)]
 pub struct LayerReport {
     pub name: String,
     pub channels: Vec<String>,
     pub pixels: u64,
     pub different: u64,
-    /// The first pixel that differs.
+    /// First pixel that differs.
     pub first: Option<PixelReport>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest: Option<Number>,
@@ -67,9 +67,9 @@ pub struct PixelReport {
     y: u32,
 }
 
-impl From<Place> for PixelReport {
-    fn from(place: Place) -> Self {
-        PixelReport { x: place.x, y: place.y }
+impl From<PixelCoord> for PixelReport {
+    fn from(pixel: PixelCoord) -> Self {
+        PixelReport { x: pixel.x, y: pixel.y }
     }
 }
 
@@ -79,7 +79,7 @@ impl fmt::Display for PixelReport {
     }
 }
 
-/// Where the largest difference is, and of what.
+/// Pixel and channel of the largest difference.
 #[derive(Debug, Serialize)]
 pub struct LargestReport {
     x: u32,
@@ -92,8 +92,8 @@ pub struct LargestReport {
 impl From<Largest> for LargestReport {
     fn from(largest: Largest) -> Self {
         LargestReport {
-            x: largest.place.x,
-            y: largest.place.y,
+            x: largest.pixel.x,
+            y: largest.pixel.y,
             channel: largest.channel,
             a: largest.a,
             b: largest.b,
@@ -101,7 +101,7 @@ impl From<Largest> for LargestReport {
     }
 }
 
-/// Values that are no finite numbers.
+/// Counts of non-finite values.
 #[derive(Debug, Serialize)]
 pub struct NotFinite {
     nan_a: u64,
@@ -111,8 +111,8 @@ pub struct NotFinite {
     first: PixelReport,
 }
 
-impl From<(Values, Values, Place)> for NotFinite {
-    fn from((a, b, first): (Values, Values, Place)) -> Self {
+impl From<(Values, Values, PixelCoord)> for NotFinite {
+    fn from((a, b, first): (Values, Values, PixelCoord)) -> Self {
         NotFinite {
             nan_a: a.nan,
             nan_b: b.nan,
@@ -134,7 +134,7 @@ impl fmt::Display for NotFinite {
     }
 }
 
-/// A number; JSON has no infinite ones, which are texts there.
+/// A number. JSON has no infinite numbers, which become strings.
 #[derive(Clone, Copy, Debug)]
 pub struct Number(pub f64);
 
@@ -148,13 +148,13 @@ impl Serialize for Number {
 }
 
 impl fmt::Display for Number {
-    /// Six digits; whole numbers with all of theirs.
+    /// Writes six digits, and all digits of a whole number.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let size = self.0.abs();
         if size == 0.0 || !size.is_finite() {
             return write!(f, "{}", self.0);
         }
-        // Numbers of shapes go up to 2^32 - 1, which is where nothing is.
+        // Shape numbers go up to 2^32 - 1, which stands for the background.
         let is_whole = size.fract() == 0.0 && size < 1e15;
         let text = if (1e-4..1e9).contains(&size) || is_whole {
             let decimals = (5 - size.log10().floor() as i32).max(0) as usize;
@@ -164,7 +164,7 @@ impl fmt::Display for Number {
             let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
             format!("{}e{exponent}", short(digits))
         };
-        // what is nearly 1 is not 1
+        // A value close to a whole number is not rounded to it.
         match size < 1e6 && self.0.fract() != 0.0 && text.parse::<i64>().is_ok() {
             true => write!(f, "{}", self.0),
             false => f.write_str(&text),
@@ -172,7 +172,7 @@ impl fmt::Display for Number {
     }
 }
 
-/// Without zeros at the end of a fraction.
+/// Removes trailing zeros of a fraction.
 fn short(digits: &str) -> &str {
     match digits.contains('.') {
         true => digits.trim_end_matches('0').trim_end_matches('.'),
@@ -199,12 +199,12 @@ impl LayerReport {
         number.map(|number| number.0)
     }
 
-    /// What is told of a metric.
+    /// Returns the line of a metric.
     fn line(&self, metric: Metric) -> Option<String> {
         let value = Number(self.value(metric)?);
         let at = match &self.largest_at {
             Some(LargestReport { x, y, channel, a, b }) => {
-                format!(" in {channel} at ({x}, {y}): {}, not {}", Number(*a), Number(*b))
+                format!(" in {channel} at ({x}, {y}): {} instead of {}", Number(*a), Number(*b))
             }
             None => String::new(),
         };
@@ -243,13 +243,13 @@ impl Report {
         (self.only_a, self.only_b) = (owned(a), owned(b));
     }
 
-    /// Whether a layer that was measured differs.
+    /// Returns whether any layer differs.
     pub fn is_different(&self) -> bool {
         self.layers.iter().any(LayerReport::is_different)
     }
 
-    /// Says what fails: sizes, places, channels and values that are no numbers always; else what is worse than a limit, or without
-    /// limits any bit.
+    /// Collects the reasons for failing. Different sizes, positions and channels and non-finite values always fail; otherwise
+    /// values beyond a limit do, or any difference if there are no limits.
     pub fn judge(&mut self, limits: &[Limit], threshold: f64) {
         let mut fails = Vec::new();
         let (a, b) = (self.size_a, self.size_b);
@@ -258,7 +258,7 @@ impl Report {
         } else if self.positions[0] != self.positions[1] {
             let [a, b] = self.positions;
             fails.push(format!(
-                "A begins at ({}, {}) of the whole picture, B at ({}, {})",
+                "A starts at pixel ({}, {}) of the whole image, B at ({}, {})",
                 a.0, a.1, b.0, b.1
             ));
         }
@@ -273,8 +273,12 @@ impl Report {
             }
             if limits.is_empty() && layer.is_different() {
                 let (name, different) = (&layer.name, layer.different);
-                let pixels = if different == 1 { "pixel has" } else { "pixels have" };
-                fails.push(format!("{name}: {different} {pixels} other bits"));
+                let pixels = if different == 1 {
+                    "pixel differs"
+                } else {
+                    "pixels differ"
+                };
+                fails.push(format!("{name}: {different} {pixels}"));
             }
             for limit in limits {
                 let value = layer.value(limit.metric);
@@ -312,7 +316,7 @@ impl fmt::Display for Report {
                 format!(" {channels}")
             };
             if !layer.is_different() {
-                writeln!(f, "{}{channels}: the same bits", layer.name)?;
+                writeln!(f, "{}{channels}: identical", layer.name)?;
                 continue;
             }
             writeln!(f, "{}{channels}", layer.name)?;
@@ -327,7 +331,7 @@ impl fmt::Display for Report {
         }
         match (self.passes, self.is_different()) {
             (true, true) => writeln!(f, "passes"),
-            (true, false) => writeln!(f, "the same"),
+            (true, false) => writeln!(f, "identical"),
             (false, _) => Ok(()),
         }
     }
@@ -338,7 +342,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_six_digits_and_do_not_hide_what_is_nearly_whole() {
+    fn numbers_have_six_digits_and_are_not_rounded_to_whole_ones() {
         let text = |value: f64| Number(value).to_string();
         assert_eq!(text(0.0), "0");
         assert_eq!(text(1.0), "1");

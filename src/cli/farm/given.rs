@@ -1,5 +1,4 @@
-//! The options of `wgray render` on the command line of `wgray farm`: what they come to here, and how tasks are told of them,
-//! word for word.
+//! The options of `wgray render` on the command line of `wgray farm`, which are passed verbatim to the tasks.
 
 use std::ffi::OsString;
 
@@ -10,7 +9,7 @@ use clap::{ArgMatches, Args, Command, FromArgMatches, Id};
 use crate::cli::picture_options::PictureOptions;
 use crate::cli::render;
 
-/// Options that each task has its own of, or the engine says.
+/// Options that the tasks or the engine set.
 const OF_TASKS: [&str; 11] = [
     "checkpoint",
     "checkpoint_interval",
@@ -37,22 +36,22 @@ const COMMON: [&str; 8] = [
     "frames",
 ];
 
-/// Options that are neither refused nor handed on: the files say them in their own way.
+/// Options that the files express in their own way.
 const IN_FILES: [&str; 2] = ["frames", "output"];
 
-/// An option that was given: its name, and its value if it takes one.
+/// An option of the command line: its name, and its value if it has one.
 pub type Given = (String, Option<OsString>);
 
-/// The options of `wgray render`, and how they were given.
+/// The options of `wgray render`, parsed and as given.
 #[derive(Debug)]
 pub struct Rendering {
-    /// What they come to.
+    /// Parsed options.
     pub args: render::Args,
-    /// Those that the rendering of a part heeds, in the order of the help.
+    /// Options for rendering a part, in the order of the help.
     pub render: Vec<Given>,
-    /// Those that say how the picture is written.
+    /// Options for writing the image.
     pub merge: Vec<Given>,
-    /// The first one that is not for farms.
+    /// First option that does not apply to farms.
     pub refused: Option<String>,
 }
 
@@ -122,7 +121,7 @@ impl Args for Rendering {
         });
         OF_TASKS
             .into_iter()
-            // What such an option needs is not asked for: it is refused by itself.
+            // The option is refused anyway, so its requirements are not checked.
             .fold(command, |command, id| {
                 command.mut_arg(id, |arg| arg.hide(true).requires(Resettable::<Id>::Reset))
             })
@@ -149,7 +148,7 @@ mod tests {
         Line::try_parse_from([&["farm"], words].concat()).unwrap().rendering
     }
 
-    /// Every option of `wgray render` is handed on, refused, or said in the files; a new one is handed on by itself.
+    /// Every option of `wgray render` is passed on, refused, or expressed in the files. A new one is passed on by default.
     #[test]
     fn every_option_is_known() {
         let all = ids(&render::Args::augment_args(Command::new("render")));
@@ -159,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn options_are_handed_on_word_for_word() {
+    fn options_are_passed_on_verbatim() {
         let rendering = given(&[
             "a.toml",
             "--aov",
@@ -180,17 +179,17 @@ mod tests {
             "--frames",
             "1-3",
         ]);
-        let told = |list: &[Given]| -> Vec<String> {
-            let told = |(name, value): &Given| match value {
+        let texts = |list: &[Given]| -> Vec<String> {
+            let text = |(name, value): &Given| match value {
                 None => name.clone(),
                 Some(value) => format!("{name}={}", value.display()),
             };
-            let mut all: Vec<String> = list.iter().map(told).collect();
+            let mut all: Vec<String> = list.iter().map(text).collect();
             all.sort();
             all
         };
         assert_eq!(
-            told(&rendering.render),
+            texts(&rendering.render),
             [
                 "--aov=normal,depth",
                 "--aov=uv",
@@ -201,10 +200,10 @@ mod tests {
                 "--spp=4",
             ]
         );
-        assert_eq!(told(&rendering.merge), ["--exposure=-1", "--reproducible"]);
+        assert_eq!(texts(&rendering.merge), ["--exposure=-1", "--reproducible"]);
         assert_eq!(rendering.refused, None);
         assert_eq!(given(&["a.toml", "--tile", "1/2"]).refused.as_deref(), Some("--tile"));
-        // What nobody has said is not handed on.
+        // Defaults are not passed on.
         assert_eq!(
             (given(&["a.toml"]).render.len(), given(&["a.toml"]).merge.len()),
             (0, 0)

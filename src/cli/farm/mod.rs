@@ -1,10 +1,10 @@
-//! `wgray farm`: the files that an engine of render farms takes for a scene. Each task renders a part of a picture, as `wgray render
-//! --tile` does; others join the parts. What tasks are told is what this command was told.
+//! `wgray farm`: writes the files with which a render farm renders a scene. Each task renders a part of an image, as `wgray render
+//! --tile` does; further tasks join the parts. The tasks get the options of this command.
 
 mod given;
 mod openjd;
 mod slurm;
-mod text;
+pub mod text;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -26,18 +26,18 @@ use super::outputs::keep_inputs;
 use super::render::{Job, Trial, parse_duration};
 use super::{Usage, ended, option};
 
-/// What runs the tasks.
+/// The engine that runs the tasks.
 #[derive(Debug, Subcommand)]
 pub enum Engine {
-    /// Writes a template of Open Job Description (jobtemplate-2023-09): a step of parts, and one that joins them
+    /// Write a template for Open Job Description (jobtemplate-2023-09)
     Openjd(Box<Args>),
-    /// Writes batch scripts of Slurm, an array of parts and one that joins them, and a script that submits both
+    /// Write batch scripts for Slurm, and a script that submits them
     Slurm(Box<Args>),
 }
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = super::EXIT_CODES)]
-#[command(allow_negative_numbers = true)] // so that a number out of range is told as such
+#[command(allow_negative_numbers = true)] // so that a number out of range is reported as such
 #[group(id = "farm")] // beside those of wgray render, which are among these
 pub struct Args {
     #[command(flatten)]
@@ -47,47 +47,49 @@ pub struct Args {
     rendering: Rendering,
 }
 
-/// What is the farm's own.
+/// Options of the farm itself.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Farm")]
 struct Own {
-    /// Where the files go. openjd: the template, NAME.yaml; if absent, the scene's name with .openjd.yaml. slurm: a folder for the scripts,
-    /// in which parts and logs will be too; if absent, the scene's name with .farm
+    /// Write the files to PATH: a template, NAME.yaml, for openjd; a folder for slurm
+    ///
+    /// The default is the name of the scene with .openjd.yaml or .farm. The folder also receives parts and logs.
     #[arg(long, value_name = "PATH")]
     to: Option<PathBuf>,
 
-    /// Parts of each picture. If absent, as many as --task-time says, by a trial of some seconds on this machine
+    /// Split each image into N parts [default: by --task-time and a trial of some seconds]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     tiles: Option<u32>,
 
-    /// How long a task is to take, from its start on, on a machine like this one: seconds, or with a unit, as 90s, 1.5m, 2h
+    /// Set the duration of a task on a machine like this one: 90s, 1.5m, 2h
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "10m", conflicts_with = "tiles")]
     task_time: Duration,
 
-    /// After how long the engine ends a task, 2m or more. If absent, four times what the trial has found, 10m at least; the engine's own
-    /// with --tiles
+    /// Set the time limit of a task, 2m or more
+    ///
+    /// The default is four times the duration found by the trial, but at least 10m; with --tiles, the engine's default.
     #[arg(long, value_name = "TIME", value_parser = parse_limit)]
     limit: Option<Duration>,
 
-    /// What wgray is called on the machines of the farm
+    /// Set the name or path of wgray on the machines of the farm
     #[arg(long, value_name = "NAME", default_value = "wgray", value_parser = NonEmptyStringValueParser::new())]
     program: String,
 
-    /// Replaces files of an earlier wgray farm
+    /// Overwrite existing files
     #[arg(long)]
     overwrite: bool,
 }
 
 fn parse_limit(text: &str) -> Result<Duration, String> {
     let limit = parse_duration(text)?;
-    let rule = "must be 2m or more: a minute before it is up a task is told to keep what it has";
-    (limit >= LEAST_LIMIT).then_some(limit).ok_or(rule.to_owned())
+    let rule = "must be 2m or more: tasks are signaled a minute before it, to write a checkpoint";
+    (limit >= MIN_LIMIT).then_some(limit).ok_or(rule.to_owned())
 }
 
-const LEAST_LIMIT: Duration = Duration::from_secs(120);
-/// The limit of tasks whose time is known.
-const SURELY: u32 = 4;
-const SURELY_AT_LEAST: Duration = Duration::from_secs(600);
+const MIN_LIMIT: Duration = Duration::from_secs(120);
+/// Factor and minimum of the time limit of tasks with a known duration.
+const LIMIT_FACTOR: u32 = 4;
+const MIN_DEFAULT_LIMIT: Duration = Duration::from_secs(600);
 
 impl Engine {
     /// Threads of the CPU and of software Vulkan, if not all.
@@ -102,25 +104,25 @@ impl Engine {
     }
 }
 
-/// What the files are written of. All texts are plain.
+/// The contents of the files. All texts are free of control characters.
 struct Work {
-    /// The folder that names are counted from.
+    /// Folder that names are relative to.
     folder: String,
-    /// Where the tasks keep what they make.
+    /// Folder for parts and checkpoints.
     place: String,
     scene: String,
-    /// The scene's name, for people.
+    /// Display name of the scene.
     name: String,
     outputs: Vec<String>,
     program: String,
     tiles: u32,
     frames: Option<Frames>,
-    /// Words of a shell: the options of `wgray render` and of `wgray merge`.
+    /// Options of `wgray render` and of `wgray merge`, as words of a shell.
     render: Vec<String>,
     merge: Vec<String>,
     limit: Option<Duration>,
-    /// Lines that tell of the trial.
-    told: Vec<String>,
+    /// Lines about the trial.
+    trial: Vec<String>,
 }
 
 /// A file to write.
@@ -135,16 +137,16 @@ pub fn run(engine: &Engine, start: Instant) -> anyhow::Result<ExitCode> {
     let args = engine.args();
     let (own, rendering) = (&args.own, &args.rendering);
     if let Some(option) = &rendering.refused {
-        return Err(Usage(format!("{option}: is not for farms, whose tasks have their own")).into());
+        return Err(Usage(format!("{option}: does not apply to farms, whose tasks set it")).into());
     }
     let outputs = &rendering.args.pictures.output;
     if outputs.is_empty() {
-        return Err(Usage("--output: must be there: -o NAME.exr".to_owned()).into());
+        return Err(Usage("--output: is required: -o NAME.exr".to_owned()).into());
     }
     let is_stream =
         |output: &&PathBuf| output.as_os_str() == "-" || Output::find(output).is_ok_and(|output| !output.is_file());
     if let Some(output) = outputs.iter().find(is_stream) {
-        let rule = "must be a file, which the tasks' machines reach";
+        let rule = "must be a file that the machines of the farm can write";
         return Err(Usage(format!("--output: {}: {rule}", output.display())).into());
     }
     let stem = plain("SCENE", rendering.args.scene.file_stem().unwrap_or("scene".as_ref()))?;
@@ -158,7 +160,7 @@ pub fn run(engine: &Engine, start: Instant) -> anyhow::Result<ExitCode> {
         Engine::Slurm(_) => plain("--to", to.as_os_str())?,
     };
     let mut work = work(args, place)?;
-    // Before a trial is made for files that may not be written.
+    // Checked before the trial, which takes seconds.
     let files = match engine {
         Engine::Openjd(_) => openjd::files(&work, &to)?,
         Engine::Slurm(_) => slurm::files(&work, &to),
@@ -179,8 +181,8 @@ pub fn run(engine: &Engine, start: Instant) -> anyhow::Result<ExitCode> {
     for file in &files {
         write(file)?;
     }
-    let mut lines = work.told.clone();
-    let (tasks, pictures) = (work.tasks(), work.pictures());
+    let mut lines = work.trial.clone();
+    let (tasks, images) = (work.tasks(), work.images());
     let of = |count: u64| {
         if count == 1 {
             "1 task".to_owned()
@@ -192,7 +194,7 @@ pub fn run(engine: &Engine, start: Instant) -> anyhow::Result<ExitCode> {
         "{}: {} to render, {} to join the parts.",
         work.what(),
         of(tasks),
-        of(pictures)
+        of(images)
     ));
     lines.push(match engine {
         Engine::Openjd(_) => openjd::next(&work, &to),
@@ -202,7 +204,7 @@ pub fn run(engine: &Engine, start: Instant) -> anyhow::Result<ExitCode> {
     Ok(ended(io::stdout().lock().write_all(text.as_bytes()), ExitCode::SUCCESS))
 }
 
-/// What is known before the scene is read. There is one part.
+/// Collects the contents that are known before the scene is read. There is a single part.
 fn work(args: &Args, place: String) -> anyhow::Result<Work> {
     let (
         own,
@@ -211,11 +213,11 @@ fn work(args: &Args, place: String) -> anyhow::Result<Work> {
         },
     ) = (&args.own, &args.rendering);
     let words = |options: &[Given]| -> Result<Vec<String>, Usage> {
-        let told = |(name, value): &Given| match value {
+        let quoted = |(name, value): &Given| match value {
             None => Ok(word(name)),
             Some(value) => Ok(word(&format!("{name}={}", plain(name, value)?))),
         };
-        options.iter().map(told).collect()
+        options.iter().map(quoted).collect()
     };
     let name = args.scene.file_name().unwrap_or(args.scene.as_os_str());
     let outputs = args
@@ -236,11 +238,11 @@ fn work(args: &Args, place: String) -> anyhow::Result<Work> {
         render: words(render)?,
         merge: words(merge)?,
         limit: own.limit,
-        told: Vec::new(),
+        trial: Vec::new(),
     })
 }
 
-/// Looks at the job, and settles how many parts a picture has.
+/// Determines the number of parts per image, by a trial if none is given.
 fn size(work: &mut Work, own: &Own, job: &mut Job, start: Instant) -> anyhow::Result<()> {
     let frame = match work.frames.as_ref().and_then(Frames::middle) {
         None => super::frames::Frame::one(None),
@@ -254,7 +256,7 @@ fn size(work: &mut Work, own: &Own, job: &mut Job, start: Instant) -> anyhow::Re
     if let Some(tiles) = own.tiles {
         if (Tile { number: 1, of: tiles }).rows(region).is_none() {
             return Err(Usage(format!(
-                "--tiles: {tiles}: parts are whole rows, and the picture has {rows} of them"
+                "--tiles: {tiles}: must be at most {rows}, the number of rows of the image"
             ))
             .into());
         }
@@ -263,13 +265,13 @@ fn size(work: &mut Work, own: &Own, job: &mut Job, start: Instant) -> anyhow::Re
     }
     let trial = Trial::of(job, frame, start)?;
     let (fixed, all) = (trial.fixed.as_secs_f64(), own.task_time.as_secs_f64());
-    let rendering = (all - fixed).max(fixed); // no more than half of a task is lost to its beginning
+    let rendering = (all - fixed).max(fixed); // at most half of a task is spent on its start
     work.tiles = (trial.rendering / rendering).ceil().clamp(1.0, f64::from(rows)) as u32;
     let of_a_task = trial.rendering / f64::from(work.tiles);
-    let surely = Duration::from_secs_f64(((fixed + of_a_task) * f64::from(SURELY)).min(1e9));
-    work.limit = work.limit.or(Some(surely.max(SURELY_AT_LEAST)));
-    work.told.push(format!(
-        "A task takes some {}: {} to begin, {} to render; the slowest rows take {:.1} times the mean.",
+    let surely = Duration::from_secs_f64(((fixed + of_a_task) * f64::from(LIMIT_FACTOR)).min(1e9));
+    work.limit = work.limit.or(Some(surely.max(MIN_DEFAULT_LIMIT)));
+    work.trial.push(format!(
+        "A task takes about {}: {} to start, {} to render; the slowest rows take {:.1} times the mean.",
         seconds(fixed + of_a_task),
         seconds(fixed),
         seconds(of_a_task),
@@ -284,67 +286,67 @@ fn size(work: &mut Work, own: &Own, job: &mut Job, start: Instant) -> anyhow::Re
         .chars()
         .map(|c| if c.is_control() { ' ' } else { c })
         .collect();
-    work.told.push(format!(
-        "This is by a trial{of} on {device}; a picture by itself takes {}.",
+    work.trial.push(format!(
+        "Estimated by a trial{of} on {device}; a whole image takes {}.",
         seconds(fixed + trial.rendering)
     ));
     let (of, begins) = (seconds(all), seconds(fixed));
-    let told = if trial.rendering > rendering * f64::from(rows) {
-        Some(format!("a part is a row at least, and takes longer than {of}"))
+    let warning = if trial.rendering > rendering * f64::from(rows) {
+        Some(format!("a part has at least one row, which takes longer than {of}"))
     } else if all < 2.0 * fixed && work.tiles == 1 {
         Some(format!(
-            "of {of} each task needs {begins} to begin; the picture is one task"
+            "each task needs {begins} of {of} to start; the image is a single task"
         ))
     } else if all < 2.0 * fixed {
         Some(format!(
-            "of {of} each task needs {begins} to begin; tasks are longer, so that it is half of them at most"
+            "each task needs {begins} of {of} to start; tasks are made longer, so that this is at most half of them"
         ))
     } else {
         None
     };
-    if let Some(told) = told {
-        log::say(Level::Warning, &format!("--task-time: {told}"));
+    if let Some(warning) = warning {
+        log::say(Level::Warning, &format!("--task-time: {warning}"));
     }
     Ok(())
 }
 
 impl Work {
-    fn pictures(&self) -> u64 {
+    fn images(&self) -> u64 {
         self.frames.as_ref().map_or(1, Frames::count) as u64
     }
 
     fn tasks(&self) -> u64 {
-        self.pictures() * u64::from(self.tiles)
+        self.images() * u64::from(self.tiles)
     }
 
-    /// What the tasks render together.
+    /// Describes what the tasks render together.
     fn what(&self) -> String {
         match self.tiles {
-            1 => format!("{} of {}", self.count_of_pictures(), self.name),
-            tiles => format!("{} of {} in {tiles} parts", self.count_of_pictures(), self.name),
+            1 => format!("{} of {}", self.count_of_images(), self.name),
+            tiles => format!("{} of {} in {tiles} parts", self.count_of_images(), self.name),
         }
     }
 
-    fn count_of_pictures(&self) -> String {
+    fn count_of_images(&self) -> String {
         match &self.frames {
-            None => "One picture".to_owned(),
+            None => "One image".to_owned(),
             Some(frames) if frames.count() == 1 => "One frame".to_owned(),
             Some(frames) => format!("{} frames", frames.count()),
         }
     }
 
-    /// What the first lines of each file say.
+    /// Returns the first lines of each file.
     fn head(&self, what: &str) -> Vec<String> {
         let mut lines = vec![
             what.to_owned(),
             concat!("Written by wgray farm, version ", env!("CARGO_PKG_VERSION"), ".").to_owned(),
         ];
-        lines.extend(self.told.iter().cloned());
+        lines.extend(self.trial.iter().cloned());
         lines
     }
 }
 
-/// A time for people.
+/// Formats a duration.
 fn seconds(seconds: f64) -> String {
     match seconds {
         s if s < 0.1 => format!("{:.0} ms", s * 1e3),
@@ -354,27 +356,27 @@ fn seconds(seconds: f64) -> String {
     }
 }
 
-/// Lines of comments.
+/// Formats lines as comments.
 fn comments(lines: &[String]) -> String {
     lines.iter().map(|line| format!("# {line}\n")).collect()
 }
 
-/// A command over several lines.
+/// Breaks a command into several lines.
 fn command(indent: &str, words: &[String]) -> String {
     words.join(&format!(" \\\n{indent}    "))
 }
 
-/// Refuses to replace what is there: an earlier job whose scripts were changed by hand, or a file that has nothing to do with farms.
+/// Rejects existing files, which may be scripts changed by hand or unrelated to farms.
 fn check(files: &[File], inputs: &[PathBuf], overwrite: bool) -> anyhow::Result<()> {
     for File { path, .. } in files {
         let output = Output::find(path).map_err(RenderError::Output)?;
         keep_inputs("--to", &output, inputs, "choose another name")?;
         let name = path.display();
         if !output.is_file() {
-            return Err(Usage(format!("--to: {name}: must be a file, there or not yet")).into());
+            return Err(Usage(format!("--to: {name}: must be a regular file or a new name")).into());
         }
         if !overwrite && fs::symlink_metadata(path).is_ok() {
-            let rule = "is there already; --overwrite replaces it, --to names another place";
+            let rule = "already exists; pass --overwrite to replace it, or choose another name by --to";
             return Err(Usage(format!("--to: {name}: {rule}")).into());
         }
     }
@@ -391,7 +393,7 @@ fn write(file: &File) -> Result<(), RenderError> {
         use std::os::unix::fs::PermissionsExt as _;
         let data = fs::metadata(&file.path).map_err(|error| not_written(&file.path, &error))?;
         let mut permissions = data.permissions();
-        permissions.set_mode(permissions.mode() | ((permissions.mode() & 0o444) >> 2)); // for those who read it
+        permissions.set_mode(permissions.mode() | ((permissions.mode() & 0o444) >> 2)); // for every user that can read it
         fs::set_permissions(&file.path, permissions).map_err(|error| not_written(&file.path, &error))?;
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! A template of Open Job Description.
+//! Template for Open Job Description.
 
 use std::path::Path;
 
@@ -6,23 +6,23 @@ use super::text::{plain, scalar, word};
 use super::{File, Work, command, comments};
 use crate::cli::Usage;
 
-/// The longest value of a parameter that engines take.
-const LONGEST: usize = 1024;
-/// The longest name of a job.
-const LONGEST_NAME: usize = 64;
+/// Maximum length of a parameter's value.
+const MAX_VALUE_LEN: usize = 1024;
+/// Maximum length of a job's name.
+const MAX_NAME_LEN: usize = 64;
 
-/// The template.
+/// Returns the template.
 pub fn files(work: &Work, to: &Path) -> Result<Vec<File>, Usage> {
     let ends = to.extension().is_some_and(|end| end == "yaml" || end == "yml");
     if !ends {
         return Err(Usage(format!("--to: {}: must end in .yaml or .yml", to.display())));
     }
-    if let Some(text) = frames(work).filter(|text| text.len() > LONGEST) {
+    if let Some(text) = frames(work).filter(|text| text.len() > MAX_VALUE_LEN) {
         let rule = format!(
-            "a template has room for {LONGEST} letters, and these frames take {}",
+            "the list takes {} characters, and a template allows {MAX_VALUE_LEN}",
             text.len()
         );
-        return Err(Usage(format!("--frames: {rule}; several templates have more")));
+        return Err(Usage(format!("--frames: {rule}; write several templates")));
     }
     Ok(vec![File {
         path: to.to_owned(),
@@ -31,7 +31,7 @@ pub fn files(work: &Work, to: &Path) -> Result<Vec<File>, Usage> {
     }])
 }
 
-/// What to do with it.
+/// Returns the command that runs the template.
 pub fn next(work: &Work, to: &Path) -> String {
     let mut words = vec!["openjd run".to_owned(), word(&dashed(&to.display().to_string()))];
     let (folder, scene) = (folder(work, to), scene(work, to));
@@ -44,7 +44,7 @@ pub fn next(work: &Work, to: &Path) -> String {
     words.join(" ")
 }
 
-/// A path that is no option.
+/// Returns a path that cannot be taken for an option.
 fn dashed(path: &str) -> String {
     match path.starts_with('-') {
         true => format!("./{path}"),
@@ -52,7 +52,7 @@ fn dashed(path: &str) -> String {
     }
 }
 
-/// A path below the template's folder, from there: no other may be a default.
+/// Returns a path relative to the template's folder if it is below it; other paths cannot be defaults.
 fn below(path: &str, to: &Path) -> Option<String> {
     let absolute = |path: &Path| std::fs::canonicalize(path).ok();
     let parent = to.parent().filter(|parent| !parent.as_os_str().is_empty());
@@ -105,7 +105,7 @@ fn parameters(work: &Work, to: &Path) -> String {
         parameter(
             "Folder",
             "PATH",
-            "The folder that names are counted from, which all machines see",
+            "The folder that names are relative to, shared by all machines",
             &path("DIRECTORY", "INOUT", folder(work, to)),
         ),
     ];
@@ -113,7 +113,7 @@ fn parameters(work: &Work, to: &Path) -> String {
         all.push(parameter(
             &output_name(number),
             "STRING",
-            "A picture to write",
+            "An image to write",
             &text(output),
         ));
     }
@@ -126,11 +126,11 @@ fn parameters(work: &Work, to: &Path) -> String {
         ));
     }
     let tiles = [("minValue", "1".to_owned()), ("default", work.tiles.to_string())];
-    all.push(parameter("Tiles", "INT", "Parts of each picture: whole rows", &tiles));
+    all.push(parameter("Tiles", "INT", "Parts of each image: whole rows", &tiles));
     all.push(parameter(
         "Program",
         "STRING",
-        "What wgray is called",
+        "The name or path of wgray",
         &text(&work.program),
     ));
     all.concat()
@@ -143,7 +143,7 @@ fn output_name(number: usize) -> String {
     }
 }
 
-/// A step's script: the words that the shell is given, and its lines.
+/// Formats the script of a step: the words passed to the shell, and the lines.
 fn step(indent: &str, words: &[&str], limit: &str, script: &str) -> String {
     let list: Vec<String> = words.iter().map(|word| scalar(word)).collect();
     let lines: String = script
@@ -178,11 +178,11 @@ fn template(work: &Work, to: &Path) -> Result<String, Usage> {
         next(work, to)
     );
     let head = comments(&work.head(&what));
-    // A job's name is a text with places for parameters, and short.
+    // A job's name is short and can contain references to parameters.
     let name = work.name.chars().map(|c| if "{}".contains(c) { ' ' } else { c });
-    let name: String = name.take(LONGEST_NAME).collect();
+    let name: String = name.take(MAX_NAME_LEN).collect();
     let has_frames = work.frames.is_some();
-    let picture = if has_frames { "$frame" } else { "picture" };
+    let stem = if has_frames { "$frame" } else { "picture" };
     let limit = work
         .limit
         .map(|limit| format!("          timeout: {}   # seconds\n", limit.as_secs()));
@@ -228,13 +228,13 @@ fn template(work: &Work, to: &Path) -> Result<String, Usage> {
     );
     let place = word(&work.place);
     let tile_script = format!(
-        "# A part of a picture. What was finished before is not rendered again.
+        "# Renders a part of an image. Finished work is not repeated.
 set -eu
 {names}
-# left are the scene and the number of the part
+# the remaining words are the scene and the number of the part
 cd -- \"$folder\"
-parts={place}/parts/{picture}-of-$tiles
-kept={place}/checkpoints/{picture}-of-$tiles/$2   # a folder: a changed scene has a file of its own
+parts={place}/parts/{stem}-of-$tiles
+kept={place}/checkpoints/{stem}-of-$tiles/$2   # a folder: a changed scene has a file of its own
 mkdir -p -- \"$parts\" \"$kept\"
 {}
 ",
@@ -258,14 +258,14 @@ mkdir -p -- \"$parts\" \"$kept\"
     merge.extend((1..=work.outputs.len()).map(|number| format!("--output=\"${number}\"")));
     merge.push("-- \"$parts\"".to_owned());
     let merge_script = format!(
-        "# Joins the parts of a picture.
+        "# Joins the parts of an image.
 set -eu
 {names}
-# left are the pictures to write
+# the remaining words are the images to write
 cd -- \"$folder\"
-parts={place}/parts/{picture}-of-$tiles
+parts={place}/parts/{stem}-of-$tiles
 {}
-rm -rf -- {place}/checkpoints/{picture}-of-$tiles   # the parts stay; remove {place} when all is done
+rm -rf -- {place}/checkpoints/{stem}-of-$tiles   # the parts stay; remove {place} when all is done
 ",
         command("", &merge)
     );

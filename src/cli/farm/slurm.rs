@@ -1,14 +1,14 @@
-//! Batch scripts of Slurm.
+//! Batch scripts for Slurm.
 
 use std::path::Path;
 
 use super::text::word;
 use super::{File, Work, command, comments};
 
-/// A task that was requeued so often is left to be looked at.
-const MOST_RESTARTS: u32 = 20;
+/// Maximum number of times a task is requeued.
+const MAX_RESTARTS: u32 = 20;
 
-/// The scripts: one for parts, one that joins them, one that submits both.
+/// Returns the scripts: one renders parts, one joins them, one submits both.
 pub fn files(work: &Work, to: &Path) -> Vec<File> {
     let file = |name: &str, text: String| File {
         path: to.join(name),
@@ -22,7 +22,7 @@ pub fn files(work: &Work, to: &Path) -> Vec<File> {
     ]
 }
 
-/// What to do with them.
+/// Returns the command that submits the job.
 pub fn next(to: &Path) -> String {
     let name = to.join("submit").display().to_string();
     let name = match name.contains('/') && !name.starts_with('-') {
@@ -32,20 +32,20 @@ pub fn next(to: &Path) -> String {
     word(&name)
 }
 
-/// The names that both kinds of tasks know.
+/// Returns the variables of both kinds of tasks.
 fn names(work: &Work) -> String {
     let ranges = work.frames.as_ref().map(|frames| {
-        let told = frames
+        let lists = frames
             .ranges()
             .into_iter()
             .map(|(first, last, step)| match last == first {
                 true => first.to_string(),
                 false => format!("$(seq {first} {step} {last})"),
             });
-        format!("frames=({})\n", told.collect::<Vec<_>>().join(" "))
+        format!("frames=({})\n", lists.collect::<Vec<_>>().join(" "))
     });
     format!(
-        "folder={}   # names are counted from here\nplace={}   # parts and checkpoints\ntiles={}   # parts of a picture\n{}",
+        "folder={}   # names are relative to it\nplace={}   # parts and checkpoints\ntiles={}   # parts of an image\n{}",
         word(&work.folder),
         word(&work.place),
         work.tiles,
@@ -53,8 +53,8 @@ fn names(work: &Work) -> String {
     )
 }
 
-/// What stands before `-of-` in the names of a picture's folders, from the task's number.
-fn picture(work: &Work, index: &str) -> (String, &'static str) {
+/// Returns the line that sets the frame from a task's number, and the start of the names of an image's folders.
+fn stem(work: &Work, index: &str) -> (String, &'static str) {
     match work.frames {
         None => (String::new(), "picture"),
         Some(_) => (format!("frame=${{frames[{index}]}}\n"), "$frame"),
@@ -63,16 +63,16 @@ fn picture(work: &Work, index: &str) -> (String, &'static str) {
 
 fn tile(work: &Work) -> String {
     let head = comments(&work.head(&format!(
-        "A part of a picture of {}: a task of a Slurm array, which ./submit submits.",
+        "Renders a part of an image of {}: a task of a Slurm array, submitted by ./submit.",
         work.name
     )));
     let limit = work.limit.map(|limit| {
         format!(
-            "#SBATCH --time={}   # minutes; a task whose time is up goes on in another try\n",
+            "#SBATCH --time={}   # minutes; a task that reaches it is requeued and resumes\n",
             limit.as_secs().div_ceil(60)
         )
     });
-    let (frame, picture) = picture(work, "task / tiles");
+    let (frame, stem) = stem(work, "task / tiles");
     let mut words = vec![format!("{} render", word(&work.program))];
     words.extend(work.render.iter().cloned());
     if work.frames.is_some() {
@@ -96,32 +96,32 @@ fn tile(work: &Work) -> String {
 {head}#SBATCH --job-name=wgray-tile
 #SBATCH --requeue
 #SBATCH --open-mode=append
-{limit}#SBATCH --signal=B:USR1@60   # a minute before, wgray is told, keeps what it has, and the task is requeued: the last lines
+{limit}#SBATCH --signal=B:USR1@60   # a minute before, wgray writes a checkpoint and the task is requeued: see the last lines
 
 {names}
-task=$(( ${{1:-0}} + SLURM_ARRAY_TASK_ID ))   # of all, from 0; an array holds so many, and there may be several
+task=$(( ${{1:-0}} + SLURM_ARRAY_TASK_ID ))   # counted from 0 over all arrays; the size of an array is limited
 tile=$(( task % tiles + 1 ))
-{frame}parts=$place/parts/{picture}-of-$tiles
-kept=$place/checkpoints/{picture}-of-$tiles/$tile   # a folder: a changed scene has a file of its own
+{frame}parts=$place/parts/{stem}-of-$tiles
+kept=$place/checkpoints/{stem}-of-$tiles/$tile   # a folder: a changed scene has a file of its own
 
 cd -- "$folder" || exit
 mkdir -p -- "$parts" "$kept" || exit
 
-# A lost device, and a time that is up, are worth another try: then wgray ends with code 75. What was finished is not rendered again.
+# After a lost device or a time limit wgray ends with code 75, and the task is tried again. Finished work is not repeated.
 again=(--requeue-exit=75)
-if [ "${{SLURM_RESTART_COUNT:-0}}" -ge {MOST_RESTARTS} ]; then
+if [ "${{SLURM_RESTART_COUNT:-0}}" -ge {MAX_RESTARTS} ]; then
     again=()
 fi
 {command}
 wgray=$!
 trap 'kill -TERM $wgray' USR1
-trap 'cancelled=1' TERM   # by scancel, which tells wgray too
+trap 'cancelled=1' TERM   # by scancel, which signals wgray too
 while kill -0 $wgray 2>/dev/null; do
     wait $wgray   # or until a signal
 done
 wait $wgray
 code=$?
-# A task that ended with a code, by RequeueExit of slurm.conf too, would count as failed for the job that joins the parts.
+# A task that ends with a code (RequeueExit of slurm.conf does too) would count as failed for the job that joins the parts.
 if [ $code = 75 ] && [ -z "${{cancelled:-}}" ]; then
     scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID" && sleep 60   # Slurm ends this at once
 fi
@@ -134,11 +134,8 @@ exit $code
 }
 
 fn merge(work: &Work) -> String {
-    let head = comments(&work.head(&format!(
-        "Joins the parts of a picture of {}, when all are there.",
-        work.name
-    )));
-    let (frame, picture) = picture(work, "${1:-0} + SLURM_ARRAY_TASK_ID");
+    let head = comments(&work.head(&format!("Joins the parts of an image of {}.", work.name)));
+    let (frame, stem) = stem(work, "${1:-0} + SLURM_ARRAY_TASK_ID");
     let mut words = vec![format!("{} merge", word(&work.program))];
     if work.frames.is_some() {
         words.push("--frame=\"$frame\"".to_owned());
@@ -153,11 +150,11 @@ fn merge(work: &Work) -> String {
 #SBATCH --open-mode=append
 
 {names}
-{frame}parts=$place/parts/{picture}-of-$tiles
+{frame}parts=$place/parts/{stem}-of-$tiles
 
 cd -- "$folder" || exit
 {command}
-rm -rf -- "$place/checkpoints/{picture}-of-$tiles"   # the parts stay, so that another try finds them; remove $place when all is done
+rm -rf -- "$place/checkpoints/{stem}-of-$tiles"   # the parts stay for another try; remove $place at the end
 "#,
         names = names(work),
         command = command("", &words),
@@ -166,7 +163,7 @@ rm -rf -- "$place/checkpoints/{picture}-of-$tiles"   # the parts stay, so that a
 
 fn submit(work: &Work) -> String {
     let head = comments(&work.head(&format!(
-        "{}. This submits it; options of sbatch may follow: ./submit --partition=gpu --gres=gpu:1",
+        "{}. Submits the job; options are passed to sbatch: ./submit --partition=gpu --gres=gpu:1",
         work.what()
     )));
     format!(
@@ -175,17 +172,17 @@ fn submit(work: &Work) -> String {
 cd -- "$(dirname -- "$0")"
 mkdir -p logs
 
-# Submits a script for so many tasks, in as few arrays as the cluster has room for; prints their numbers with colons before them.
-most=$(( $(scontrol show config | sed -n 's/^MaxArraySize *= *//p') ))   # an array's indices are less than this
-if [ "$most" -lt 1 ]; then
-    echo "$0: scontrol does not tell MaxArraySize" >&2
+# Submits a script for a number of tasks, in as few arrays as the cluster allows; prints their numbers with colons before them.
+max=$(( $(scontrol show config | sed -n 's/^MaxArraySize *= *//p') ))   # an array's indices are less than this
+if [ "$max" -lt 1 ]; then
+    echo "$0: scontrol does not report MaxArraySize" >&2
     exit 1
 fi
 arrays() {{
     local script=$1 count=$2 first job
     shift 2
-    for (( first = 0; first < count; first += most )); do
-        job=$(sbatch --parsable --array=0-$(( (count - first < most ? count - first : most) - 1 )) \
+    for (( first = 0; first < count; first += max )); do
+        job=$(sbatch --parsable --array=0-$(( (count - first < max ? count - first : max) - 1 )) \
             --chdir="$PWD" --output=logs/%x-%A_%a.txt "$@" "$script" "$first") || return
         echo -n ":${{job%%;*}}"
     done
@@ -200,10 +197,10 @@ give_up() {{
     exit 1
 }}
 tiles=$(arrays tile.sh {tasks} "$@") || give_up
-merges=$(arrays merge.sh {pictures} "$@" --dependency=afterok"$tiles" --kill-on-invalid-dep=yes) || give_up
+merges=$(arrays merge.sh {images} "$@" --dependency=afterok"$tiles" --kill-on-invalid-dep=yes) || give_up
 echo "tiles${{tiles//:/ }}, merge${{merges//:/ }}"
 "#,
         tasks = work.tasks(),
-        pictures = work.pictures(),
+        images = work.pictures(),
     )
 }

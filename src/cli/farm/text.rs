@@ -1,23 +1,23 @@
-//! Names and values in the files for farms: words of a shell and scalars of YAML that mean themselves, whatever is in them.
+//! Quoting of names and values as words of a shell and scalars of YAML.
 
 use std::ffi::OsStr;
 
 use crate::cli::Usage;
 
-/// A value as a text that can stand in a file. `what` is what it is of, in messages.
+/// Returns a value as text that can be written to a script. Messages call it `what`.
 pub fn plain(what: &str, value: &OsStr) -> Result<String, Usage> {
-    // What ends a line somewhere, and what YAML has no room for.
-    let is_strange =
+    // Line breaks, and characters that YAML excludes.
+    let is_excluded =
         |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}');
-    let text = value.to_str().filter(|text| !text.contains(is_strange));
+    let text = value.to_str().filter(|text| !text.contains(is_excluded));
     text.map(str::to_owned).ok_or_else(|| {
         Usage(format!(
-            "{what}: {value:?}: must be UTF-8 without line breaks and other control characters, as it stands in a script"
+            "{what}: {value:?}: must be UTF-8 without line breaks or control characters, as it is written to a script"
         ))
     })
 }
 
-/// A word of a shell. Open Job Description looks for doubled braces wherever they are: these are pulled apart.
+/// Quotes a word for a shell. Doubled braces are separated, as Open Job Description would expand them.
 pub fn word(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./:=,@%+".contains(c);
     if !text.is_empty() && text.chars().all(is_plain) {
@@ -38,9 +38,9 @@ pub fn word(text: &str) -> String {
     quoted + "'"
 }
 
-/// A scalar of YAML.
+/// Quotes a scalar of YAML.
 pub fn scalar(text: &str) -> String {
-    serde_json::Value::from(text).to_string() // every text of JSON is one of YAML
+    serde_json::Value::from(text).to_string() // every JSON string is valid YAML
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What `wgray info` tells, as its JSON has it.
+//! The JSON of `wgray info`.
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
@@ -6,34 +6,39 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use serde::Serialize;
-use wgray::device::Foreseen;
+use wgray::device::DevicePlan;
 use wgray::film::Region;
 use wgray::job::{Cut, bands};
 use wgray::pack::Packed;
-use wgray::scene::{Camera, CameraPath, Geometry, Light, Projection, Reflection, Scene, Texels, TextureKind};
+use wgray::scene::{
+    Camera, CameraPath, Geometry, Light, ModelContents, Projection, Reflection, Scene, Texels, TextureKind,
+};
 
 use super::kernel::features;
 
 type Counts = BTreeMap<&'static str, u64>;
 
-/// All of it. Angles are in degrees, memory in bytes.
+/// Everything that is printed. Angles are in degrees, memory in bytes.
 #[derive(Debug, Serialize)]
 pub struct Info {
     pub scene: String,
     pub picture: Picture,
-    pub camera: Seen,
-    /// The box around all shapes but planes: its lowest and its highest corner.
+    pub camera: CameraInfo,
+    /// Lowest and highest corner of all shapes except planes.
     pub bounds: Option<[[f64; 3]; 2]>,
     pub shapes: Shapes,
     pub materials: Kinds,
+    pub material_names: Vec<String>,
     pub textures: Vec<Textured>,
     pub lights: Lights,
+    /// The contents of glTF files.
+    pub models: Vec<ModelContents>,
     pub memory: Memory,
     pub kernel: Kernel,
     pub device: Device,
-    /// What a render warns of.
+    /// Warnings that a render prints.
     pub notes: Vec<String>,
-    /// All that the scene is made of besides its own file.
+    /// Files that the scene refers to.
     pub files: Vec<String>,
 }
 
@@ -44,29 +49,33 @@ pub struct Picture {
     pub integrator: &'static str,
     pub pixel_pattern: &'static str,
     pub pixel_samples: u32,
-    /// Under adaptive sampling the most of a pixel.
-    pub most_samples: u32,
-    /// At every hit, over all lights.
+    /// Maximum samples per pixel, which differs from `pixel_samples` under adaptive sampling.
+    pub max_samples: u32,
+    /// The same under its name up to version 0.2.
+    #[serde(rename = "most_samples")]
+    old_max_samples: u32,
+    /// Light samples per hit, over all lights.
     pub light_samples: u64,
     pub max_depth: u32,
     pub seed: u32,
 }
 
 #[derive(Debug, Serialize)]
-pub struct Seen {
+pub struct CameraInfo {
     #[serde(rename = "type")]
     pub kind: &'static str,
     pub position: [f64; 3],
     pub look_at: [f64; 3],
     pub up: [f64; 3],
-    /// Vertical, of perspective cameras.
+    /// Vertical field of view of a perspective camera.
     pub fov: Option<f64>,
-    /// Of the seen rectangle, of orthographic cameras.
+    /// Height of the view of an orthographic camera.
     pub height: Option<f64>,
-    /// The diameter of its lens, and where it is sharp.
+    /// Diameter of the lens.
     pub aperture: Option<f64>,
+    /// Distance of the focal plane.
     pub focus_distance: Option<f64>,
-    /// The first and the last frame of its path.
+    /// First and last frame of the camera's path.
     pub frames: Option<[f64; 2]>,
 }
 
@@ -93,14 +102,18 @@ impl Kinds {
 pub struct Shapes {
     #[serde(flatten)]
     pub kinds: Kinds,
-    /// Different meshes.
+    /// Distinct meshes.
     pub meshes: u64,
-    /// Their triangles, each counted once, and as often as its mesh is there.
+    /// Triangles of the distinct meshes.
     pub mesh_triangles: u64,
-    pub placed_mesh_triangles: u64,
-    /// All triangles that there are: these, and those of triangles and tetrahedra.
+    /// Triangles of all instances of meshes.
+    pub instanced_triangles: u64,
+    /// The same under its name up to version 0.2.
+    #[serde(rename = "placed_mesh_triangles")]
+    old_instanced_triangles: u64,
+    /// All triangles, with those of triangles and tetrahedra.
     pub triangles: u64,
-    /// What rays are tested with besides meshes: shapes, four triangles of a tetrahedron, and rectangles that are lights.
+    /// Primitives outside of meshes: shapes, four triangles for a tetrahedron, and rectangles of area lights.
     pub primitives: u64,
 }
 
@@ -108,7 +121,7 @@ pub struct Shapes {
 pub struct Textured {
     #[serde(rename = "type")]
     pub kind: &'static str,
-    /// Of an image.
+    /// Size of an image.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<[u32; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -119,38 +132,40 @@ pub struct Textured {
 pub struct Lights {
     #[serde(flatten)]
     pub kinds: Kinds,
-    /// What paths sample light of: these, surfaces that shine, the surroundings.
+    /// Emitters that the path tracer samples: lights, emissive surfaces, the environment.
     pub emitters: u64,
-    /// `color`, or the size of an image.
+    /// `color`, or the size of the environment map.
     pub environment: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
 pub struct Memory {
-    /// The scene as it is rendered from, all below among it.
+    /// The packed scene and the largest film.
+    pub total: u64,
+    /// The packed scene, which includes BVHs and texels.
     pub scene: u64,
     pub trees: u64,
     pub texels: u64,
-    /// The scene on the device, if it is not the CPU.
+    /// The scene on the device, unless that is the CPU.
     pub scene_on_device: Option<u64>,
-    /// The largest film at a time.
+    /// The largest film.
     pub film: u64,
-    /// In how many parts the picture is rendered.
+    /// Number of bands that the image is rendered in.
     pub bands: u64,
 }
 
 #[derive(Debug, Serialize)]
 pub struct Kernel {
-    /// Nothing is compiled for the CPU.
+    /// False for the CPU, which needs no kernel.
     pub compiled: bool,
     pub entry: Option<&'static str>,
-    /// Whether the scene is written into it as constants.
+    /// True if the scene is compiled into the kernel as constants.
     pub baked: Option<bool>,
-    /// Lines of WGSL, before what is not needed is left out.
+    /// Lines of WGSL before dead code is removed.
     pub lines: Option<usize>,
     pub uses: Vec<&'static str>,
     pub leaves_out: Vec<&'static str>,
-    /// What it takes as constant, by the names in the shaders.
+    /// Values of the shaders' overrides, by name.
     pub constants: BTreeMap<&'static str, u32>,
 }
 
@@ -164,12 +179,13 @@ pub struct Device {
 }
 
 impl Info {
-    /// Gathers it.
-    pub fn of(path: &Path, scene: &Scene, packed: &Packed, foreseen: &Foreseen) -> Info {
+    /// Gathers the facts about a scene and the device that would render it.
+    pub fn of(path: &Path, scene: &Scene, packed: &Packed, plan: &DevicePlan) -> Info {
         let whole = Region::whole(scene.width, scene.height);
         let cut = Cut::of(packed.form());
         let films: Vec<u64> = bands(whole, &cut, u64::MAX).map(|band| band.pixels()).collect();
-        let kernel = kernel(packed, foreseen);
+        let film = films.iter().max().unwrap_or(&0) * packed.form().bytes() as u64;
+        let kernel = kernel(packed, plan);
         Info {
             scene: path.display().to_string(),
             picture: Picture {
@@ -178,47 +194,51 @@ impl Info {
                 integrator: scene.render.integrator.name(),
                 pixel_pattern: scene.render.pixel_samples.pattern.name(),
                 pixel_samples: scene.render.pixel_samples.count,
-                most_samples: packed.pixel_samples,
+                max_samples: packed.pixel_samples,
+                old_max_samples: packed.pixel_samples,
                 light_samples: packed.light_samples(),
                 max_depth: scene.render.max_depth,
                 seed: scene.render.seed,
             },
-            camera: seen(&scene.camera, scene.camera_path.as_ref()),
+            camera: camera(&scene.camera, scene.camera_path.as_ref()),
             bounds: scene
                 .bounds()
                 .map(|(low, high)| [low, high].map(|corner| corner.to_array())),
             shapes: shapes(scene, packed),
             materials: Kinds::of(scene.materials.iter().map(|material| reflection(&material.reflection))),
+            material_names: scene.material_names.clone(),
             textures: scene.textures.iter().map(|texture| textured(&texture.kind)).collect(),
             lights: lights(scene, packed),
+            models: scene.models().cloned().collect(),
             memory: Memory {
+                total: packed.bytes() + film,
                 scene: packed.bytes(),
                 trees: packed.tree_bytes(),
                 texels: packed.texel_bytes(),
-                scene_on_device: scene_on_device(foreseen),
-                film: films.iter().max().unwrap_or(&0) * packed.form().bytes() as u64,
+                scene_on_device: scene_on_device(plan),
+                film,
                 bands: films.len() as u64,
             },
             kernel,
             device: Device {
-                name: foreseen.info.name.clone(),
-                driver: foreseen.info.driver.clone(),
-                backend: foreseen.info.interface.clone(),
-                why: foreseen.why.clone(),
+                name: plan.info.name.clone(),
+                driver: plan.info.driver.clone(),
+                backend: plan.info.interface.clone(),
+                why: plan.why.clone(),
             },
-            notes: scene.notes.clone(),
+            notes: scene.notes.iter().cloned().chain(scene.visibility_warnings()).collect(),
             files: scene.files.iter().map(|file| file.display().to_string()).collect(),
         }
     }
 }
 
-fn seen(camera: &Camera, path: Option<&CameraPath>) -> Seen {
+fn camera(camera: &Camera, path: Option<&CameraPath>) -> CameraInfo {
     let (kind, fov, height) = match camera.projection {
         Projection::Perspective { fov } => ("perspective", Some(fov.to_degrees()), None),
         Projection::Orthographic { height } => ("orthographic", None, Some(height)),
         Projection::Panorama => ("panorama", None, None),
     };
-    Seen {
+    CameraInfo {
         kind,
         position: camera.position.to_array(),
         look_at: camera.look_at.to_array(),
@@ -233,12 +253,12 @@ fn seen(camera: &Camera, path: Option<&CameraPath>) -> Seen {
 
 fn shapes(scene: &Scene, packed: &Packed) -> Shapes {
     let mut known = HashSet::new();
-    let (mut mesh_triangles, mut placed_mesh_triangles, mut others) = (0, 0, 0);
+    let (mut mesh_triangles, mut instanced_triangles, mut others) = (0, 0, 0);
     for shape in &scene.shapes {
         match &shape.geometry {
             Geometry::Mesh { mesh, .. } => {
                 let count = mesh.triangles.len() as u64;
-                placed_mesh_triangles += count;
+                instanced_triangles += count;
                 if known.insert(Arc::as_ptr(mesh)) {
                     mesh_triangles += count;
                 }
@@ -251,8 +271,9 @@ fn shapes(scene: &Scene, packed: &Packed) -> Shapes {
         kinds: Kinds::of(scene.shapes.iter().map(|shape| form(&shape.geometry))),
         meshes: known.len() as u64,
         mesh_triangles,
-        placed_mesh_triangles,
-        triangles: placed_mesh_triangles + others,
+        instanced_triangles,
+        old_instanced_triangles: instanced_triangles,
+        triangles: instanced_triangles + others,
         primitives: packed.primitives.len() as u64,
     }
 }
@@ -270,7 +291,7 @@ fn form(geometry: &Geometry) -> &'static str {
     }
 }
 
-/// Whether half axes are those that a sphere has, along x, y and z.
+/// Returns whether half axes are those of a sphere, along x, y and z.
 fn is_sphere(axes: &[DVec3; 3]) -> bool {
     *axes == [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * axes[0].x)
 }
@@ -321,31 +342,25 @@ fn lights(scene: &Scene, packed: &Packed) -> Lights {
         Some(image) => format!("image, {} x {} texels", image.image.width, image.image.height),
         None => "color".to_owned(),
     });
-    // Where they are many all but what is infinitely far away is one emitter, a tree.
-    let in_tree = packed
-        .light_leaves
-        .iter()
-        .filter(|leaf| **leaf != wgray::pack::NOTHING)
-        .count();
     Lights {
         kinds: Kinds::of(scene.lights.iter().map(kind)),
-        emitters: packed.emitters.len().saturating_sub(usize::from(in_tree > 0)) as u64 + in_tree as u64,
+        emitters: packed.emitter_count(),
         environment,
     }
 }
 
 #[cfg(feature = "gpu")]
-fn scene_on_device(foreseen: &Foreseen) -> Option<u64> {
-    let (_, foreseen) = foreseen.adapter.as_ref()?;
-    Some(foreseen.scene_bytes)
+fn scene_on_device(plan: &DevicePlan) -> Option<u64> {
+    let (_, kernel) = plan.adapter.as_ref()?;
+    Some(kernel.scene_bytes)
 }
 
 #[cfg(not(feature = "gpu"))]
-fn scene_on_device(_: &Foreseen) -> Option<u64> {
+fn scene_on_device(_: &DevicePlan) -> Option<u64> {
     None
 }
 
-fn kernel(packed: &Packed, foreseen: &Foreseen) -> Kernel {
+fn kernel(packed: &Packed, plan: &DevicePlan) -> Kernel {
     let features = features(packed);
     let those = |wanted: bool| {
         let all = features.iter().filter(move |(_, has)| *has == wanted);
@@ -360,24 +375,24 @@ fn kernel(packed: &Packed, foreseen: &Foreseen) -> Kernel {
         leaves_out: those(false),
         constants: packed.specialization.constants().into_iter().collect(),
     };
-    with_adapter(plain, foreseen)
+    with_adapter(plain, plan)
 }
 
 #[cfg(feature = "gpu")]
-fn with_adapter(plain: Kernel, foreseen: &Foreseen) -> Kernel {
-    match &foreseen.adapter {
+fn with_adapter(plain: Kernel, plan: &DevicePlan) -> Kernel {
+    match &plan.adapter {
         None => plain,
-        Some((_, foreseen)) => Kernel {
+        Some((_, kernel)) => Kernel {
             compiled: true,
-            entry: Some(foreseen.entry),
-            baked: Some(foreseen.baked),
-            lines: Some(foreseen.lines),
+            entry: Some(kernel.entry),
+            baked: Some(kernel.baked),
+            lines: Some(kernel.lines),
             ..plain
         },
     }
 }
 
 #[cfg(not(feature = "gpu"))]
-fn with_adapter(plain: Kernel, _: &Foreseen) -> Kernel {
+fn with_adapter(plain: Kernel, _: &DevicePlan) -> Kernel {
     plain
 }

@@ -1,12 +1,11 @@
-//! What a kernel is compiled for, in words.
+//! Names of the features that a kernel is compiled with.
 
 use wgray::pack::{
-    BACKGROUND, IMAGE_AROUND, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, LOBE_TRANSMISSION, Packed,
-    Specialization,
+    BACKGROUND, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, LOBE_TRANSMISSION, Packed, Specialization,
 };
 use wgray::scene::Integrator;
 
-/// All that a scene's kernel may have, with whether this one has it.
+/// Returns all features of kernels, each with whether the scene uses it.
 pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
     let Specialization {
         in_tree,
@@ -36,17 +35,17 @@ pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
     } = packed.specialization;
     let is_path = packed.integrator == Integrator::Path;
     let mut all = vec![
-        ("trees of boxes", in_tree != 0),
+        ("BVH", in_tree != 0),
         ("lens", lens != 0),
         ("panorama", panoramic != 0),
-        ("things hidden from the camera", hidden != 0),
-        ("filter", filter_bins != 0),
+        ("camera-invisible materials", hidden != 0),
+        ("pixel filter", filter_bins != 0),
         ("adaptive sampling", packed.adaptive),
         ("textures", lookups + specular_lookups != 0),
-        ("footprints of rays", differentials != 0),
+        ("ray differentials", differentials != 0),
         ("normal maps", normal_maps != 0),
-        ("further texture coordinates", uv_sets != 0),
-        ("colours of vertices", vertex_colors != 0),
+        ("several UV sets", uv_sets != 0),
+        ("vertex colors", vertex_colors != 0),
     ];
     if !is_path {
         all.push(("mirrors and glass", bounces != 0));
@@ -58,16 +57,16 @@ pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
         ("anisotropy", anisotropic != 0 || lobe(LOBE_ANISOTROPY)),
         ("specular lobe", lobe(LOBE_SPECULAR)),
         ("transmission", lobe(LOBE_TRANSMISSION)),
-        ("clear coat", lobe(LOBE_COAT)),
+        ("clearcoat", lobe(LOBE_COAT)),
         ("sheen", lobe(LOBE_SHEEN)),
-        ("alpha of surfaces", sees_through != 0),
+        ("alpha", sees_through != 0),
         ("absorption", absorption != 0),
-        ("surfaces that shine", shines != 0),
-        ("textures that shine", emission_textures != 0),
-        ("tree of lights", light_tree != 0),
-        ("image around the scene", surroundings & IMAGE_AROUND != 0),
-        ("background of its own", surroundings & BACKGROUND != 0),
-        ("clamped indirect light", most_indirect != 0),
+        ("emissive surfaces", shines != 0),
+        ("emissive textures", emission_textures != 0),
+        ("light tree", light_tree != 0),
+        ("environment map", packed.specialization.has_environment_map()),
+        ("separate background", surroundings & BACKGROUND != 0),
+        ("clamp", most_indirect != 0),
         ("transparent background", alpha != 0),
     ]);
     all

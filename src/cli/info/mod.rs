@@ -1,4 +1,4 @@
-//! `wgray info`: what is in a scene, and what would render it. Nothing is rendered.
+//! `wgray info`: prints the contents of a scene, its memory use and the device that would render it.
 
 mod gather;
 mod kernel;
@@ -10,7 +10,7 @@ use std::process::ExitCode;
 
 use clap::ValueHint;
 use clap::builder::NonEmptyStringValueParser;
-use wgray::device::{Device, foresee};
+use wgray::device::{Device, plan_device};
 use wgray::pack::pack;
 use wgray::scene::{Define, Overrides};
 use wgray::visible::visible_lines;
@@ -25,27 +25,31 @@ pub struct Args {
     /// Scene file: .toml, .gltf or .glb, .json
     scene: PathBuf,
 
-    /// Prints one JSON object in place of the table
+    /// Print one JSON object
     #[arg(long)]
     json: bool,
 
-    /// Size of the picture in pixels, in place of the scene's
+    /// Print sampling, memory, kernel and driver details too
+    #[arg(short, long)]
+    verbose: bool,
+
+    /// Set the image size in pixels
     #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
     size: Option<(u32, u32)>,
 
-    /// Samples of every pixel, in place of the scene's
+    /// Set the number of samples per pixel
     #[arg(long, visible_alias = "spp", value_name = "N")]
     pixel_samples: Option<u32>,
 
-    /// What would render, as of wgray render
+    /// Choose the device, as for wgray render
     #[arg(long, value_name = "auto|gpu|cpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
     device: String,
 
-    /// Folder that files named by the scene must lie in, in place of the scene's own
+    /// Allow the files of the scene to lie anywhere in DIR instead of only in the scene's own folder
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 
-    /// Puts a value in place of the scene's: -D render.integrator=path
+    /// Override a scene value: -D render.integrator=path
     #[arg(short = 'D', long, value_name = "KEY=VALUE")]
     define: Vec<Define>,
 
@@ -63,11 +67,11 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     });
     let scene = super::load(&args.scene, &overrides)?;
     let packed = pack(&scene);
-    let foreseen = foresee(&packed, &Device::from(args.device.as_str()))?;
-    let info = Info::of(&args.scene, &scene, &packed, &foreseen);
+    let plan = plan_device(&packed, &Device::from(args.device.as_str()))?;
+    let info = Info::of(&args.scene, &scene, &packed, &plan);
     let text = match args.json {
         true => format!("{}\n", serde_json::to_string_pretty(&info)?),
-        false => visible_lines(&show::table(&info)).into_owned(),
+        false => visible_lines(&show::table(&info, args.verbose)).into_owned(),
     };
     Ok(super::ended(
         io::stdout().lock().write_all(text.as_bytes()),

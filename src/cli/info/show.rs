@@ -1,152 +1,231 @@
-//! What `wgray info` tells, as a table.
+//! The text of `wgray info`: a table with a row for each topic.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use wgray::scene::ModelContents;
+
 use super::gather::{Info, Kinds, Textured};
 
-/// So many images and notes are listed by themselves.
-const MOST: usize = 20;
+/// Maximum number of images, names and notes in a list.
+const MAX_LISTED: usize = 20;
 
-/// A line for each thing, and one below it for what is more of it.
-pub fn table(info: &Info) -> String {
-    let mut out = format!("{}\n", info.scene);
-    let mut row = |name: &str, text: &str| {
+/// A table under construction.
+struct Table(String);
+
+impl Table {
+    /// Adds a row; an empty name continues the row above.
+    fn row(&mut self, name: &str, text: &str) {
         // Writing to a String cannot fail.
-        let _ = writeln!(out, "    {name:<12}{text}");
-    };
-    let picture = &info.picture;
-    let most = match picture.most_samples {
-        most if most != picture.pixel_samples => format!(", up to {most}"),
+        let _ = writeln!(self.0, "    {name:<12}{text}");
+    }
+}
+
+/// Returns the table: what users need, and with `verbose` what developers need.
+pub fn table(info: &Info, verbose: bool) -> String {
+    let mut table = Table(format!("{}\n", info.scene));
+    image(&mut table, info, verbose);
+    table.row("camera", &camera(info));
+    table.row("bounds", &bounds(info));
+    shapes(&mut table, info, verbose);
+    table.row("materials", &materials(info));
+    table.row("textures", &textures(&info.textures));
+    lights(&mut table, info, verbose);
+    info.models.iter().for_each(|model| contents(&mut table, model));
+    memory(&mut table, info, verbose);
+    if verbose {
+        kernel(&mut table, info);
+    }
+    let device = &info.device;
+    table.row("device", &format!("{}: {}", device.name, device.why));
+    if verbose {
+        table.row("", &device.driver);
+        for file in &info.files {
+            table.row("file", file);
+        }
+    }
+    for note in info.notes.iter().take(MAX_LISTED) {
+        table.row("warning", note);
+    }
+    if info.notes.len() > MAX_LISTED {
+        table.row("", &format!("and {} more", info.notes.len() - MAX_LISTED));
+    }
+    table.0
+}
+
+fn image(table: &mut Table, info: &Info, verbose: bool) {
+    let image = &info.picture;
+    let max = match image.max_samples {
+        max if max != image.pixel_samples => format!(", up to {max}"),
         _ => String::new(),
     };
-    let samples = format!(
-        "{} samples each ({}){most}, {} of light",
-        picture.pixel_samples, picture.pixel_pattern, picture.light_samples
+    let samples = format!("{} per pixel{max}", count(image.pixel_samples.into(), "sample"));
+    table.row(
+        "image",
+        &format!("{} x {} pixels, {samples}", image.width, image.height),
     );
-    row(
-        "picture",
-        &format!("{} x {} pixels, {samples}", picture.width, picture.height),
-    );
-    row(
-        "light",
+    table.row(
+        "integrator",
         &format!(
-            "{}, up to {} bounces, seed {}",
-            picture.integrator, picture.max_depth, picture.seed
+            "{}, up to {}",
+            image.integrator,
+            count(image.max_depth.into(), "bounce")
         ),
     );
-    row("camera", &camera(info));
-    row(
-        "bounds",
-        &match &info.bounds {
-            Some([low, high]) => format!("{} to {}", point(low), point(high)),
-            None => "none: there is nothing but planes, or nothing at all".to_owned(),
-        },
-    );
-    row("shapes", &kinds(&info.shapes.kinds));
-    let shapes = &info.shapes;
-    if shapes.meshes > 0 {
-        let (meshes, triangles) = (shapes.meshes, shapes.mesh_triangles);
-        row(
-            "meshes",
-            &format!(
-                "{meshes} different, of {triangles} triangles; {} with all their copies",
-                shapes.placed_mesh_triangles
-            ),
+    if verbose {
+        let lights = count(image.light_samples, "light sample");
+        table.row(
+            "sampling",
+            &format!("pattern {}, {lights} per hit, seed {}", image.pixel_pattern, image.seed),
         );
     }
-    let lit = info.lights.kinds.by_type.get("rectangle");
-    let more = [
-        lit.map(|count| format!("rectangles of lights among them, {count}")),
-        (shapes.meshes > 0).then(|| "meshes not".to_owned()),
-    ];
-    let more: Vec<String> = more.into_iter().flatten().collect();
-    row(
-        "primitives",
-        &match more.is_empty() {
-            true => shapes.primitives.to_string(),
-            false => format!("{}: {}", shapes.primitives, more.join("; ")),
-        },
-    );
-    row("materials", &kinds(&info.materials));
-    row("textures", &textures(&info.textures));
-    let lights = &info.lights;
-    let around = lights
-        .environment
-        .as_ref()
-        .map(|text| format!("; around the scene: {text}"));
-    let sampled = match lights.emitters {
-        0 => String::new(),
-        count => format!("; light is sampled of {count}"),
-    };
-    row(
-        "lights",
-        &format!("{}{sampled}{}", kinds(&lights.kinds), around.unwrap_or_default()),
-    );
-    let memory = &info.memory;
-    let [scene, trees, texels, film] = [memory.scene, memory.trees, memory.texels, memory.film].map(mebibytes);
-    row(
-        "memory",
-        &format!("{scene} for the scene: {trees} of trees, {texels} of texels"),
-    );
-    let bands = match memory.bands {
-        0 | 1 => String::new(),
-        count => format!(" at a time, for {count} parts of the picture"),
-    };
-    row("", &format!("{film} for the film{bands}"));
-    if let Some(bytes) = memory.scene_on_device {
-        row("", &format!("{} for the scene on the device", mebibytes(bytes)));
-    }
-    let kernel = &info.kernel;
-    let list = |names: &[&str]| match names {
-        [] => "nothing of these".to_owned(),
-        names => names.join(", "),
-    };
-    row(
-        "kernel",
-        &match (kernel.entry, kernel.lines, kernel.baked) {
-            (Some(entry), Some(lines), Some(baked)) => {
-                let form = if baked {
-                    "the scene as constants"
-                } else {
-                    "the scene in buffers"
-                };
-                format!("{entry}, {lines} lines of WGSL, with {form}")
-            }
-            _ => "none is compiled: the CPU has all".to_owned(),
-        },
-    );
-    row("", &format!("uses {}", list(&kernel.uses)));
-    row("", &format!("leaves out {}", list(&kernel.leaves_out)));
-    let device = &info.device;
-    row("device", &format!("{}: {}", device.name, device.why));
-    row("", &device.driver);
-    for note in info.notes.iter().take(MOST) {
-        row("note", note);
-    }
-    if info.notes.len() > MOST {
-        row("", &format!("and {} more", info.notes.len() - MOST));
-    }
-    out
 }
 
 fn camera(info: &Info) -> String {
     let camera = &info.camera;
     let (position, look_at) = (point(&camera.position), point(&camera.look_at));
-    let mut text = format!("{}, at {position}, looks at {look_at}", camera.kind);
+    let mut text = format!("{} at {position}, looking at {look_at}", camera.kind);
     if let Some(fov) = camera.fov {
-        let _ = write!(text, ", {} degrees high", short(fov));
+        let _ = write!(text, ", vertical field of view {} degrees", short(fov));
     }
     if let Some(height) = camera.height {
-        let _ = write!(text, ", {} high", short(height));
+        let _ = write!(text, ", height {}", short(height));
     }
     if let (Some(aperture), Some(focus)) = (camera.aperture, camera.focus_distance) {
-        let _ = write!(text, "; a lens {} wide, sharp at {}", short(aperture), short(focus));
+        let _ = write!(text, "; lens {} wide, focused at {}", short(aperture), short(focus));
     }
     if let Some([first, last]) = camera.frames {
-        let _ = write!(text, "; it moves from frame {first} to {last}");
+        let _ = write!(text, "; moves from frame {first} to {last}");
     }
     text
+}
+
+fn bounds(info: &Info) -> String {
+    let Some([low, high]) = &info.bounds else {
+        return "none (no shapes other than planes)".to_owned();
+    };
+    let size = [0, 1, 2].map(|axis| short(high[axis] - low[axis]).to_string());
+    format!("{} to {}, size {}", point(low), point(high), size.join(" x "))
+}
+
+fn shapes(table: &mut Table, info: &Info, verbose: bool) {
+    let shapes = &info.shapes;
+    table.row("shapes", &kinds(&shapes.kinds));
+    if shapes.meshes > 0 {
+        let instanced = match shapes.instanced_triangles {
+            all if all == shapes.mesh_triangles => String::new(),
+            all => format!("; {all} including instances"),
+        };
+        let triangles = count(shapes.mesh_triangles, "triangle");
+        table.row("meshes", &format!("{} with {triangles}{instanced}", shapes.meshes));
+    }
+    if verbose {
+        let lights = info.lights.kinds.by_type.get("rectangle");
+        let lights = lights.map_or(String::new(), |n| format!(", including {}", count(*n, "area light")));
+        table.row("primitives", &format!("{}{lights}", shapes.primitives));
+    }
+}
+
+fn materials(info: &Info) -> String {
+    match info.material_names.as_slice() {
+        [] => kinds(&info.materials),
+        names => format!(
+            "{} ({})",
+            kinds(&info.materials),
+            list(names.iter().map(|name| Some(name.as_str())), false)
+        ),
+    }
+}
+
+fn lights(table: &mut Table, info: &Info, verbose: bool) {
+    let lights = &info.lights;
+    table.row("lights", &kinds(&lights.kinds));
+    if let Some(environment) = &lights.environment {
+        table.row("environment", environment);
+    }
+    if verbose && lights.emitters > 0 {
+        table.row("emitters", &format!("{} sampled by the path tracer", lights.emitters));
+    }
+}
+
+/// Adds what can be selected in a glTF file, with the numbers and names that options accept.
+fn contents(table: &mut Table, model: &ModelContents) {
+    table.row("glTF file", &model.file);
+    let ModelContents {
+        scenes,
+        cameras,
+        animations,
+        variants,
+        materials,
+        images,
+        ..
+    } = model;
+    let lists = [
+        ("scenes", scenes),
+        ("cameras", cameras),
+        ("animations", animations),
+        ("variants", variants),
+        ("materials", materials),
+        ("images", images),
+    ];
+    for (name, names) in lists {
+        if !names.is_empty() {
+            let listed = list(names.iter().map(Option::as_deref), true);
+            table.row("", &format!("{name:<11}{}: {listed}", names.len()));
+        }
+    }
+}
+
+fn memory(table: &mut Table, info: &Info, verbose: bool) {
+    let memory = &info.memory;
+    let [total, scene, bvhs, texels, film] =
+        [memory.total, memory.scene, memory.trees, memory.texels, memory.film].map(mebibytes);
+    table.row("memory", &format!("{total} (scene {scene}, film {film})"));
+    if !verbose {
+        return;
+    }
+    table.row("", &format!("scene: {bvhs} of BVHs, {texels} of texels"));
+    if memory.bands > 1 {
+        table.row("", &format!("film: one of {} bands at a time", memory.bands));
+    }
+    if let Some(bytes) = memory.scene_on_device {
+        table.row("", &format!("scene on the device: {}", mebibytes(bytes)));
+    }
+}
+
+fn kernel(table: &mut Table, info: &Info) {
+    let kernel = &info.kernel;
+    let features = |names: &[&str]| match names {
+        [] => "none".to_owned(),
+        names => names.join(", "),
+    };
+    table.row(
+        "kernel",
+        &match (kernel.entry, kernel.lines, kernel.baked) {
+            (Some(entry), Some(lines), Some(baked)) => {
+                let form = if baked { "constants" } else { "buffers" };
+                format!("{entry}, {lines} lines of WGSL, scene in {form}")
+            }
+            _ => "none (the CPU compiles no kernel)".to_owned(),
+        },
+    );
+    table.row("", &format!("features: {}", features(&kernel.uses)));
+    table.row("", &format!("unused: {}", features(&kernel.leaves_out)));
+}
+
+/// Returns the first names of a list, numbered if options accept the numbers.
+fn list<'a>(names: impl ExactSizeIterator<Item = Option<&'a str>>, numbered: bool) -> String {
+    let more = names.len().saturating_sub(MAX_LISTED);
+    let one = |(i, name): (usize, Option<&str>)| match (name, numbered) {
+        (Some(name), true) => format!("{i} {name:?}"),
+        (Some(name), false) => name.to_owned(),
+        (None, _) => format!("{i} (unnamed)"),
+    };
+    let mut listed: Vec<String> = names.enumerate().take(MAX_LISTED).map(one).collect();
+    if more > 0 {
+        listed.push(format!("and {more} more"));
+    }
+    listed.join(", ")
 }
 
 fn kinds(kinds: &Kinds) -> String {
@@ -165,7 +244,7 @@ fn textures(textures: &[Textured]) -> String {
     let mut by_kind: BTreeMap<String, u64> = BTreeMap::new();
     for texture in textures {
         let name = match (texture.size, texture.texels) {
-            (Some([width, height]), Some(texels)) => format!("image of {width} x {height} ({texels})"),
+            (Some([width, height]), Some(texels)) => format!("image {width} x {height} ({texels})"),
             _ => texture.kind.to_owned(),
         };
         *by_kind.entry(name).or_default() += 1;
@@ -175,14 +254,18 @@ fn textures(textures: &[Textured]) -> String {
     }
     let listed: Vec<String> = by_kind
         .iter()
-        .take(MOST)
+        .take(MAX_LISTED)
         .map(|(name, count)| format!("{count} {name}"))
         .collect();
-    let more = match by_kind.len().saturating_sub(MOST) {
+    let more = match by_kind.len().saturating_sub(MAX_LISTED) {
         0 => String::new(),
         more => format!(" and {more} more kinds"),
     };
     format!("{}: {}{more}", textures.len(), listed.join(", "))
+}
+
+fn count(n: u64, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
 fn point(point: &[f64; 3]) -> String {
@@ -190,14 +273,14 @@ fn point(point: &[f64; 3]) -> String {
     format!("[{}]", numbers.join(", "))
 }
 
-/// With six digits.
+/// Returns a number rounded to six digits.
 fn short(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x)
 }
 
 fn mebibytes(bytes: u64) -> String {
     match bytes {
-        0 => "nothing".to_owned(),
+        0 => "0".to_owned(),
         bytes if bytes < 1 << 20 => format!("{:.1} KiB", bytes as f64 / 1024.0),
         bytes => format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20)),
     }

@@ -1,43 +1,42 @@
-//! What the manual pages say besides what the help says.
+//! Texts of the manual pages beyond the help.
 
-/// What a scene is.
+/// The section on scenes.
 pub const SCENES: &str = "\
-A scene is a TOML file, a glTF file (.gltf, .glb), or a JSON file of a course on path tracing. The manual of the format, \
-docs/scene-format.md, documents every key; wgray schema prints a JSON Schema by which editors complete and check the keys; \
-wgray check says whether a file is sound.
+A scene is a TOML file, a glTF file (.gltf, .glb), or a JSON file of a course on path tracing. docs/scene-format.md \
+documents every key; wgray schema prints a JSON Schema for editors; wgray check validates files.
 
-Files that a scene names lie in its folder or below, unless --asset-root names another one.";
+The files that a scene refers to must lie in its folder or below, unless --asset-root names another folder.";
 
-/// Variables of the environment that the program, or what it is made of, reads; with the commands that do.
+/// Environment variables that the program or its libraries read, each with the commands that do.
 pub const ENVIRONMENT: &[(&str, &str, &[&str])] = &[
     (
         "VK_DRIVER_FILES",
-        "Read by the Vulkan loader: the drivers that it looks for, in place of all that are installed.",
+        "Read by the Vulkan loader: the drivers to use instead of all installed ones.",
         DEVICES,
     ),
     (
         "WGPU_BACKEND",
-        "Which interfaces to drivers are asked: vulkan, metal or dx12, with commas between.",
+        "Graphics APIs to use: vulkan, metal or dx12, separated by commas.",
         DEVICES,
     ),
     (
         "LP_NUM_THREADS",
-        "Read by Mesa's software Vulkan: its threads. --threads sets it.",
+        "Read by Mesa's software Vulkan: number of threads. --threads sets it.",
         DEVICES,
     ),
     (
         "MESA_SHADER_CACHE_DIR",
-        "Read by Mesa: the folder in which compiled kernels are kept, so that the next render need not wait for them.",
+        "Read by Mesa: the cache folder of compiled kernels, which later renders reuse.",
         DEVICES,
     ),
     (
         "XDG_RUNTIME_DIR",
-        "Read by Mesa. Where it is not set the program sets it to the folder of temporary files, as Mesa complains otherwise.",
+        "Read by Mesa, which prints a warning if it is not set; the program then sets it to the folder of temporary files.",
         DEVICES,
     ),
     (
         "RAYON_NUM_THREADS",
-        "Threads of the CPU, if --threads does not say; all that there are if absent.",
+        "Number of CPU threads unless --threads is given; by default all.",
         &[
             "wgray-render",
             "wgray-check",
@@ -47,10 +46,10 @@ pub const ENVIRONMENT: &[(&str, &str, &[&str])] = &[
             "wgray-convert",
         ],
     ),
-    ("NO_COLOR", "If it is set, messages have no colours.", &["wgray-dev"]),
+    ("NO_COLOR", "Disables colors in messages.", &["wgray-dev"]),
 ];
 
-/// The commands that look for devices.
+/// Commands that use devices.
 const DEVICES: &[&str] = &[
     "wgray-render",
     "wgray-devices",
@@ -60,32 +59,32 @@ const DEVICES: &[&str] = &[
     "wgray-dev",
 ];
 
-/// Files that are written.
+/// Output files.
 pub const FILES: &[(&str, &str)] = &[
     (
         "NAME.png, NAME.exr, NAME.jpg, NAME.webp",
-        "Pictures. One appears when it is whole: until then a hidden file beside it, .wgray-*, is written, of which nothing is left.",
+        "Images. A file appears when it is complete; until then a hidden temporary file, .wgray-*, is written beside it.",
     ),
     (
         "NAME.checkpoint",
-        "What --checkpoint keeps of an unfinished picture, under any name, or one of its own in a folder; --resume goes on from it. It remains after success.",
+        "Progress of an unfinished image, written by --checkpoint under any name; --resume continues from it. It remains after success.",
     ),
     (
         "NAME.part",
-        "A part of a picture, of --tile, under any name; wgray merge joins parts.",
+        "A part of an image, written by --tile under any name; wgray merge joins parts.",
     ),
 ];
 
-/// A line to type.
+/// An example command.
 pub struct Example {
-    /// What it does.
+    /// Purpose.
     pub what: &'static str,
-    /// With the program's name in front.
+    /// The whole command line.
     pub line: &'static str,
 }
 
 impl Example {
-    /// Whether it is one of this command, `wgray-render`; the program's own page has the first of each.
+    /// Returns whether the example belongs on the page of a command, such as `wgray-render`. The program's page has a selection.
     pub fn of(&self, command: &str) -> bool {
         match command {
             "wgray" => PROGRAM.contains(&self.line),
@@ -97,94 +96,94 @@ impl Example {
     }
 }
 
-/// Those that the program's own page shows.
+/// Examples on the program's page.
 const PROGRAM: &[&str] = &[
-    "wgray render model.glb -o picture.png",
+    "wgray render model.glb -o image.png",
     "wgray check scene.toml",
     "wgray devices",
 ];
 
-/// All of them.
+/// All examples.
 pub const EXAMPLES: &[Example] = &[
     Example {
-        what: "A model of another program, in a neutral studio if it has no lights:",
-        line: "wgray render model.glb -o picture.png",
+        what: "Render a model, in a neutral studio if it has no lights:",
+        line: "wgray render model.glb -o image.png",
     },
     Example {
-        what: "Linear light with layers, of another size and with more samples:",
-        line: "wgray render scene.toml --size 1920x1200 --spp 64 -o picture.exr --aov normal,depth",
+        what: "Render linear values with layers, at another size and with more samples:",
+        line: "wgray render scene.toml --size 1920x1200 --spp 64 -o image.exr --aov normal,depth",
     },
     Example {
-        what: "Frames of a camera that moves, those that are not there yet:",
+        what: "Render the missing frames of an animation:",
         line: "wgray render scene.toml --frames 1-100 -o 'out.####.png' --skip-existing",
     },
     Example {
-        what: "A long render that goes on after any end:",
+        what: "Render for a long time, and resume after any interruption:",
         line: "wgray render scene.toml --spp 4096 --checkpoint scene.checkpoint --resume",
     },
     Example {
-        what: "The second of four parts of a picture:",
+        what: "Render the second of four parts of an image:",
         line: "wgray render scene.toml --tile 2/4 -o 2.part",
     },
     Example {
-        what: "Messages that a program reads, one JSON object a line:",
+        what: "Print messages as one JSON object per line:",
         line: "wgray render scene.toml --log-format json",
     },
     Example {
-        what: "Whether a scene is sound:",
+        what: "Validate a scene:",
         line: "wgray check scene.toml",
     },
     Example {
-        what: "What is in a scene, and what would render it:",
+        what: "Print the contents of a scene and the device that would render it:",
         line: "wgray info scene.toml",
     },
     Example {
-        what: "The same for a program:",
+        what: "Print the same as JSON:",
         line: "wgray info scene.toml --json",
     },
     Example {
-        what: "Four parts to a picture:",
-        line: "wgray merge 1.part 2.part 3.part 4.part -o picture.exr",
+        what: "Join four parts:",
+        line: "wgray merge 1.part 2.part 3.part 4.part -o image.exr",
     },
     Example {
-        what: "A template of Open Job Description, of 16 parts that it joins:",
-        line: "wgray farm openjd scene.toml -o picture.exr --tiles 16",
+        what: "Write a template for Open Job Description that renders 16 parts and joins them:",
+        line: "wgray farm openjd scene.toml -o image.exr --tiles 16",
     },
     Example {
-        what: "Scripts of Slurm, with parts that take some five minutes each:",
-        line: "wgray farm slurm scene.toml -o picture.exr --task-time 5m",
+        what: "Write Slurm scripts with parts of about five minutes each:",
+        line: "wgray farm slurm scene.toml -o image.exr --task-time 5m",
     },
     Example {
-        what: "A scene to edit that renders the same bits as a model:",
+        what: "Write a scene to edit that renders the same bits as a model:",
         line: "wgray convert model.glb -o scene.toml",
     },
     Example {
-        what: "Whether two pictures differ by more than can be seen:",
+        what: "Check whether two images differ visibly:",
         line: "wgray diff new.png golden.png --fail flip=0.01 --out differences.png",
     },
     Example {
-        what: "What there is to render on:",
+        what: "List the devices:",
         line: "wgray devices",
     },
     Example {
-        what: "The JSON Schema of scene files, as a file for an editor:",
+        what: "Write the JSON Schema of scene files for an editor:",
         line: "wgray schema > wgray.schema.json",
     },
     Example {
-        what: "Completions of the command line for bash:",
+        what: "Print completions for bash:",
         line: "wgray completions bash",
     },
     Example {
-        what: "A page to read:",
+        what: "Read a page:",
         line: "wgray man render | man -l -",
     },
     Example {
-        what: "All pages as files:",
+        what: "Write all pages:",
         line: "wgray man -o man1",
     },
     #[cfg(feature = "dev")]
     Example {
-        what: "A scene on a web page that follows every save:",
+        what: "Show a scene on a web page that updates after every save:",
         line: "wgray dev scene.toml",
     },
 ];

@@ -1,4 +1,4 @@
-//! Reading picture files: which kind of file it is is told by its first bytes, not by its name.
+//! Image file decoding. The format is detected from the first bytes, not from the name.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read as _, Seek, SeekFrom};
@@ -11,86 +11,86 @@ use super::{Channel, Kind, Picture, Plane};
 use crate::memory::fallible;
 use crate::waiting;
 
-/// What a decoder may take beside the picture, in bytes.
+/// Memory limit of a decoder in addition to the image, in bytes.
 const BESIDE: usize = 64 << 20;
 
-/// The most pixels that a byte of a JPEG can stand for: each block of 8 x 8 takes a bit, and covers up to 32 x 32 pixels.
-const PIXELS_OF_JPEG: u64 = 8 * 32 * 32;
+/// Maximum pixels per byte of a JPEG: each block of 8 x 8 takes a bit at least, and covers up to 32 x 32 pixels.
+const MAX_JPEG_PIXELS_PER_BYTE: u64 = 8 * 32 * 32;
 
-/// The most bytes that a picture's values take, and how many more they may take for a byte of its file: a small file may be a picture
-/// of 65,536 x 65,536 zeros.
-const LARGEST: (u64, u64) = (1 << 30, 256);
+/// Maximum bytes of an image's values, and the bytes allowed in addition per byte of its file: a small file can describe
+/// 65,536 x 65,536 zeros.
+const MAX_BYTES: (u64, u64) = (1 << 30, 256);
 
-/// Why there is no picture.
+/// Why a file cannot be read as an image.
 #[derive(Debug, thiserror::Error)]
 pub enum Unreadable {
     /// The file cannot be opened or read.
-    // Its text is in the message, so it is not named as the source, and is told once.
+    // Not marked as the source, since its text is in the message already.
     #[error("cannot be read: {0}")]
     Io(io::Error),
-    /// It is a folder.
-    #[error("is a folder; a picture is a file")]
+    /// The path is a directory.
+    #[error("is a directory, not an image file")]
     Folder,
-    /// There are no bytes.
+    /// The file is empty.
     #[error("is empty")]
     Empty,
-    /// Its first bytes are those of no such file.
-    #[error("is no picture: it must be a PNG, EXR, JPEG, WebP or Radiance HDR file")]
+    /// The first bytes match no known format.
+    #[error("is not an image: it must be a PNG, EXR, JPEG, WebP or Radiance HDR file")]
     Format,
-    /// It is a picture, but not a sound one.
-    #[error("is damaged or cut short: {0}")]
+    /// The image is damaged.
+    #[error("is damaged or truncated: {0}")]
     Damaged(String),
-    /// It is a picture of a kind that is not read.
-    #[error("is of a kind that is not read: {0}")]
+    /// The format variant is not supported.
+    #[error("is not supported: {0}")]
     Kind(String),
-    /// It has more pixels than are taken here.
-    #[error("has {width} x {height} pixels; they must be at most {most}")]
+    /// The image has too many pixels.
+    #[error("has {width} x {height} pixels; the limit is {most} pixels")]
     Pixels {
         /// Columns.
         width: u64,
         /// Rows.
         height: u64,
-        /// How many there may be.
+        /// Maximum number of pixels.
         most: u64,
     },
-    /// It takes far more memory than its file has bytes.
+    /// The image takes far more memory than its file has bytes.
     #[error(
-        "has {width} x {height} pixels, which take {bytes} bytes; of a file of {length} bytes they must take at most {most}"
+        "has {width} x {height} pixels, which take {bytes} bytes; the limit for a file of {length} bytes is {most} bytes"
     )]
     Large {
         /// Columns.
         width: u64,
         /// Rows.
         height: u64,
-        /// What its values take.
+        /// Bytes of its values.
         bytes: u64,
-        /// The bytes of the file.
+        /// Bytes of the file.
         length: u64,
-        /// What they may take.
+        /// Maximum bytes of the values.
         most: u64,
     },
-    /// It does not fit memory.
-    #[error("does not fit memory: {width} x {height} pixels take {bytes} bytes")]
+    /// The image does not fit into memory.
+    #[error("does not fit into memory: {width} x {height} pixels take {bytes} bytes")]
     Memory {
         /// Columns.
         width: u64,
         /// Rows.
         height: u64,
-        /// What its values take.
+        /// Bytes of its values.
         bytes: u64,
     },
 }
 
-/// What pictures are read from.
+/// A source of image bytes.
 pub(super) trait Source: BufRead + Seek {}
 impl<T: BufRead + Seek> Source for T {}
 
 impl Picture {
-    /// Reads a picture; `-` is standard input.
+    /// Reads an image; `-` is standard input.
     ///
     /// # Errors
     ///
-    /// What is no picture, and why.
+    /// [`Unreadable`], with the reason.
     pub fn read(path: &Path) -> Result<Picture, Unreadable> {
         if path.as_os_str() == "-" {
             let mut bytes = Vec::new();
@@ -104,7 +104,7 @@ impl Picture {
             return Err(Unreadable::Folder);
         }
         if !data.is_file() {
-            // a pipe: what decodes pictures goes back and forth
+            // Decoders seek, which pipes cannot.
             let mut bytes = Vec::new();
             file.read_to_end(&mut bytes)?;
             return Picture::decode(bytes, u64::MAX);
@@ -116,7 +116,7 @@ impl Picture {
     ///
     /// # Errors
     ///
-    /// What is no picture, and why.
+    /// [`Unreadable`], with the reason.
     pub fn decode(bytes: Vec<u8>, most_pixels: u64) -> Result<Picture, Unreadable> {
         decode(&mut Cursor::new(bytes), most_pixels)
     }
@@ -152,7 +152,7 @@ pub(super) fn check(
         });
     }
     let bytes = width.saturating_mul(height).saturating_mul(bytes_of_pixel);
-    let most = LARGEST.0.saturating_add(length.saturating_mul(LARGEST.1));
+    let most = MAX_BYTES.0.saturating_add(length.saturating_mul(MAX_BYTES.1));
     match bytes <= most {
         true => Ok(()),
         false => Err(Unreadable::Large {
@@ -311,7 +311,9 @@ fn other(source: &mut dyn Source, format: ImageFormat, most_pixels: u64) -> Resu
     if width == 0 || height == 0 {
         return Err(Unreadable::Damaged("it has no pixels".to_owned()));
     }
-    if format == ImageFormat::Jpeg && length.saturating_mul(PIXELS_OF_JPEG) < u64::from(width) * u64::from(height) {
+    if format == ImageFormat::Jpeg
+        && length.saturating_mul(MAX_JPEG_PIXELS_PER_BYTE) < u64::from(width) * u64::from(height)
+    {
         return Err(Unreadable::Damaged(format!(
             "its header says {width} x {height} pixels, and {length} bytes cannot hold them"
         )));

@@ -324,7 +324,7 @@ fn meshes_lie_in_the_folder_above_or_where_it_is_told() {
     within(&folder.path().join("assets")).unwrap();
     let told = within(&configs).unwrap_err();
     assert!(
-        told.contains(":23: objects[0].obj_file_path: \"../assets/floor.obj\" must not leave the scene's folder"),
+        told.contains(":23: objects[0].obj_file_path: \"../assets/floor.obj\" lies outside of the scene's folder"),
         "{told}"
     );
     fs::write(&path, GOOD.replace("../assets", "../../assets")).unwrap();

@@ -16,7 +16,7 @@ use super::{
     Description, EnvironmentDescription, EnvironmentName, Framing, GltfDescription, ImageDescription, Integrator,
     RenderDescription, SamplesDescription, Scene, Selection, View, ViewTransform, framed,
 };
-use crate::gltf::{Choice, GltfError, Imported, ImportedCamera, STILL, UPRIGHT, load};
+use crate::gltf::{Choice, GltfError, Imported, ImportedCamera, ModelContents, STILL, UPRIGHT, load};
 
 pub(super) use self::expand::Expanded;
 
@@ -99,6 +99,11 @@ impl Scene {
     /// Whether it has a glTF file with animations, of which [`GltfChoice::time`] shows a moment.
     pub fn has_animations(&self) -> bool {
         self.imported.iter().any(|imported| imported.animations > 0)
+    }
+
+    /// Returns the names in each of its glTF files.
+    pub fn models(&self) -> impl Iterator<Item = &ModelContents> {
+        self.imported.iter().map(|imported| &imported.contents)
     }
 
     /// Whether it has a glTF file with cameras.

@@ -8,7 +8,7 @@ use crate::pack::Packed;
 
 /// The kernel of a scene, and what the scene takes.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Foreseen {
+pub struct KernelPlan {
     /// The kernel's entry point.
     pub entry: &'static str,
     /// Whether the scene is written into it as constants.
@@ -20,11 +20,11 @@ pub struct Foreseen {
 }
 
 /// Looks ahead.
-pub fn foresee(packed: &Packed, info: &Info) -> Foreseen {
+pub fn plan_kernel(packed: &Packed, info: &Info) -> KernelPlan {
     let kernel = if packed.adaptive { &ADAPTIVE } else { &RENDER };
     let baked = (info.kind == "software").then(|| bake_if_small(packed)).flatten();
     let source = Shaders::built_in().compose(kernel, packed.integrator, baked.as_deref());
-    Foreseen {
+    KernelPlan {
         entry: kernel.entry_point,
         baked: baked.is_some(),
         lines: source.text.lines().count(),
