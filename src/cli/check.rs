@@ -96,6 +96,7 @@ fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &S
         Some(image(&scene, &packed)),
         Some(shapes(&scene, &packed)),
         Some(count(scene.lights.len(), "light")),
+        scene.environment.as_ref().map(|_| "environment".to_owned()),
         camera(&scene),
         frames,
     ]

@@ -1,6 +1,6 @@
 //! How far the shapes of a scene reach.
 
-use glam::{DAffine3, DVec3};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Geometry, Scene};
@@ -43,8 +43,8 @@ fn of(geometry: &Geometry) -> Option<Bounds> {
             points.reduce(join)
         }
         Geometry::Mesh { mesh, to_world, .. } => {
-            let place = |to_world: &DAffine3, point: glam::Vec3| to_world.transform_point3(point.as_dvec3());
-            let points = mesh.positions.par_iter().map(|point| place(to_world, *point));
+            let place = |point: &Vec3| to_world.transform_point3(point.as_dvec3() + mesh.center);
+            let points = mesh.positions.par_iter().map(place);
             points.map(|point| (point, point)).reduce_with(join)
         }
         Geometry::Plane { .. } => None,

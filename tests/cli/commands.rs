@@ -50,6 +50,34 @@ fn a_check_warns_of_scenes_that_render_black() {
 }
 
 #[test]
+fn a_mesh_away_from_the_origin_is_found_in_view() {
+    let place = Place::new();
+    place.write("far.obj", "v 100 0 0\nv 101 0 0\nv 100 0 1\nf 1 2 3\n");
+    let (start, rest) = super::SCENE.split_once("[[shapes]]").unwrap();
+    let mesh = "[[shapes]]\ntype = 'mesh'\nmaterial = 'gray'\nfile = 'far.obj'\n";
+    assert!(rest.contains("sphere"));
+    let near = format!("{start}{mesh}");
+    let far = near.replace(
+        "position = [0, -5, 1], look_at = [0, 0, 1]",
+        "position = [100.3, -5, 1], look_at = [100.3, 0, 1]",
+    );
+    for (scene, is_in_view) in [(far, true), (near, false)] {
+        place.write("far.toml", &scene);
+        let ran = place.run(&["check", "far.toml"]);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let warns = ran
+            .stderr
+            .contains("warning: far.toml: no shape is in view of the camera");
+        assert_eq!(warns, !is_in_view, "{scene}: {}", ran.stderr);
+    }
+    let info = place.run(&["info", "far.toml", "--device", "cpu"]).stdout;
+    assert!(
+        info.contains("    bounds      [100, 0, 0] to [101, 0, 1], size 1 x 0 x 1\n"),
+        "{info}"
+    );
+}
+
+#[test]
 fn help_and_version_are_no_errors() {
     let place = Place::new();
     for arguments in [

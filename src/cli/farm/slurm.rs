@@ -201,6 +201,6 @@ merges=$(arrays merge.sh {images} "$@" --dependency=afterok"$tiles" --kill-on-in
 echo "tiles${{tiles//:/ }}, merge${{merges//:/ }}"
 "#,
         tasks = work.tasks(),
-        images = work.pictures(),
+        images = work.images(),
     )
 }

@@ -140,7 +140,9 @@ fn read(args: &Args, log: &OnceLog) -> anyhow::Result<Scene> {
     };
     let moves = scene.camera_path.is_some() || args.fps(&scene)?.is_some();
     let still = (args.frames.is_some() && !moves).then_some(still);
-    for note in scene.notes.iter().map(String::as_str).chain(still) {
+    let invisible = scene.visibility_warnings();
+    let warnings = scene.notes.iter().chain(&invisible).map(String::as_str);
+    for note in warnings.chain(still) {
         log.log_once(Level::Warning, &format!("{}: {note}", path.display()));
     }
     Ok(scene)
