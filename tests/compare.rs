@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use wgray::compare::{self, COLOR, Channel, Difference, Kind, PIXELS_PER_DEGREE, Picture, Place, Plane, layers};
+use wgray::compare::{self, COLOR, Channel, Difference, Kind, PIXELS_PER_DEGREE, Picture, PixelCoord, Plane, layers};
 
 /// A picture of red, green and blue by a function of column, row and channel.
 fn picture(width: u32, height: u32, kind: Kind, value: impl Fn(u32, u32, u32) -> f32) -> Picture {
@@ -165,7 +165,7 @@ fn cuts_into_tiles_and_chunks_change_nothing() {
     assert!(lost(&first) > 1e-7);
     is_near(lost(&both), lost(&first) + lost(&second), 1e-11);
     let found = color(&both, &b);
-    assert_eq!((found.different, found.first), (2, Some(Place { x: 512, y: 100 })));
+    assert_eq!((found.different, found.first), (2, Some(PixelCoord { x: 512, y: 100 })));
     is_near(
         found.rmse,
         (6.0 * (90.0_f64 / 255.0).powi(2) / (3.0 * 180_000.0)).sqrt(),
