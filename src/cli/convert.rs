@@ -20,7 +20,7 @@ use super::{Usage, plain};
 #[derive(Debug, clap::Args)]
 #[command(after_help = super::EXIT_CODES)]
 pub struct Args {
-    /// Scene file: .gltf or .glb, .json or .toml
+    /// Scene or model file: .toml, .json, .gltf, .glb, .obj, .ply or .stl
     scene: PathBuf,
 
     /// File to write. It refers to the model, images and meshes of the scene

@@ -16,7 +16,7 @@ use super::session::{Session, Settings};
 use super::source::Sources;
 use crate::gpu::AdapterChoice;
 use crate::gpu::compose::{self, Shaders};
-use crate::scene::{Overrides, is_course, is_gltf};
+use crate::scene::{Overrides, is_course, is_gltf, is_mesh};
 
 /// Number of changes of each kind.
 const ROUNDS: usize = 7;
@@ -53,7 +53,11 @@ pub fn measure(
     stopped: &AtomicBool,
 ) -> Result<Vec<Measured>, Option<String>> {
     let told = |error: std::io::Error| Some(error.to_string());
-    for (is_it, kind) in [(is_course as fn(&Path) -> bool, "JSON"), (is_gltf, "glTF")] {
+    for (is_it, kind) in [
+        (is_course as fn(&Path) -> bool, "JSON"),
+        (is_gltf, "glTF"),
+        (is_mesh, "a mesh"),
+    ] {
         if is_it(&sources.scene) {
             let place = sources.scene.display();
             return Err(Some(format!("{place}: only TOML scenes can be measured, not {kind}")));

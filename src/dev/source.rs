@@ -13,7 +13,7 @@ use crate::image::AovSource;
 use crate::pack::{Packed, Specialization, pack};
 use crate::scene::{
     CameraDescription, Description, Draft, Integrator, Overrides, Pieces, Places, Scene, folder_of, is_course, is_gltf,
-    read_bytes, read_text,
+    is_mesh, is_model, read_bytes, read_text,
 };
 
 /// The locations of the files.
@@ -150,6 +150,7 @@ impl Sources {
     pub fn read_only(&self) -> Option<String> {
         let kind = match &self.scene {
             scene if is_gltf(scene) => "glTF",
+            scene if is_mesh(scene) => "a mesh",
             scene if is_course(scene) => "JSON",
             _ => return None,
         };
@@ -216,7 +217,7 @@ impl Sources {
         let mut files = vec![(self.scene.clone(), self.stamp(&self.scene))];
         let mut named = BTreeSet::new();
         let (mut text, origin) = (String::new(), self.scene.display().to_string());
-        let scene = match is_gltf(&self.scene) {
+        let scene = match is_model(&self.scene) {
             true => Scene::load_and_list(&self.scene, &self.overrides, &mut named),
             false => read_text(&self.scene).and_then(|read| {
                 text = read;
@@ -257,7 +258,7 @@ impl Sources {
     }
 
     fn stamp(&self, path: &Path) -> FileStamp {
-        if path == self.scene && !is_gltf(path) {
+        if path == self.scene && !is_model(path) {
             return read_bytes(path).map_or(FileStamp::Absent, FileStamp::Content);
         }
         fs::metadata(path).map_or(FileStamp::Absent, |data| {

@@ -16,7 +16,7 @@ use super::skin::Skin;
 use super::tangent::{generated, unturned};
 use super::texture::LAST_SET;
 use super::{Damage, LONGEST_AXIS};
-use crate::mesh::{Draft, Group, LARGEST_COORDINATE, Mesh, unit};
+use crate::mesh::{Draft, Group, MAX_COORDINATE, Mesh, unit};
 
 /// The most vertices of a mesh, those among them that no triangle has.
 const MOST_VERTICES: usize = 1 << 27;
@@ -314,8 +314,9 @@ impl<'a> Meshes<'a> {
         let mesh = whole.finish(most).map_err(|rule| self.document.fault(place(), rule))?;
         // Not what is so small that a scene cannot have it.
         let has_size = |mesh: &Mesh| {
-            let corners: Vec<DVec3> = mesh.corners().collect();
-            (corners[7] - corners[0]).max_element() >= 1e-9
+            let positions = || mesh.positions.iter().copied();
+            let extent = positions().fold(Vec3::NEG_INFINITY, Vec3::max) - positions().fold(Vec3::INFINITY, Vec3::min);
+            extent.max_element() >= 1e-9
         };
         let mesh = mesh.filter(|mesh| !key.is_flat() || has_size(mesh));
         let built = mesh.map(|mesh| Built {
@@ -492,7 +493,7 @@ impl Whole {
             (0..count).for_each(|i| carry(&map, i, &mut placed, normals.as_mut(), tangents.as_mut()));
         }
         for (i, position) in placed.iter_mut().enumerate() {
-            if !(position.is_finite() && position.abs().max_element() <= LARGEST_COORDINATE) {
+            if !(position.is_finite() && position.abs().max_element() <= MAX_COORDINATE) {
                 *position = DVec3::ZERO;
                 self.unplaced.insert(first + i);
             }

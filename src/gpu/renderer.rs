@@ -1,10 +1,11 @@
 //! A scene on a device: its buffers, its kernels, and the film that it accumulates.
 
 use std::ops::Range;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bytemuck::{bytes_of, cast_slice};
 use glam::{UVec2, Vec4};
+use web_time::Instant;
 use wgpu::BufferUsages;
 
 use super::bake::bake_if_small;

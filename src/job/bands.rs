@@ -1,7 +1,9 @@
 //! The bands of a picture, one after the other, or all of them little by little.
 
 use std::collections::VecDeque;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use web_time::Instant;
 
 use super::piece::{CheckpointStore, Piece, StoredPiece};
 use super::steps::{Order, Reached, Steps};

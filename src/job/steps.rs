@@ -1,7 +1,9 @@
 //! The calls that render a film.
 
 use std::ops::Range;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use web_time::Instant;
 
 use super::Cut;
 use super::pace::Pace;

@@ -2,8 +2,10 @@
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
+use super::damage::Damages;
 use super::error::{Fault, Place, shown_number};
-use super::{Group, LARGEST_COORDINATE, MOST, Mesh, finish};
+use super::polygon::Polygon;
+use super::{Group, MAX_COORDINATE, MOST, Mesh, finish};
 
 /// A mesh as its file has it.
 #[derive(Default)]
@@ -20,11 +22,14 @@ pub(crate) struct Draft {
     /// For each vertex, or empty, as [`Mesh::tangents`](super::Mesh::tangents) has them.
     pub tangents: Vec<Vec4>,
     pub triangles: Vec<[u32; 3]>,
+    /// The fans among the triangles that stand for polygons of more than three corners.
+    pub(super) polygons: Vec<Polygon>,
     pub groups: Vec<Group>,
     /// The first triangles of runs of one group each, and their groups.
     pub runs: Vec<(usize, u32)>,
     /// What a user should know.
     pub notes: Vec<String>,
+    pub(super) damages: Damages,
 }
 
 impl Draft {
@@ -44,13 +49,24 @@ impl Draft {
         }
     }
 
-    /// Adds a triangle.
+    /// Adds a face of three corners or more as a fan from its first corner.
     #[inline]
-    pub(super) fn push(&mut self, triangle: [u32; 3], place: Place) -> Result<(), Fault> {
-        if self.triangles.len() >= MOST {
+    pub(super) fn face(&mut self, corners: &[u32], place: Place) -> Result<(), Fault> {
+        let &[first, ref others @ ..] = corners else {
+            return Ok(());
+        };
+        let count = others.len().saturating_sub(1);
+        if self.triangles.len() + count > MOST {
             return Err(place.fault(format!("there must be at most {MOST} triangles")));
         }
-        self.triangles.push(triangle);
+        if count > 1 {
+            self.polygons.push(Polygon {
+                first: self.triangles.len() as u32,
+                count: count as u32,
+            });
+        }
+        let triangles = others.windows(2).map(|pair| [first, pair[0], pair[1]]);
+        self.triangles.extend(triangles);
         Ok(())
     }
 }
@@ -60,33 +76,11 @@ pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { several })
 }
 
-/// A polygon's triangles: a fan from its first vertex.
-#[derive(Default)]
-pub(super) struct Fan {
-    first: u32,
-    last: u32,
-    pub count: usize,
-}
-
-impl Fan {
-    /// Takes the next vertex; from the third on there is a triangle.
-    #[inline]
-    pub fn next(&mut self, vertex: u32) -> Option<[u32; 3]> {
-        let triangle = [self.first, self.last, vertex];
-        if self.count == 0 {
-            self.first = vertex;
-        }
-        self.last = vertex;
-        self.count += 1;
-        (self.count > 2).then_some(triangle)
-    }
-}
-
 /// Checks a coordinate of a position. Zero loses its sign, so that equal coordinates have equal bits. The error is the
 /// value and the rule.
 #[inline]
 pub(super) fn coordinate(x: f64) -> Result<f64, String> {
-    if x.abs() <= LARGEST_COORDINATE {
+    if x.abs() <= MAX_COORDINATE {
         Ok(x + 0.0)
     } else {
         Err(format!("{} must be finite, from -1e9 to 1e9", shown_number(x)))
@@ -100,6 +94,14 @@ pub(super) fn texture_coordinate(x: f64) -> Result<f32, String> {
         Ok(x as f32)
     } else {
         Err(format!("{} must be finite as a 32-bit float", shown_number(x)))
+    }
+}
+
+/// Returns the linear value of a component of an sRGB color, from 0 to 1 (IEC 61966-2-1).
+pub(super) fn linear(srgb: f64) -> f64 {
+    match srgb <= 0.04045 {
+        true => srgb / 12.92,
+        false => ((srgb + 0.055) / 1.055).powf(2.4),
     }
 }
 

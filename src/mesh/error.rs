@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why there is no mesh. Every message begins with the place: `bunny.obj:17: vertex 9 of the face is not there; there are 8
+/// Why there is no mesh. Every message begins with the place: `bunny.obj:17: vertex 9 of the face does not exist; there are 8
 /// so far`.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -47,16 +47,47 @@ pub enum MeshError {
     },
 }
 
+impl MeshError {
+    /// Returns the file.
+    pub fn path(&self) -> &Path {
+        match self {
+            MeshError::Read { path, .. }
+            | MeshError::Line { path, .. }
+            | MeshError::Byte { path, .. }
+            | MeshError::File { path, .. } => path,
+        }
+    }
+
+    /// Returns the line, counted from 1, if the error has one.
+    pub fn line(&self) -> Option<usize> {
+        match self {
+            MeshError::Line { line, .. } => Some(*line),
+            _ => None,
+        }
+    }
+
+    /// Returns the error with another path to the same file.
+    pub(crate) fn at(mut self, other: &Path) -> MeshError {
+        match &mut self {
+            MeshError::Read { path, .. }
+            | MeshError::Line { path, .. }
+            | MeshError::Byte { path, .. }
+            | MeshError::File { path, .. } => *path = other.to_owned(),
+        }
+        self
+    }
+}
+
 /// An error before it knows its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Fault {
+pub(crate) struct Fault {
     pub place: Place,
     pub message: String,
 }
 
 /// A place in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Place {
+pub(crate) enum Place {
     /// All of it.
     File,
     /// A line of a text, counted from 1.

@@ -7,15 +7,14 @@ use robust::{Coord, orient2d};
 use super::draft::{Draft, counted};
 use super::error::{Fault, Place};
 use super::neighbours::Neighbours;
-use super::{MOST, Mesh, Normals};
+use super::{MAX_COLOR, MOST, Mesh, Normals, polygon};
 
-/// The largest red, green or blue of a vertex.
-const MOST_COLOR: f32 = 1e6;
 /// How the message begins where nothing is left to be seen.
 pub(super) const NO_TRIANGLES: &str = "has no triangles";
 
 /// Makes the mesh.
-pub(super) fn finish(draft: Draft, normals: Option<Normals>) -> Result<Mesh, Fault> {
+pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh, Fault> {
+    polygon::triangulate(&mut draft);
     let mut mesh = Mesh {
         normals: draft.normals,
         uvs: draft.uvs,
@@ -40,8 +39,17 @@ pub(super) fn finish(draft: Draft, normals: Option<Normals>) -> Result<Mesh, Fau
     // NaN is 0 too.
     let bounded = |x: f32, most: f32| if x > 0.0 { x.min(most) } else { 0.0 };
     for color in &mut mesh.colors {
-        let most = Vec4::new(MOST_COLOR, MOST_COLOR, MOST_COLOR, 1.0);
+        let most = Vec4::new(MAX_COLOR, MAX_COLOR, MAX_COLOR, 1.0);
         *color = Vec4::from_array(std::array::from_fn(|i| bounded(color[i], most[i])));
+    }
+    keep_triangles(&mut mesh, |triangle| {
+        triangle
+            .iter()
+            .all(|vertex| draft.positions[*vertex as usize].is_finite())
+    });
+    let count = mesh.triangles.len();
+    if count == 0 {
+        return Err(Place::File.fault(NO_TRIANGLES));
     }
     round(&mut mesh, &draft.positions);
     drop(draft.positions);
@@ -188,9 +196,15 @@ fn area([a, b, c]: [Vec3; 3]) -> DVec3 {
 }
 
 fn drop_degenerate(mesh: &mut Mesh) {
-    let positions = &mesh.positions;
+    let positions = std::mem::take(&mut mesh.positions);
     let has_area = |triangle: &[u32; 3]| area(triangle.map(|vertex| positions[vertex as usize])) != DVec3::ZERO;
-    let marks: Vec<bool> = mesh.triangles.par_iter().map(has_area).collect();
+    keep_triangles(mesh, has_area);
+    mesh.positions = positions;
+}
+
+/// Keeps the triangles of which a condition is true.
+fn keep_triangles(mesh: &mut Mesh, condition: impl Fn(&[u32; 3]) -> bool + Send + Sync) {
+    let marks: Vec<bool> = mesh.triangles.par_iter().map(condition).collect();
     if marks.contains(&false) {
         keep(&mut mesh.triangles, &marks);
         keep(&mut mesh.group_of, &marks);

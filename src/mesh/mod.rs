@@ -3,6 +3,8 @@
 //! [`Mesh::load`] reads Wavefront OBJ, PLY and STL files.
 
 mod cache;
+mod check;
+mod damage;
 mod draft;
 mod error;
 mod finish;
@@ -10,6 +12,7 @@ mod mtl;
 mod neighbours;
 mod obj;
 mod ply;
+mod polygon;
 mod stl;
 mod tangents;
 mod words;
@@ -37,11 +40,16 @@ const LARGEST_FILE: u64 = 8 << 30;
 const LARGEST_LIBRARY: u64 = 16 << 20;
 /// The most triangles, and the most vertices: three times as many are numbered by 32 bits.
 const MOST: usize = 1 << 30;
+/// The largest red, green or blue of a vertex.
+const MAX_COLOR: f32 = 1e6;
 /// The largest coordinate of a position.
-pub(crate) const LARGEST_COORDINATE: f64 = 1e9;
+pub(crate) const MAX_COORDINATE: f64 = 1e9;
 
 /// A mesh of triangles that share vertices. Positions count from [`Mesh::center`], so that one far from the origin keeps its
 /// digits.
+///
+/// A mesh made in code is checked when a scene is made of it. Its BVH is kept in it from the first use on, and is built again for a mesh that
+/// was cloned or taken out of its `Arc`; `Arc::get_mut` returns `None` from then on.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Mesh {
@@ -71,12 +79,16 @@ pub struct Mesh {
     pub libraries: Vec<Library>,
     /// What is odd about the file, and how it was dealt with, for a user to read: `12 degenerate triangles dropped`.
     pub notes: Vec<String>,
+    /// Damage to the file, as the errors that it is where damage is refused.
+    pub(crate) damage: Vec<Fault>,
     /// The mesh as it is rendered, once that was asked for.
     packed: Cache<PackedMesh>,
     /// The same with tangents for normal maps, once that was asked for.
     packed_with_tangents: Cache<PackedMesh>,
     /// The box around its vertices, once that was asked for.
     bounds: Cache<Aabb>,
+    /// The rule that it breaks, if any, once that was asked for.
+    broken_rule: Cache<Option<String>>,
 }
 
 /// A part of a mesh.
@@ -125,8 +137,40 @@ pub struct MtlMaterial {
     pub illumination: Option<u8>,
     /// The file of the diffuse reflectance, without options: `map_Kd`.
     pub diffuse_map: Option<String>,
-    /// What is not here of its look, by keywords: other maps, and options of `map_Kd`.
+    /// How metallic it is, from 0 to 1: `Pm`.
+    pub metallic: Option<f64>,
+    /// How rough it is, from 0 to 1: `Pr`.
+    pub roughness: Option<f64>,
+    /// The file of the emission: `map_Ke`.
+    pub emission_map: Option<String>,
+    /// The file of the opacity: `map_d`.
+    pub opacity_map: Option<String>,
+    /// The file of heights, or of normals as some exporters have it: `map_Bump` or `bump`.
+    pub bump_map: Option<String>,
+    /// The file of normals: `norm`.
+    pub normal_map: Option<String>,
+    /// The file of the metalness: `map_Pm`.
+    pub metallic_map: Option<String>,
+    /// The file of the roughness: `map_Pr`.
+    pub roughness_map: Option<String>,
+    /// The keywords of its look that have no field here: other maps, and options of maps.
     pub others: Vec<&'static str>,
+}
+
+impl MtlMaterial {
+    /// Returns the files of all maps.
+    pub(crate) fn maps(&self) -> impl Iterator<Item = &String> {
+        let maps = [
+            &self.diffuse_map,
+            &self.emission_map,
+            &self.opacity_map,
+            &self.bump_map,
+            &self.normal_map,
+            &self.metallic_map,
+            &self.roughness_map,
+        ];
+        maps.into_iter().flatten()
+    }
 }
 
 /// Which normals a mesh has: what its surface looks like under light, not where it is.
@@ -147,17 +191,17 @@ impl Mesh {
     ///
     /// Without a word on normals they are the file's if it has any for its vertices (OBJ, PLY), else flat ones.
     ///
-    /// - Polygons become triangles: fans from their first vertex. Triangles without an area are dropped.
+    /// - Polygons become triangles. Triangles without an area are dropped.
     /// - OBJ files have a vertex for each different combination of position, texture coordinates and normal at a corner,
     ///   and a group for each different combination of `g` or `o`, the later one, with `usemtl`. The files that `mtllib`
-    ///   names are read if they are in the folder of the mesh or in one below. Smoothing groups (`s`), colours of vertices,
-    ///   fourth coordinates, and what is no triangle are not looked at.
+    ///   names are read if they are in the folder of the mesh or in one below. Colors of vertices are sRGB. Smoothing groups (`s`),
+    ///   fourth coordinates, lines and curves are ignored.
     /// - PLY files have the vertices that their triangles share. Colours of vertices that are whole numbers are sRGB, those that are floats
     ///   linear.
     /// - STL files have a vertex for each different position, and a group for each `solid`. Normals of facets are looked at
     ///   for [`Normals::File`] alone, and then tell vertices apart.
     ///
-    /// What is odd but no error is in [`Mesh::notes`].
+    /// Damaged parts are left out. [`Mesh::notes`] has warnings about them, and about other oddities.
     pub fn load(path: &Path, normals: Option<Normals>) -> Result<Mesh, MeshError> {
         let _span = tracing::debug_span!("mesh", path = %path.display()).entered();
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
@@ -181,8 +225,9 @@ impl Mesh {
                 return Err(Place::File.fault(rule).of(path));
             }
         };
-        let (mut mesh, libraries) = read(&bytes, format, normals).map_err(|fault| fault.of(path))?;
+        let (mut mesh, libraries, damage) = read(&bytes, format, normals).map_err(|fault| fault.of(path))?;
         drop(bytes);
+        mesh.damage = damage;
         for names in libraries {
             mesh.load_libraries(path, &names);
         }
@@ -243,21 +288,24 @@ impl Mesh {
 }
 
 impl Mesh {
-    /// The mesh as it is rendered, with its tree; and with tangents, if it may have any, for normal maps. It is built when
-    /// that is first asked for.
-    pub(crate) fn packed(&self, with_tangents: bool) -> Arc<PackedMesh> {
+    /// Returns the first rule that the mesh breaks. Meshes that were read from files break none.
+    pub(crate) fn broken_rule(self: &Arc<Self>) -> Option<String> {
+        let broken = || check::check(self).err();
+        self.broken_rule.get_or_init(self, broken).as_ref().clone()
+    }
+
+    /// Returns the mesh as it is rendered, with its BVH, and with tangents for normal maps if it can have any. It is built on first use.
+    pub(crate) fn packed(self: &Arc<Self>, with_tangents: bool) -> Arc<PackedMesh> {
         let tangents = || VertexTangents::of(self).unwrap_or_default();
         match with_tangents && !self.uvs.is_empty() && !self.normals.is_empty() {
-            true => self
-                .packed_with_tangents
-                .get_or_init(|| PackedMesh::of(self, Some(tangents()))),
-            false => self.packed.get_or_init(|| PackedMesh::of(self, None)),
+            true => (self.packed_with_tangents).get_or_init(self, || PackedMesh::of(self, Some(tangents()))),
+            false => self.packed.get_or_init(self, || PackedMesh::of(self, None)),
         }
     }
 
-    /// The corners of its box, in the file's coordinates.
-    pub(crate) fn corners(&self) -> impl Iterator<Item = DVec3> {
-        let bounds = self.bounds.get_or_init(|| Aabb::around(&self.positions));
+    /// Returns the corners of the bounding box, in the file's coordinates.
+    pub(crate) fn corners(self: &Arc<Self>) -> impl Iterator<Item = DVec3> + use<> {
+        let bounds = self.bounds.get_or_init(self, || Aabb::around(&self.positions));
         let [low, high] = [bounds.low, bounds.high].map(|corner| corner.as_dvec3() + self.center);
         (0..8).map(move |i| {
             let side = |axis: usize| if i >> axis & 1 == 0 { low[axis] } else { high[axis] };
@@ -273,18 +321,27 @@ enum Format {
     Stl,
 }
 
-/// Reads a mesh, and the names of its files of materials, from the bytes of a file.
-fn read(bytes: &[u8], format: Format, normals: Option<Normals>) -> Result<(Mesh, Vec<String>), Fault> {
+/// Reads a mesh, the names of its MTL files, and the damage that was dealt with, from the bytes of a file.
+fn read(bytes: &[u8], format: Format, normals: Option<Normals>) -> Result<(Mesh, Vec<String>, Vec<Fault>), Fault> {
     let are_wanted = matches!(normals, None | Some(Normals::File));
-    let (draft, libraries) = match format {
+    let (mut draft, libraries) = match format {
         Format::Obj => {
-            let obj = obj::read(bytes, are_wanted)?;
+            let obj = obj::read(&words::utf8(bytes), are_wanted)?;
             (obj.draft, obj.libraries)
         }
         Format::Ply => (ply::read(bytes, are_wanted)?, Vec::new()),
         Format::Stl => (stl::read(bytes, normals == Some(Normals::File))?, Vec::new()),
     };
-    Ok((finish::finish(draft, normals)?, libraries))
+    if let (true, Some(fault)) = (draft.triangles.is_empty(), draft.damages.first()) {
+        return Err(fault.clone());
+    }
+    let (damage, notes) = std::mem::take(&mut draft.damages).into_parts();
+    draft.notes.splice(0..0, notes);
+    let mesh = finish::finish(draft, normals).map_err(|fault| match damage.first() {
+        Some(first) if fault.message.starts_with(finish::NO_TRIANGLES) => first.clone(),
+        _ => fault,
+    })?;
+    Ok((mesh, libraries, damage))
 }
 
 /// The bytes of a file; None if it is too large.

@@ -84,13 +84,15 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<
         b"d" => material.opacity = Some(finite(words)?),
         b"tr" => material.opacity = Some(1.0 - finite(words)?),
         b"illum" => material.illumination = Some(finite(words)?.clamp(0.0, 255.0) as u8),
-        b"map_kd" => {
-            let (file, has_options) = map_file(&words.name());
-            if has_options {
-                left_out(material, "the options of map_Kd");
-            }
-            material.diffuse_map = Some(file).filter(|file| !file.is_empty());
-        }
+        b"pm" => material.metallic = Some(finite(words)?),
+        b"pr" => material.roughness = Some(finite(words)?),
+        b"map_kd" => material.diffuse_map = map(material, words, "the options of map_Kd"),
+        b"map_ke" => material.emission_map = map(material, words, "the options of map_Ke"),
+        b"map_d" => material.opacity_map = map(material, words, "the options of map_d"),
+        b"map_bump" | b"bump" => material.bump_map = map(material, words, "the options of map_Bump"),
+        b"norm" => material.normal_map = map(material, words, "the options of norm"),
+        b"map_pm" => material.metallic_map = map(material, words, "the options of map_Pm"),
+        b"map_pr" => material.roughness_map = map(material, words, "the options of map_Pr"),
         _ => {
             if let Some((_, told)) = OTHERS.iter().find(|(known, _)| known.as_bytes() == keyword) {
                 left_out(material, told);
@@ -101,21 +103,23 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<
 }
 
 /// Maps that are not read, in lower case, and what they are called. That of the ambient light is mostly `map_Kd` again.
-const OTHERS: [(&str, &str); 13] = [
-    ("bump", "bump"),
+const OTHERS: [(&str, &str); 6] = [
     ("decal", "decal"),
     ("disp", "disp"),
-    ("map_bump", "map_Bump"),
-    ("map_d", "map_d"),
-    ("map_ke", "map_Ke"),
     ("map_ks", "map_Ks"),
     ("map_ns", "map_Ns"),
-    ("map_pm", "map_Pm"),
-    ("map_pr", "map_Pr"),
     ("map_tr", "map_Tr"),
-    ("norm", "norm"),
     ("refl", "refl"),
 ];
+
+/// Returns the file of a map. Its options have no effect.
+fn map(material: &mut MtlMaterial, words: &mut Words, options: &'static str) -> Option<String> {
+    let (file, has_options) = map_file(&words.name());
+    if has_options {
+        left_out(material, options);
+    }
+    Some(file).filter(|file| !file.is_empty())
+}
 
 fn left_out(material: &mut MtlMaterial, what: &'static str) {
     if !material.others.contains(&what) {
@@ -169,7 +173,9 @@ mod tests {
             index_of_refraction: Some(1.5),
             illumination: Some(2),
             diffuse_map: Some("my wood.png".to_string()),
-            others: vec!["the options of map_Kd", "map_Bump"],
+            bump_map: Some("b.png".to_string()),
+            others: vec!["the options of map_Kd"],
+            ..MtlMaterial::default()
         };
         let glass = MtlMaterial {
             name: "glass".to_string(),

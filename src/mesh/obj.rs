@@ -1,18 +1,19 @@
 //! Wavefront OBJ files: Wavefront Technologies, "Advanced Visualizer Manual", appendix B, 1995.
 //!
 //! Not by `tobj` 4, which joins no lines at a backslash, tells no lines in its errors, and takes 0.6 s for a million
-//! triangles; a whole load takes 0.25 s here. Smoothing groups (`s`) are not looked at.
+//! triangles; a whole load takes 0.25 s here. Smoothing groups (`s`) are ignored.
 
 use std::collections::{BTreeMap, HashMap};
 use std::hash::BuildHasher;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use hashbrown::{DefaultHashBuilder, HashTable};
 
-use super::draft::{Draft, Fan, coordinate, counted, texture_coordinate, unit};
-use super::error::{Fault, shown};
+use super::draft::{Draft, coordinate, counted, linear, texture_coordinate, unit};
+use super::error::{Fault, Place, shown};
 use super::words::Words;
 use super::{Group, MOST};
+use super::{damage, words};
 
 /// No number of a vertex.
 const NONE: u32 = u32::MAX;
@@ -47,7 +48,12 @@ struct Reader {
     positions: Vec<DVec3>,
     uvs: Vec<Vec2>,
     normals: Vec<Vec3>,
+    /// For each position, or empty where no vertex has a color.
+    colors: Vec<Vec4>,
     vertices: Vertices,
+    /// The corners of the face that is being read.
+    corners: Vec<[u32; 3]>,
+    face: Vec<u32>,
     draft: Draft,
     numbers: HashMap<Group, u32>,
     /// The group of what follows.
@@ -62,33 +68,30 @@ impl Reader {
     fn statement(&mut self, keyword: &[u8], words: &mut Words) -> Result<(), Fault> {
         match keyword {
             b"v" => {
-                let mut x = [0.0; 3];
-                for (x, name) in x.iter_mut().zip(["x", "y", "z"]) {
-                    let value = words.number(name)?;
-                    *x = coordinate(value).map_err(|rule| words.fault(format!("{name}: {rule}")))?;
-                }
+                let position = position(words).unwrap_or_else(|fault| {
+                    self.draft.damages.add(damage::VERTEX, || fault);
+                    DVec3::NAN
+                });
                 has_room(self.positions.len(), words)?;
-                self.positions.push(x.into());
+                self.color(words);
+                self.positions.push(position);
                 self.vertices.first.push(NONE);
             }
             b"vt" => {
-                let u = words.number("u")?;
-                // A texture may be a line, then v is left out.
-                let v = match words.on_line() {
-                    Some(word) => super::words::number(word)
-                        .ok_or_else(|| words.fault(format!("v: {} must be a number", shown(word))))?,
-                    None => 0.0,
-                };
-                let check =
-                    |name: &str, x| texture_coordinate(x).map_err(|rule| words.fault(format!("{name}: {rule}")));
-                let uv = Vec2::new(check("u", u)?, check("v", v)?);
+                let uv = uv(words).unwrap_or_else(|fault| {
+                    self.draft.damages.add(damage::UV, || fault);
+                    Vec2::ZERO
+                });
                 has_room(self.uvs.len(), words)?;
                 self.uvs.push(uv);
             }
             b"vn" => {
-                let normal = [words.number("x")?, words.number("y")?, words.number("z")?];
+                let normal = numbers(words).unwrap_or_else(|fault| {
+                    self.draft.damages.add(damage::NORMAL, || fault);
+                    DVec3::ZERO
+                });
                 has_room(self.normals.len(), words)?;
-                self.normals.push(unit(normal.into()));
+                self.normals.push(unit(normal));
             }
             b"f" => self.face(words)?,
             b"g" | b"o" => {
@@ -122,19 +125,50 @@ impl Reader {
         if self.is_new || self.draft.runs.is_empty() {
             self.begin();
         }
-        let place = words.place();
-        let mut fan = Fan::default();
+        self.corners.clear();
         while let Some(word) = words.on_line() {
-            let corner = self.corner(word).map_err(|message| words.fault(message))?;
-            let vertex = self.vertices.number(corner);
-            if let Some(triangle) = fan.next(vertex) {
-                self.draft.push(triangle, place)?;
+            match self.corner(word, words.place()) {
+                Ok(corner) => self.corners.push(corner),
+                Err(message) => {
+                    self.draft.damages.add(damage::FACE, || words.fault(message));
+                    return Ok(());
+                }
             }
         }
-        match fan.count {
-            3.. => Ok(()),
-            count => Err(place.fault(format!("a face must have 3 corners or more; this one has {count}"))),
+        let count = self.corners.len();
+        if count < 3 {
+            let rule = || words.fault(format!("a face must have 3 corners or more; this one has {count}"));
+            self.draft.damages.add(damage::FACE, rule);
+            return Ok(());
         }
+        let corners = std::mem::take(&mut self.corners);
+        self.face.clear();
+        self.face
+            .extend(corners.iter().map(|corner| self.vertices.number(*corner)));
+        self.corners = corners;
+        self.draft.face(&self.face, words.place())
+    }
+
+    /// Reads the color behind a position. It is sRGB, as MeshLab and Blender write it.
+    fn color(&mut self, words: &mut Words) {
+        let mut values = [0.0; 4];
+        let mut count = 0;
+        while let Some(word) = words.on_line() {
+            if let (Some(value), Some(number)) = (values.get_mut(count), words::number(word)) {
+                *value = number;
+            }
+            count += 1;
+        }
+        // One number is a weight, and a fourth one behind three is an opacity that no viewer shows.
+        if count < 3 {
+            if !self.colors.is_empty() {
+                self.colors.push(Vec4::ONE);
+            }
+            return;
+        }
+        let color = [values[0], values[1], values[2]].map(|x| linear(x.clamp(0.0, 1.0)) as f32);
+        self.colors.resize(self.positions.len(), Vec4::ONE);
+        self.colors.push(Vec3::from(color).extend(1.0));
     }
 
     /// Begins the group of what follows.
@@ -152,9 +186,9 @@ impl Reader {
         self.is_new = false;
     }
 
-    /// The position, texture coordinates and normal of a corner. The error is the value and the rule.
+    /// Returns the position, texture coordinates and normal of a corner. The error is the value and the rule.
     #[inline]
-    fn corner(&self, word: &[u8]) -> Result<[u32; 3], String> {
+    fn corner(&mut self, word: &[u8], place: Place) -> Result<[u32; 3], String> {
         let mut parts = [&word[..0]; 3];
         for (i, part) in word.split(|byte| *byte == b'/').enumerate() {
             match parts.get_mut(i) {
@@ -163,16 +197,23 @@ impl Reader {
             }
         }
         let [position, uv, normal] = parts;
-        if position.is_empty() {
-            return Err(no_corner(word));
-        }
         let index = |part: &[u8], count: usize, what: &str| match part {
             [] => Ok(NONE),
             _ => index(part, count, what).unwrap_or_else(|| Err(no_corner(word))),
         };
+        if position.is_empty() {
+            return Err(no_corner(word));
+        }
         let position = index(position, self.positions.len(), "vertex")?;
-        let uv = index(uv, self.uvs.len(), "texture coordinate")?;
-        let normal = index(normal, self.normals.len(), "normal")?;
+        let damages = &mut self.draft.damages;
+        let mut or_none = |found: Result<u32, String>, stand_in| {
+            found.unwrap_or_else(|message| {
+                damages.add(stand_in, || place.fault(message));
+                NONE
+            })
+        };
+        let uv = or_none(index(uv, self.uvs.len(), "texture coordinate"), damage::UV);
+        let normal = or_none(index(normal, self.normals.len(), "normal"), damage::NORMAL);
         Ok([position, uv, if self.normals_wanted { normal } else { NONE }])
     }
 
@@ -184,6 +225,10 @@ impl Reader {
         let corners = &self.vertices.corners;
         let mut draft = self.draft;
         draft.positions = corners.iter().map(|[v, _, _]| self.positions[*v as usize]).collect();
+        if !self.colors.is_empty() {
+            let color = |v: u32| self.colors.get(v as usize).copied().unwrap_or(Vec4::ONE);
+            draft.colors = corners.iter().map(|[v, _, _]| color(*v)).collect();
+        }
         let missing = corners.iter().filter(|[_, t, _]| *t == NONE).count();
         if missing < corners.len() {
             let uv = |i: u32| self.uvs.get(i as usize).copied().unwrap_or_default();
@@ -205,6 +250,30 @@ impl Reader {
             libraries: self.libraries,
         }
     }
+}
+
+fn position(words: &mut Words) -> Result<DVec3, Fault> {
+    let mut x = [0.0; 3];
+    for (x, name) in x.iter_mut().zip(["x", "y", "z"]) {
+        let value = words.number(name)?;
+        *x = coordinate(value).map_err(|rule| words.fault(format!("{name}: {rule}")))?;
+    }
+    Ok(x.into())
+}
+
+fn numbers(words: &mut Words) -> Result<DVec3, Fault> {
+    Ok(DVec3::new(words.number("x")?, words.number("y")?, words.number("z")?))
+}
+
+fn uv(words: &mut Words) -> Result<Vec2, Fault> {
+    let u = words.number("u")?;
+    // A texture may be a line, then v is left out.
+    let v = match words.on_line() {
+        Some(word) => words::number(word).ok_or_else(|| words.fault(format!("v: {} must be a number", shown(word))))?,
+        None => 0.0,
+    };
+    let check = |name: &str, x| texture_coordinate(x).map_err(|rule| words.fault(format!("{name}: {rule}")));
+    Ok(Vec2::new(check("u", u)?, check("v", v)?))
 }
 
 fn has_room(count: usize, words: &Words) -> Result<(), Fault> {
@@ -242,7 +311,7 @@ fn index(part: &[u8], count: usize, what: &str) -> Option<Result<u32, String>> {
         (false, _) => {
             let number = String::from_utf8_lossy(&part[..part.len().min(30)]);
             Err(format!(
-                "{what} {number} of the face is not there; there are {count} so far"
+                "{what} {number} of the face does not exist; there are {count} so far"
             ))
         }
     })

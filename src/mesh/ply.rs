@@ -10,7 +10,8 @@ use glam::{DVec3, Vec2, Vec4};
 
 use self::header::{Element, Format, Header, Property, Scalar, header};
 use self::values::{Ascii, Binary, Values};
-use super::draft::{Draft, Fan, coordinate, texture_coordinate, unit};
+use super::damage::{self, Damages};
+use super::draft::{Draft, coordinate, linear, texture_coordinate, unit};
 use super::error::{Fault, Place, shown_number};
 use super::words::Words;
 use super::{Group, MOST};
@@ -18,17 +19,22 @@ use super::{Group, MOST};
 /// Reads a file. Normals are kept if they are wanted.
 pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
     let mut words = Words::new(bytes);
-    let header = header(&mut words)?;
+    let mut damages = Damages::default();
+    let header = header(&mut words, &mut damages)?;
     match header.format {
-        Format::Ascii => body(&header, Ascii { words }, normals_wanted),
+        Format::Ascii => {
+            // As other readers do; unless a line must have several rows.
+            let by_lines = words.lines_left() as u128 >= header.rows();
+            body(&header, Ascii { words, by_lines }, normals_wanted, damages)
+        }
         Format::Binary { is_big } => {
             let at = words.offset();
-            body(&header, Binary { bytes, at, is_big }, normals_wanted)
+            body(&header, Binary { bytes, at, is_big }, normals_wanted, damages)
         }
     }
 }
 
-fn body(header: &Header, mut values: impl Values, normals_wanted: bool) -> Result<Draft, Fault> {
+fn body(header: &Header, mut values: impl Values, normals_wanted: bool, damages: Damages) -> Result<Draft, Fault> {
     let element = |name: &str| header.elements.iter().find(|element| element.name == name);
     let vertices = element("vertex").ok_or_else(|| Place::File.fault("the header must have an element \"vertex\""))?;
     if element("face").is_none_or(|faces| faces.count == 0) {
@@ -41,7 +47,10 @@ fn body(header: &Header, mut values: impl Values, normals_wanted: bool) -> Resul
         let rule = format!("{} vertices; there must be at most {MOST}", vertices.count);
         return Err(vertices.place.fault(rule));
     }
-    let mut draft = Draft::default();
+    let mut draft = Draft {
+        damages,
+        ..Draft::default()
+    };
     draft.groups.push(Group::default());
     draft.begin(0);
     // A name that stands there twice is skipped the second time.
@@ -67,6 +76,7 @@ fn body(header: &Header, mut values: impl Values, normals_wanted: bool) -> Resul
                         .properties
                         .iter()
                         .try_for_each(|property| skip(property, &mut values))?;
+                    end_row(&mut values, &mut draft);
                 }
             }
         }
@@ -87,6 +97,15 @@ fn check_size(element: &Element, values: &impl Values) -> Result<(), Fault> {
             element.count,
             values.left()
         ))),
+    }
+}
+
+/// Ends a row, whose line may have values that the header does not declare.
+#[inline]
+fn end_row(values: &mut impl Values, draft: &mut Draft) {
+    if let Some(place) = values.end_row() {
+        let rule = "the line has more values than the header declares";
+        draft.damages.add(damage::REST, || place.fault(rule));
     }
 }
 
@@ -136,12 +155,10 @@ fn color_value(value: f64, scalar: Scalar, is_opacity: bool) -> f32 {
         return value as f32;
     };
     let share = (value / largest).clamp(0.0, 1.0);
-    let linear = match share {
-        _ if is_opacity => share,
-        share if share <= 0.04045 => share / 12.92,
-        share => ((share + 0.055) / 1.055).powf(2.4),
-    };
-    linear as f32
+    match is_opacity {
+        true => share as f32,
+        false => linear(share) as f32,
+    }
 }
 
 fn read_vertices(
@@ -198,18 +215,25 @@ fn read_vertices(
                 None => skip(property, values)?,
             }
         }
-        let fault = |name: &str, rule: String| place.fault(format!("vertex {i}: {name}: {rule}"));
+        end_row(values, draft);
+        let fault = |(name, rule): (&str, String)| place.fault(format!("vertex {i}: {name}: {rule}"));
         let [x, y, z, nx, ny, nz, u, v, ..] = row;
-        let position = |name: &str, x: f64| coordinate(x).map_err(|rule| fault(name, rule));
-        draft
-            .positions
-            .push(DVec3::new(position("x", x)?, position("y", y)?, position("z", z)?));
+        let position = |name: &'static str, x: f64| coordinate(x).map_err(|rule| (name, rule));
+        let position = || Ok(DVec3::new(position("x", x)?, position("y", y)?, position("z", z)?));
+        draft.positions.push(position().unwrap_or_else(|broken| {
+            draft.damages.add(damage::VERTEX, || fault(broken));
+            DVec3::NAN
+        }));
         if has_normals {
             draft.normals.push(unit(DVec3::new(nx, ny, nz)));
         }
         if has_uvs {
-            let uv = |name: &str, x: f64| texture_coordinate(x).map_err(|rule| fault(name, rule));
-            draft.uvs.push(Vec2::new(uv("u", u)?, uv("v", v)?));
+            let uv = |name: &'static str, x: f64| texture_coordinate(x).map_err(|rule| (name, rule));
+            let uv = || Ok(Vec2::new(uv("u", u)?, uv("v", v)?));
+            draft.uvs.push(uv().unwrap_or_else(|broken| {
+                draft.damages.add(damage::UV, || fault(broken));
+                Vec2::ZERO
+            }));
         }
         if has_colors {
             let value = |k: usize| color_value(row[8 + k], of_colors[k], k == 3);
@@ -236,6 +260,7 @@ fn read_faces(element: &Element, values: &mut impl Values, vertices: usize, draf
         draft.notes.push(note.to_string());
     }
     draft.triangles.reserve_exact(element.count.min(MOST));
+    let mut corners = Vec::new();
     for i in 0..element.count {
         for (k, property) in element.properties.iter().enumerate() {
             let count = match property.count {
@@ -247,24 +272,28 @@ fn read_faces(element: &Element, values: &mut impl Values, vertices: usize, draf
             };
             let place = values.place();
             let length = list_length(count, property, values)?;
-            if length < 3 {
-                let rule = format!("face {i}: it must have 3 vertices or more; it has {length}");
-                return Err(place.fault(rule));
-            }
-            let mut fan = Fan::default();
+            corners.clear();
+            let mut broken = None;
             for _ in 0..length {
                 let place = values.place();
                 let vertex = values.next(property.scalar)?;
+                corners.push(vertex as u32);
                 if !(vertex >= 0.0 && vertex < vertices as f64 && vertex.fract() == 0.0) {
-                    let vertex = shown_number(vertex);
-                    let rule = format!("face {i}: vertex {vertex} is not there; there are {vertices}, counted from 0");
-                    return Err(place.fault(rule));
-                }
-                if let Some(triangle) = fan.next(vertex as u32) {
-                    draft.push(triangle, place)?;
+                    broken.get_or_insert((place, vertex));
                 }
             }
+            if let Some((place, vertex)) = broken {
+                let vertex = shown_number(vertex);
+                let rule = || format!("face {i}: vertex {vertex} does not exist; there are {vertices}, counted from 0");
+                draft.damages.add(damage::FACE, || place.fault(rule()));
+            } else if length < 3 {
+                let rule = || format!("face {i}: must have 3 vertices or more; it has {length}");
+                draft.damages.add(damage::FACE, || place.fault(rule()));
+            } else {
+                draft.face(&corners, place)?;
+            }
         }
+        end_row(values, draft);
     }
     Ok(())
 }

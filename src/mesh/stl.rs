@@ -9,6 +9,7 @@ use glam::{DVec3, Vec3};
 use hashbrown::{DefaultHashBuilder, HashTable};
 
 use super::Group;
+use super::damage;
 use super::draft::{Draft, coordinate, counted, unit};
 use super::error::{Fault, Place, shown};
 use super::words::Words;
@@ -74,10 +75,7 @@ fn binary(bytes: &[u8], facets: &mut Facets) -> Result<(), Fault> {
         let vector = |k: usize| DVec3::new(number(k), number(k + 1), number(k + 2));
         let place = |k: usize| Place::Byte(HEADER + TRIANGLE * i + 4 * k);
         let normal = vector(0);
-        let mut vertices = [DVec3::ZERO; 3];
-        for (vertex, k) in vertices.iter_mut().zip([3, 6, 9]) {
-            *vertex = position(vector(k)).map_err(|(axis, rule)| place(k + axis).fault(rule))?;
-        }
+        let vertices = [3, 6, 9].map(|k| facets.position(vector(k), |axis, rule| place(k + axis).fault(rule)));
         facets.push(normal, vertices, place(0))?;
     }
     Ok(())
@@ -116,8 +114,9 @@ fn solid(words: &mut Words, facets: &mut Facets) -> Result<(), Fault> {
         let mut vertices = [DVec3::ZERO; 3];
         for vertex in &mut vertices {
             expect(words, "vertex")?;
-            *vertex = position(vector(words)?)
-                .map_err(|(axis, rule)| words.fault(format!("{}: {rule}", ["x", "y", "z"][axis])))?;
+            let point = vector(words)?;
+            let fault = |axis: usize, rule| words.fault(format!("{}: {rule}", ["x", "y", "z"][axis]));
+            *vertex = facets.position(point, fault);
         }
         expect(words, "endloop")?;
         expect(words, "endfacet")?;
@@ -137,12 +136,6 @@ fn expect(words: &mut Words, keyword: &str) -> Result<(), Fault> {
     }
 }
 
-/// Checks a position. The error is the axis, the value and the rule.
-fn position(p: DVec3) -> Result<DVec3, (usize, String)> {
-    let check = |axis: usize| coordinate(p[axis]).map_err(|rule| (axis, rule));
-    Ok(DVec3::new(check(0)?, check(1)?, check(2)?))
-}
-
 /// Triangles whose vertices are shared where their bits are equal.
 #[derive(Default)]
 struct Facets {
@@ -153,10 +146,24 @@ struct Facets {
 }
 
 impl Facets {
+    /// Returns a vertex, or NaN for a facet to be left out. The fault is made of the axis and the rule.
+    fn position(&mut self, p: DVec3, fault: impl FnOnce(usize, String) -> Fault) -> DVec3 {
+        for axis in 0..3 {
+            if let Err(rule) = coordinate(p[axis]) {
+                self.draft.damages.add(damage::FACE, || fault(axis, rule));
+                return DVec3::NAN;
+            }
+        }
+        p + DVec3::ZERO // a zero has no sign, so that equal positions have equal bits
+    }
+
     fn push(&mut self, normal: DVec3, vertices: [DVec3; 3], place: Place) -> Result<(), Fault> {
+        if !vertices.iter().all(|vertex| vertex.is_finite()) {
+            return Ok(());
+        }
         let normal = if self.normals_wanted { unit(normal) } else { Vec3::ZERO };
         let triangle = vertices.map(|vertex| self.number(vertex, normal));
-        self.draft.push(triangle, place)
+        self.draft.face(&triangle, place)
     }
 
     /// The number of the vertex with this position and normal.

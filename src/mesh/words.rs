@@ -1,6 +1,21 @@
 //! The words of a text file, with the lines that they stand in.
 
+use std::borrow::Cow;
+
 use super::error::{Fault, Place, shown};
+
+/// Returns a text as UTF-8: one that begins with the byte order mark of UTF-16 is converted.
+pub(super) fn utf8(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let unit: fn([u8; 2]) -> u16 = match bytes {
+        [0xfe, 0xff, ..] => u16::from_be_bytes,
+        [0xff, 0xfe, ..] => u16::from_le_bytes,
+        _ => return Cow::Borrowed(bytes),
+    };
+    let (pairs, _) = bytes[2..].as_chunks::<2>();
+    let text = char::decode_utf16(pairs.iter().map(|pair| unit(*pair)));
+    let text: String = text.map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
+    Cow::Owned(text.into_bytes())
+}
 
 /// A text as words between blanks. `#` in front of a word makes the rest of the line a comment; a backslash at the end of a
 /// line joins it with the next one, and is nothing at the end of the text.
@@ -130,6 +145,19 @@ impl<'a> Words<'a> {
                 false
             }
         }
+    }
+
+    /// Goes to the end of the line. Returns whether there was another word.
+    pub fn skip_rest(&mut self) -> bool {
+        let has_more = self.on_line().is_some();
+        while self.on_line().is_some() {}
+        has_more
+    }
+
+    /// Returns the number of lines that are left and have a character that is not a blank.
+    pub fn lines_left(&self) -> usize {
+        let lines = self.bytes[self.at..].split(|byte| *byte == self.end);
+        lines.filter(|line| line.iter().any(|byte| *byte > b' ')).count()
     }
 
     /// The next number of the line.

@@ -187,7 +187,7 @@ fn item(kind: u32, index: u32, (low, high): (DVec3, DVec3)) -> Item {
     }
 }
 
-fn box_in_world(mesh: &Mesh, to_world: &DAffine3) -> (DVec3, DVec3) {
+fn box_in_world(mesh: &Arc<Mesh>, to_world: &DAffine3) -> (DVec3, DVec3) {
     let corners = mesh.corners().map(|corner| to_world.transform_point3(corner));
     corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
         (low.min(p), high.max(p))

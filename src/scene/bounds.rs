@@ -1,15 +1,15 @@
-//! How far the shapes of a scene reach.
+//! Axis-aligned bounding boxes of shapes and scenes.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Geometry, Scene};
 
-/// A box, from its lowest corner to its highest.
+/// The minimum and maximum corner of a box.
 pub type Bounds = (DVec3, DVec3);
 
 impl Scene {
-    /// The box around all shapes but planes, which are infinite; none where there are no others.
+    /// Returns the bounding box of all shapes except planes, or `None` if there are only planes.
     pub fn bounds(&self) -> Option<Bounds> {
         let all = self.shapes.iter().filter_map(|shape| shape.geometry.bounds());
         all.reduce(join)
@@ -17,7 +17,7 @@ impl Scene {
 }
 
 impl Geometry {
-    /// The box around it; none around a plane.
+    /// Returns the bounding box, or `None` for a plane, which is infinite.
     pub fn bounds(&self) -> Option<Bounds> {
         of(self)
     }
@@ -32,7 +32,7 @@ fn around(center: DVec3, reach: DVec3) -> Option<Bounds> {
 }
 
 fn of(geometry: &Geometry) -> Option<Bounds> {
-    // A disk or an ellipsoid reaches along an axis as far as its half axes' parts there, squared and summed.
+    // The extent of a disk or an ellipsoid along an axis is the norm of its half axes' components there.
     let round = |axes: &[DVec3]| axes.iter().map(|axis| axis * axis).sum::<DVec3>().map(f64::sqrt);
     match geometry {
         Geometry::Rectangle(shape) => around(shape.center, shape.u.abs() + shape.v.abs()),

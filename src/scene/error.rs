@@ -6,6 +6,7 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::gltf::GltfError;
+use crate::mesh::MeshError;
 
 /// An error of loading a scene. Every message starts with its location.
 #[derive(Debug, thiserror::Error)]
@@ -45,6 +46,17 @@ pub enum SceneError {
     /// The glTF file could not be loaded as a scene.
     #[error("{0}")]
     Gltf(GltfError),
+    /// The mesh file could not be loaded as a scene.
+    #[error("{0}")]
+    Mesh(MeshError),
+    /// The file has a format that cannot be read.
+    #[error("{}: {message}", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// The format, and what to do.
+        message: String,
+    },
     /// A value that overrides one of the file is invalid; the key is the field of [`Overrides`](super::Overrides).
     #[error("{0}")]
     Override(Problem),
@@ -72,7 +84,11 @@ impl SceneError {
             ..ErrorPlace::default()
         };
         match self {
-            SceneError::Read { path, .. } => of_file(path.display().to_string()),
+            SceneError::Read { path, .. } | SceneError::Unsupported { path, .. } => of_file(path.display().to_string()),
+            SceneError::Mesh(error) => ErrorPlace {
+                line: error.line(),
+                ..of_file(error.path().display().to_string())
+            },
             SceneError::Syntax {
                 origin, line, column, ..
             } => ErrorPlace {

@@ -324,7 +324,7 @@ pub(super) struct File {
 }
 
 /// What is taken of a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Part {
     /// Its colours, with what their values mean if that is said.
     Colors(Option<Encoding>),

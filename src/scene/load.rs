@@ -12,6 +12,7 @@ use super::define::{Define, Defines};
 use super::error::KeyPath;
 use super::error::{At, Problem, SceneError};
 use super::gltf::{GltfChoice, describe, is_gltf};
+use super::model;
 #[cfg(feature = "dev")]
 use super::parse::Places;
 use super::parse::{NOT_UTF8, encoding, invalid, line_of_path, syntax_error};
@@ -171,7 +172,8 @@ fn set_count(samples: &mut SamplesDescription, count: Option<u32>, integrator: I
 }
 
 impl Scene {
-    /// Reads and checks a scene file: JSON where its name ends in `.json`, glTF where that is `.gltf` or `.glb`, else TOML.
+    /// Reads and checks a scene file. The format follows from the file name: `.json` is JSON, `.gltf` and `.glb` are glTF, `.obj`, `.ply` and
+    /// `.stl` are meshes, and everything else is TOML.
     ///
     /// # Errors
     ///
@@ -190,7 +192,7 @@ impl Scene {
     }
 
     /// [`Scene::load_with`], and what the file describes, with the other values in their places; files that it names are relative to the file's
-    /// folder. A glTF file is described as one shape, with a camera and what lights it.
+    /// folder. A glTF file or a mesh file is described as one shape, with a camera and what lights it.
     ///
     /// # Errors
     ///
@@ -208,6 +210,10 @@ impl Scene {
         if is_gltf(path) {
             return load_gltf(path, overrides, files);
         }
+        if model::is_mesh(path) {
+            return load_mesh(path, overrides, files);
+        }
+        model::check_format(path)?;
         let text = read_text(path)?;
         parse_beside(&text, &path.display().to_string(), folder_of(path), overrides, files)
     }
@@ -270,6 +276,31 @@ fn load_gltf(
     let mut scene = overrides.finish(description.validate_and_list(&assets, files), invalid, |_| {})?;
     for note in &mut scene.notes {
         *note = own(note);
+    }
+    Ok((scene, description))
+}
+
+/// A mesh file as a scene of its own, with the values in place.
+fn load_mesh(
+    path: &Path,
+    overrides: &Overrides,
+    files: &mut BTreeSet<PathBuf>,
+) -> Result<(Scene, Description), SceneError> {
+    let (mut description, _mesh) = model::describe(path, overrides)?;
+    if !overrides.define.is_empty() {
+        let mut defines = Defines::new(&overrides.define);
+        description = description.defined(&mut defines).map_err(SceneError::Override)?;
+    }
+    overrides.apply(&mut description).map_err(SceneError::Override)?;
+    let assets = overrides.assets(folder_of(path), folder_of(path));
+    let checked = description.validate_and_list(&assets, files);
+    let mut scene = overrides.finish(checked, |problem| model::error_of(path, problem), |_| {})?;
+    // Whose name stands before the notes.
+    let place = format!("{}: ", path.file_name().unwrap_or_default().to_string_lossy());
+    for note in &mut scene.notes {
+        if let Some(own) = note.strip_prefix(&place) {
+            *note = own.to_owned();
+        }
     }
     Ok((scene, description))
 }

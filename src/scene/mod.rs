@@ -20,6 +20,7 @@ pub(crate) mod limits;
 mod load;
 mod mesh_file;
 mod metals;
+mod model;
 mod parse;
 mod presentation;
 mod schema;
@@ -62,6 +63,7 @@ pub use load::Overrides;
 #[cfg(feature = "dev")]
 pub(crate) use load::{Draft, folder_of, read_bytes, read_text};
 pub use metals::MetalIndex;
+pub use model::{is_mesh, is_model};
 #[cfg(feature = "dev")]
 pub(crate) use parse::{Pieces, Places};
 pub use presentation::{Presentation, UpAxis};

@@ -137,7 +137,7 @@ impl TextureFilter {
 }
 
 /// What an image's 8-bit and 16-bit values mean. In a file the names are in snake case: `"srgb"`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
     /// Colours by the curve of IEC 61966-2-1.

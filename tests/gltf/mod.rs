@@ -3,7 +3,7 @@
 
 mod agreement;
 mod animations;
-mod build;
+pub mod build;
 mod cameras;
 mod damage;
 mod geometry;

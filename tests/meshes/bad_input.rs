@@ -41,12 +41,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "a.obj",
         "v 1 2 3\nf 1 1 2\n",
-        "a.obj:2: vertex 2 of the face is not there; there are 1 so far",
+        "a.obj:2: vertex 2 of the face does not exist; there are 1 so far",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 1 1 -2\n",
-        "a.obj:2: vertex -2 of the face is not there; there are 1 so far",
+        "a.obj:2: vertex -2 of the face does not exist; there are 1 so far",
     ),
     (
         "a.obj",
@@ -56,17 +56,17 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "a.obj",
         "v 1 2 3\nf 1/1 1 1\n",
-        "a.obj:2: texture coordinate 1 of the face is not there; there are 0 so far",
+        "a.obj:2: texture coordinate 1 of the face does not exist; there are 0 so far",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 1//4294967297 1 1\n",
-        "a.obj:2: normal 4294967297 of the face is not there; there are 0 so far",
+        "a.obj:2: normal 4294967297 of the face does not exist; there are 0 so far",
     ),
     (
         "a.obj",
         "v 1 2 3\nf 1 1 99999999999999999999999999999999999999\n",
-        "a.obj:2: vertex 999999999999999999999999999999 of the face is not there; there are 1 so far",
+        "a.obj:2: vertex 999999999999999999999999999999 of the face does not exist; there are 1 so far",
     ),
     (
         "a.obj",
@@ -118,7 +118,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "a.ply",
         "ply\nfromat ascii\n",
-        "a.ply:2: \"fromat\" must be \"format\", \"comment\", \"obj_info\", \"element\", \"property\" or \"end_header\"",
+        "a.ply:3: the file ends inside of its header; \"end_header\" is missing",
     ),
     (
         "a.ply",
@@ -180,7 +180,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "a.stl",
         "solid\nfacet normal 0 0 1\nouter loop\nvertex 1 -inf 2",
-        "a.stl:4: y: -inf must be finite, from -1e9 to 1e9",
+        "a.stl:4: the file ends where \"vertex\" must be",
     ),
 ];
 
@@ -249,19 +249,19 @@ fn bad_ply_bodies_are_told() {
         ),
         (
             ply(vertex, face, &format!("{points}3 0 1 3\n")),
-            "a.ply:13: face 0: vertex 3 is not there; there are 3, counted from 0",
+            "a.ply:13: face 0: vertex 3 does not exist; there are 3, counted from 0",
         ),
         (
             ply(vertex, face, &format!("{points}3 0 1 -1\n")),
-            "a.ply:13: face 0: vertex -1 is not there; there are 3, counted from 0",
+            "a.ply:13: face 0: vertex -1 does not exist; there are 3, counted from 0",
         ),
         (
             ply(vertex, face, &format!("{points}3 0 1 1.5\n")),
-            "a.ply:13: face 0: vertex 1.5 is not there; there are 3, counted from 0",
+            "a.ply:13: face 0: vertex 1.5 does not exist; there are 3, counted from 0",
         ),
         (
             ply(vertex, face, &format!("{points}2 0 1\n")),
-            "a.ply:13: face 0: it must have 3 vertices or more; it has 2",
+            "a.ply:13: face 0: must have 3 vertices or more; it has 2",
         ),
         (
             ply(vertex, face, &format!("{points}-3 0 1 2\n")),
@@ -270,14 +270,6 @@ fn bad_ply_bodies_are_told() {
         (
             ply(vertex, face, &format!("{points}4 0 1 2\n")),
             "a.ply:14: the file ends too early: values are missing",
-        ),
-        (
-            ply(
-                &format!("{vertex}property float u\nproperty float v\n"),
-                face,
-                "0 0 0 0 inf\n1 0 0 0 0\n0 1 0 0 0\n3 0 1 2\n",
-            ),
-            "a.ply:12: vertex 0: v: inf must be finite as a 32-bit float",
         ),
     ] {
         let error = load("a.ply", &text, None).unwrap_err();
@@ -365,7 +357,7 @@ fn good_files() -> Vec<(&'static str, Vec<u8>)> {
     files
 }
 
-/// A message has the file, and a place where there is one.
+/// Checks a mesh, or that a message has the file, and a place if any. Returns whether there is neither an error nor damage.
 fn check(name: &str, result: Result<Mesh, String>) -> bool {
     match result {
         Ok(mesh) => {
@@ -381,7 +373,8 @@ fn check(name: &str, result: Result<Mesh, String>) -> bool {
             for normal in &mesh.normals {
                 assert!((normal.length() - 1.0).abs() < 1e-5, "{normal}");
             }
-            true
+            let is_damage = |note: &String| note.starts_with("line ") || note.starts_with("byte ");
+            !mesh.notes.iter().any(is_damage)
         }
         Err(message) => {
             assert!(message.starts_with(&format!("{name}:")), "{message}");
@@ -410,7 +403,7 @@ fn files_that_are_cut_anywhere_are_meshes_or_errors() {
 const MTL: &str = "# all\nnewmtl a\nKa 1 1 1\nKd 0.5 0.25 \\\n0.125\nKs 0.5\nNs 20\nd 0.5\nillum 2\nmap_Kd -s 2 2 a.png\n\
                    newmtl b c\r\nKe 1 0 0\r\nTr 1\r\nNi 1.5\r\nmap_Bump -bm 1 b.png\r\n";
 
-/// Checks that a mesh with this MTL file is a scene, or an error about its materials, and says which.
+/// Checks that a mesh with this MTL file is a scene. Returns whether the file has both of its materials.
 fn check_mtl(folder: &std::path::Path, mtl: &[u8]) -> bool {
     std::fs::write(folder.join("a.mtl"), mtl).unwrap();
     let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 0 1\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b c\nf 3/1 2/1 1/1\n";
@@ -441,19 +434,17 @@ fn check_mtl(folder: &std::path::Path, mtl: &[u8]) -> bool {
                 assert!((1e-6..=1e6).contains(shininess), "{material:?}");
             }
             assert!(scene.notes.iter().all(|note| note.len() < 500), "{:?}", scene.notes);
-            true
+            !scene
+                .notes
+                .iter()
+                .any(|note| note.ends_with("a grey material stands in"))
         }
-        Err(error) => {
-            let message = error.to_string();
-            assert!(message.contains(": shapes[0].material: is missing; "), "{message}");
-            assert!(message.len() < 500, "{message}");
-            false
-        }
+        Err(error) => panic!("{error}"),
     }
 }
 
 #[test]
-fn materials_that_are_cut_anywhere_are_scenes_or_errors() {
+fn materials_that_are_cut_anywhere_are_scenes() {
     let folder = tempfile::tempdir().unwrap();
     let scenes = (0..=MTL.len()).filter(|end| check_mtl(folder.path(), &MTL.as_bytes()[..*end]));
     let last = MTL.find("b c").unwrap() + 3;
@@ -462,7 +453,7 @@ fn materials_that_are_cut_anywhere_are_scenes_or_errors() {
 }
 
 #[test]
-fn materials_with_random_bytes_are_scenes_or_errors() {
+fn materials_with_random_bytes_are_scenes() {
     let folder = tempfile::tempdir().unwrap();
     let random = Random::new(17);
     let long = [b"newmtl ".as_slice(), &[b'x'; 5000], b"\nmap_Kd ", &[b'y'; 5000], b"\n"].concat();

@@ -2,8 +2,14 @@
 //! should, by whatever trees, without holes, on a sphere as on a sphere.
 
 mod bad_input;
+mod bounds;
+mod damage;
 pub mod forms;
+mod in_code;
 mod made;
+mod materials;
+mod model;
+mod polygons;
 mod readers;
 mod sphere;
 mod tangents;

@@ -22,7 +22,7 @@ use gather::Info;
 #[derive(Debug, clap::Args)]
 #[command(after_help = super::EXIT_CODES)]
 pub struct Args {
-    /// Scene file: .toml, .gltf or .glb, .json
+    /// Scene or model file: .toml, .json, .gltf, .glb, .obj, .ply or .stl
     scene: PathBuf,
 
     /// Print one JSON object

@@ -16,7 +16,7 @@ use wgray::device::DeviceInfo;
 use wgray::error::RenderError;
 use wgray::film::Region;
 use wgray::job::{CheckpointStore, NoCheckpoint};
-use wgray::scene::{Problem, Scene, is_gltf};
+use wgray::scene::{Problem, Scene, is_model};
 
 use self::once_log::OnceLog;
 use self::plan::Plan;
@@ -134,7 +134,7 @@ fn read(args: &Args, log: &OnceLog) -> anyhow::Result<Scene> {
     let scene = progress::named(args.shown_progress(), "reading the scene", || {
         super::load(path, &overrides)
     })?;
-    let still = match is_gltf(path) {
+    let still = match is_model(path) {
         true => "no animation: all frames are equal",
         false => "no camera.path: all frames are equal",
     };

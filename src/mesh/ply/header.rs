@@ -1,5 +1,6 @@
 //! The header of a PLY file: what elements there are, and the types of their properties.
 
+use super::super::damage::{self, Damages};
 use super::super::error::{Fault, Place, shown};
 use super::super::words::Words;
 
@@ -84,7 +85,15 @@ pub(super) struct Header {
     pub elements: Vec<Element>,
 }
 
-pub(super) fn header(words: &mut Words) -> Result<Header, Fault> {
+impl Header {
+    /// Returns the number of rows that have values.
+    pub fn rows(&self) -> u128 {
+        let with_values = self.elements.iter().filter(|element| !element.properties.is_empty());
+        with_values.map(|element| element.count as u128).sum()
+    }
+}
+
+pub(super) fn header(words: &mut Words, damages: &mut Damages) -> Result<Header, Fault> {
     if words.on_line() != Some(&b"ply"[..]) {
         return Err(words.fault("the file must begin with \"ply\""));
     }
@@ -139,7 +148,7 @@ pub(super) fn header(words: &mut Words) -> Result<Header, Fault> {
             Some(b"end_header") => break,
             Some(word) => {
                 let rule = "must be \"format\", \"comment\", \"obj_info\", \"element\", \"property\" or \"end_header\"";
-                return Err(words.fault(format!("{} {rule}", shown(word))));
+                damages.add(damage::LINE, || words.fault(format!("{} {rule}", shown(word))));
             }
         }
     }

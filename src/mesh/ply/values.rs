@@ -13,10 +13,16 @@ pub(super) trait Values {
     fn left(&self) -> usize;
     /// Where the next value is.
     fn place(&mut self) -> Place;
+    /// Ends a row. Returns its line if that has more values, which are skipped.
+    fn end_row(&mut self) -> Option<Place> {
+        None
+    }
 }
 
 pub(super) struct Ascii<'a> {
     pub words: Words<'a>,
+    /// Each row ends with its line. Otherwise a line may have several rows.
+    pub by_lines: bool,
 }
 
 impl Values for Ascii<'_> {
@@ -46,6 +52,11 @@ impl Values for Ascii<'_> {
     fn place(&mut self) -> Place {
         self.words.find_word_anywhere();
         self.words.place()
+    }
+
+    fn end_row(&mut self) -> Option<Place> {
+        let place = self.words.place();
+        (self.by_lines && self.words.skip_rest()).then_some(place)
     }
 }
 

@@ -12,19 +12,11 @@ use glam::DVec3;
 
 use super::error::{Problem, SceneError};
 use super::load::{Overrides, folder_of};
-use super::{
-    Description, EnvironmentDescription, EnvironmentName, Framing, GltfDescription, ImageDescription, Integrator,
-    RenderDescription, SamplesDescription, Scene, Selection, View, ViewTransform, framed,
-};
+use super::model::{self, SIDE};
+use super::{Description, Framing, GltfDescription, Scene, Selection, View, framed};
 use crate::gltf::{Choice, GltfError, Imported, ImportedCamera, ModelContents, STILL, UPRIGHT, load};
 
 pub(super) use self::expand::Expanded;
-
-/// The longer side of a picture in pixels, and the samples of a pixel, if nothing is said.
-const LONGER_SIDE: u32 = 1024;
-const SAMPLES: u32 = 64;
-/// What is behind it: the grey in the middle of what a display shows.
-const BACKGROUND: DVec3 = DVec3::splat(0.18);
 
 /// What is shown of a glTF file, and from where.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -173,25 +165,9 @@ pub(super) fn describe(
         Some(camera) => camera.description.clone(),
         None => framed(points.iter().copied(), framing).into(),
     };
-    let render = RenderDescription {
-        integrator: Some(Integrator::Path),
-        pixel_samples: SamplesDescription::new(SAMPLES),
-        ..RenderDescription::default()
-    };
-    let mut description = Description::new(width, height, camera)
-        .with_render(render)
-        .with_shape(shape);
-    presentation.add_ground(&mut description, &points);
-    description.image = ImageDescription {
-        view_transform: ViewTransform::KhronosPbrNeutral,
-        ..description.image
-    };
+    let mut description = model::scene(overrides, (width, height), camera, shape, &points);
     if imported.lights.is_empty() {
-        // What is shown stands before grey, not before the studio's lamps, unless surroundings are asked for.
-        description = description.with_environment(EnvironmentDescription {
-            background: overrides.environment.is_none().then_some(BACKGROUND),
-            ..EnvironmentDescription::named(EnvironmentName::Studio)
-        });
+        description = description.with_environment(model::studio(overrides));
     }
     Ok((description, imported))
 }
@@ -212,13 +188,9 @@ fn chosen<'a>(
 
 /// A size of this aspect.
 fn size(aspect: Option<f64>) -> (u32, u32) {
-    let side = |ratio: f64| {
-        (f64::from(LONGER_SIDE) * ratio)
-            .round()
-            .clamp(1.0, f64::from(LONGER_SIDE)) as u32
-    };
+    let side = |ratio: f64| (f64::from(SIDE) * ratio).round().clamp(1.0, f64::from(SIDE)) as u32;
     match aspect {
         Some(aspect) if aspect > 0.0 => (side(aspect), side(1.0 / aspect)),
-        _ => (LONGER_SIDE, LONGER_SIDE),
+        _ => (SIDE, SIDE),
     }
 }

@@ -202,7 +202,7 @@ pub(super) fn texture(description: &TextureDescription, images: &mut Images) -> 
 }
 
 /// A texture of a part of an image.
-fn image_texture(texture: &ImageTextureDescription, part: Part, images: &mut Images) -> Checked<Texture> {
+pub(super) fn image_texture(texture: &ImageTextureDescription, part: Part, images: &mut Images) -> Checked<Texture> {
     let max_anisotropy = between(texture.max_anisotropy, ANISOTROPIES).at("max_anisotropy")?;
     let transform = transform(texture.scale, texture.rotate, texture.offset)?;
     for x in texture.factor {

@@ -1,6 +1,7 @@
 //! The rules of meshes.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
@@ -134,7 +135,10 @@ pub(super) fn notes(
 
 fn load(file: &str, normals: Option<Normals>, known: &mut Known) -> Checked<Arc<Mesh>> {
     if let Some(mesh) = known.assets.meshes.get(file) {
-        return Ok(Arc::clone(mesh));
+        return match mesh.broken_rule() {
+            None => Ok(Arc::clone(mesh)),
+            Some(rule) => Err(Problem::new(format!("{file:?}: {rule}"))).at("file"),
+        };
     }
     let place = known.assets.find(file).at("file")?;
     let Place::File(path) = place else {
@@ -143,6 +147,9 @@ fn load(file: &str, normals: Option<Normals>, known: &mut Known) -> Checked<Arc<
     let mesh = mesh_file::load(&path, normals)
         .map_err(|error| Problem::new(error.to_string()))
         .at("file")?;
+    if let (true, Some(damage)) = (known.assets.strict, mesh.damage.first()) {
+        return Err(Problem::damage(damage.clone().of(Path::new(file)).to_string())).at("file");
+    }
     known.looks.know(&mesh);
     Ok(mesh)
 }
@@ -206,57 +213,44 @@ fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, known: &mut Kn
         of_names.insert(group.as_str(), named(material).at(group.as_str()).at("materials")?);
     }
     let mut indices = Vec::with_capacity(mesh.groups.len());
+    let mut missing = BTreeSet::new();
     for (i, group) in mesh.groups.iter().enumerate() {
         let named = names(group).find_map(|name| of_names.get(name).copied()).or(whole);
-        indices.extend(named.or_else(|| known.looks.of_group(mesh, i)));
-        if indices.len() == i {
-            let has_none = |(j, group): &(usize, &Group)| {
-                let named = names(group).any(|name| of_names.contains_key(name));
-                !named && known.looks.of_group(mesh, *j).is_none()
-            };
-            let missing = mesh.groups.iter().enumerate().skip(i).filter(has_none);
-            let missing = missing.map(|(_, group)| group).collect::<Vec<_>>();
-            return Err(Problem::of("material", without_material(mesh, file, &missing)));
+        let index = named.or_else(|| known.looks.of_group(mesh, i));
+        if index.is_none() {
+            missing.extend(group.material.as_deref());
         }
+        indices.push(index.unwrap_or_else(|| known.looks.default_material(!mesh.colors.is_empty())));
+    }
+    if !missing.is_empty() {
+        known.looks.unmatched.insert(without_material(mesh, file, &missing));
     }
     Ok(indices)
 }
 
-/// What is told of groups that have no material.
-fn without_material(mesh: &Mesh, file: &str, groups: &[&Group]) -> String {
-    /// The most names in the message.
+/// Returns the note about materials that the file names and no file describes.
+fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String {
+    /// Maximum number of names in the message.
     const MOST_NAMES: usize = 8;
-    // Few materials may have many groups.
-    let name = |group: &&Group| group.material.clone().unwrap_or_else(|| group.name.clone());
-    let names: BTreeSet<String> = groups.iter().map(name).collect();
-    let is_unnamed = names.contains("");
-    let count = names.len() - usize::from(is_unnamed);
-    let shown = names.iter().filter(|name| !name.is_empty()).take(MOST_NAMES);
-    let mut parts: Vec<String> = shown.map(|name| format!("{:?}", cut(name))).collect();
-    if count > MOST_NAMES {
-        parts.push(format!("{} more", count - MOST_NAMES));
+    let shown = missing.iter().take(MOST_NAMES);
+    let mut names = shown
+        .map(|name| format!("{:?}", cut(name)))
+        .collect::<Vec<_>>()
+        .join(", ");
+    if missing.len() > MOST_NAMES {
+        names += &format!(" and {} more", missing.len() - MOST_NAMES);
     }
-    if is_unnamed {
-        parts.push("triangles without a name".to_owned());
-    }
-    let what = match (count, parts.pop()) {
-        (0, _) => return format!("is missing; {file:?} has triangles without a group that materials could name"),
-        (_, None) => String::new(),
-        (_, Some(last)) if parts.is_empty() => last,
-        (_, Some(last)) => format!("{} and {last}", parts.join(", ")),
-    };
     let why = match mesh.libraries.as_slice() {
-        _ if groups.iter().all(|group| group.material.is_none()) => String::new(),
-        [] => ", and the file names no MTL file that has".to_owned(),
+        [] => "the file names no MTL file".to_owned(),
         libraries => match libraries.iter().find_map(|l| Some((l, l.problem.as_ref()?))) {
             Some((library, problem)) => {
                 let name = library.file.file_name().unwrap_or_default().display();
-                format!("; its MTL file \"{name}\" is not read: {problem}")
+                format!("its MTL file \"{name}\" cannot be read: {problem}")
             }
-            None => ", nor do its MTL files".to_owned(),
+            None => "its MTL files do not have it".to_owned(),
         },
     };
-    format!("is missing; {file:?} has {what}, which materials does not name{why}")
+    format!("{file}: no material {names}: {why}; a grey material stands in")
 }
 
 /// The names by which a file's group may be told: its own, and that of the material which the file gives it.
@@ -273,7 +267,8 @@ fn has_textures(material: &Material) -> bool {
     is_streaked || !material.textures().is_empty()
 }
 
-fn turned_up(up: Up) -> DAffine3 {
+/// Returns the map that turns an axis of a file upwards.
+pub(in crate::scene) fn turned_up(up: Up) -> DAffine3 {
     DAffine3::from_mat3(match up {
         Up::X => DMat3::from_cols(DVec3::Z, DVec3::X, DVec3::Y),
         Up::Y => DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y),

@@ -4,6 +4,7 @@
 
 mod appearance;
 mod camera;
+mod default_material;
 mod environment;
 mod integrator;
 mod light;
@@ -34,7 +35,7 @@ use super::{
 };
 
 pub(super) use self::appearance::TEXEL_MEMORY;
-pub(super) use self::mesh::placement;
+pub(super) use self::mesh::{placement, turned_up};
 pub(super) use self::path::LIGHT_SAMPLES;
 
 /// From which bounce on a path may end at random, if nothing is said.
@@ -116,7 +117,7 @@ impl Description {
         let own = (self.materials.keys().cloned().collect(), materials);
         let mut known = Known {
             names: &indices,
-            looks: Looks::new(own, textures, images, files),
+            looks: Looks::new(own, textures, images, files, integrator),
             assets,
         };
         let mut shapes = each(&self.shapes, |description| shape(description, &mut known)).at("shapes")?;
@@ -129,6 +130,9 @@ impl Description {
         mesh::few_groups(&shapes).at("instances")?;
         let mut notes = mesh::notes(&self.shapes, &shapes, &meshes);
         let mut looks = known.looks;
+        if let Some(damage) = looks.damage() {
+            return Err(damage);
+        }
         let material_names = std::mem::take(&mut looks.names);
         let materials = std::mem::take(&mut looks.materials);
         let textures = std::mem::take(&mut looks.textures);

@@ -1,5 +1,7 @@
 //! Materials that meshes bring: what a group's MTL file says of it, as a Phong material, where the scene says nothing.
 
+mod principled;
+
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -7,11 +9,12 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::super::error::{cut, cut_to};
-use super::super::image_file::Place;
+use super::super::image_file::{Part, Place};
 use super::super::limits::{BRIGHTEST, SHININESS};
-use super::super::{Color, ImageTextureDescription, Material, Reflection, Texture, TextureDescription};
-use super::appearance::{Images, texture};
-use super::{number, show};
+use super::super::{Color, ImageTextureDescription, Integrator, Material, Reflection, Texture};
+use super::appearance::{Images, image_texture};
+use super::default_material::default_materials;
+use super::{Problem, number, show};
 use crate::mesh::{Mesh, MtlMaterial, file_beside};
 
 /// What a material is like of which its file does not say it: `Kd` by Ramey, Rose and Tyerman, "MTL material format", 1995;
@@ -20,7 +23,7 @@ const DIFFUSE: f64 = 0.8;
 const NS: f64 = 16.0;
 
 /// The most characters that are told of why there is no image.
-const MOST_OF_MAP: usize = 300;
+const MAX_MAP_MESSAGE: usize = 300;
 
 /// All materials of a scene, those of meshes behind its own.
 pub(super) struct Looks<'a> {
@@ -34,11 +37,25 @@ pub(super) struct Looks<'a> {
     folder: PathBuf,
     /// What is known of each mesh, by its address.
     meshes: HashMap<usize, Described>,
-    /// The materials by their file and line, and by whether their mesh has texture coordinates.
-    known: HashMap<(PathBuf, usize, bool), usize>,
+    integrator: Integrator,
+    /// The materials by their file and line, and by what their mesh has.
+    known: HashMap<(PathBuf, usize, Traits), usize>,
     /// The textures of maps.
-    maps: BTreeMap<Place, usize>,
+    maps: BTreeMap<(Place, Part), usize>,
     oddities: BTreeMap<(PathBuf, Oddity), (String, usize)>,
+    /// The material of groups that have none, for meshes without and with colors; and its index once it is used.
+    defaults: [(Material, Option<usize>); 2],
+    /// Notes about materials that mesh files name and no file describes.
+    pub unmatched: BTreeSet<String>,
+    /// The first damaged image, if damage is refused.
+    damage: Option<Problem>,
+}
+
+/// What a mesh has that its materials depend on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Traits {
+    has_uvs: bool,
+    has_colors: bool,
 }
 
 /// Where the materials of a mesh's groups are.
@@ -56,8 +73,6 @@ enum Oddity {
     Bright,
     Specular,
     Shininess,
-    Emission,
-    Opacity,
     Map,
     Other(&'static str),
 }
@@ -69,6 +84,7 @@ impl<'a> Looks<'a> {
         textures: Vec<Texture>,
         images: Images<'a>,
         files: &'a mut BTreeSet<PathBuf>,
+        integrator: Integrator,
     ) -> Self {
         let folder = &images.assets.folder;
         Looks {
@@ -82,7 +98,21 @@ impl<'a> Looks<'a> {
             known: HashMap::new(),
             maps: BTreeMap::new(),
             oddities: BTreeMap::new(),
+            defaults: default_materials(integrator).map(|material| (material, None)),
+            integrator,
+            unmatched: BTreeSet::new(),
+            damage: None,
         }
+    }
+
+    /// Returns the material of a group that has none.
+    pub fn default_material(&mut self, has_colors: bool) -> usize {
+        let (material, index) = &mut self.defaults[usize::from(has_colors)];
+        *index.get_or_insert_with(|| {
+            self.names.push("default".to_owned());
+            self.materials.push(material.clone());
+            self.materials.len() - 1
+        })
     }
 
     /// Takes note of a mesh, and of the files that it names, whether or not anything is taken from there.
@@ -93,7 +123,7 @@ impl<'a> Looks<'a> {
         }
         self.meshes.insert(address, Described::of(mesh));
         for library in &mesh.libraries {
-            let maps = library.materials.iter().filter_map(|m| m.diffuse_map.as_ref());
+            let maps = library.materials.iter().flat_map(MtlMaterial::maps);
             let maps: BTreeSet<&String> = maps.collect();
             let maps = maps.into_iter().map(|map| beside(&library.file, map));
             for path in maps.chain([library.file.clone()]) {
@@ -113,12 +143,18 @@ impl<'a> Looks<'a> {
         let (library, i) = described.places[group]?;
         let library = &mesh.libraries[library];
         let own = &library.materials[i];
-        let has_uvs = !mesh.uvs.is_empty();
-        let key = (library.file.clone(), own.line, has_uvs);
+        let traits = Traits {
+            has_uvs: !mesh.uvs.is_empty(),
+            has_colors: !mesh.colors.is_empty(),
+        };
+        let key = (library.file.clone(), own.line, traits);
         let material = match self.known.get(&key) {
             Some(material) => *material,
             None => {
-                let material = self.phong(own, &library.file, has_uvs);
+                let material = match self.integrator {
+                    Integrator::Phong => self.phong(own, &library.file, traits.has_uvs),
+                    Integrator::Path => self.principled(own, &library.file, traits),
+                };
                 self.names.push(own.name.clone());
                 self.materials.push(material);
                 self.known.insert(key, self.materials.len() - 1);
@@ -138,7 +174,7 @@ impl<'a> Looks<'a> {
             2 => format!("{first} (and 1 more material)"),
             _ => format!("{first} (and {} more materials)", count - 1),
         });
-        self.images.notes.into_iter().chain(oddities)
+        self.images.notes.into_iter().chain(self.unmatched).chain(oddities)
     }
 
     /// `Ka` is not looked at: exporters write what they like there, and one ambient light wants the colour of the surface.
@@ -171,37 +207,40 @@ impl<'a> Looks<'a> {
             let rule = format!("Ns: {exponent} must be from {low} to {high}; {inside} stands for it");
             odd.push((Oddity::Shininess, rule));
         }
-        if own.emission.is_some_and(|emission| emission != [0.0; 3]) {
-            let rule =
-                "Ke: it does not shine; a material of the scene with emission, or [[lights]], may stand in for it";
-            odd.push((Oddity::Emission, rule.to_owned()));
-        }
-        if own.opacity.is_some_and(|opacity| opacity < 1.0) {
-            let rule = "d or Tr: it is rendered opaque; a material of type \"glass\" of the scene may stand in for it";
-            odd.push((Oddity::Opacity, rule.to_owned()));
+        let needs_path = [
+            (own.emission.is_some_and(|emission| emission != [0.0; 3]), "Ke"),
+            (own.opacity.is_some_and(|opacity| opacity < 1.0), "d or Tr"),
+            (own.emission_map.is_some(), "map_Ke"),
+            (own.opacity_map.is_some(), "map_d"),
+            (own.bump_map.is_some(), "map_Bump"),
+            (own.normal_map.is_some(), "norm"),
+            (own.metallic_map.is_some(), "map_Pm"),
+            (own.roughness_map.is_some(), "map_Pr"),
+        ];
+        for (_, name) in needs_path.into_iter().filter(|(is_given, _)| *is_given) {
+            odd.push((
+                Oddity::Other(name),
+                format!("{name} is ignored: it needs integrator = \"path\""),
+            ));
         }
         for other in &own.others {
             let verb = if other.starts_with("the ") { "are" } else { "is" };
-            odd.push((Oddity::Other(other), format!("{other} {verb} not looked at")));
+            odd.push((Oddity::Other(other), format!("{other} {verb} ignored")));
         }
         let texture = own.diffuse_map.as_ref().map(|map| match has_uvs {
-            true => self.map(&beside(file, map)),
+            true => self.map(&beside(file, map), Part::Colors(None)),
             false => Err("the mesh has no texture coordinates".to_owned()),
         });
         let diffuse = match texture {
             None => Color::Plain(diffuse),
             Some(Ok(texture)) => Color::Texture(texture),
             Some(Err(why)) => {
-                let why = cut_to(MOST_OF_MAP, &why);
+                let why = cut_to(MAX_MAP_MESSAGE, &why);
                 odd.push((Oddity::Map, format!("map_Kd: {why}; Kd stands for it")));
                 Color::Plain(diffuse)
             }
         };
-        let place = format!("{}:{}: {:?}", self.shown(file).display(), own.line, cut(&own.name));
-        for (oddity, message) in odd {
-            let told = self.oddities.entry((file.to_owned(), oddity));
-            told.or_insert_with(|| (format!("{place}: {message}"), 0)).1 += 1;
-        }
+        self.tell(own, file, odd);
         Material {
             reflection: Reflection::Phong {
                 ambient: diffuse,
@@ -215,17 +254,42 @@ impl<'a> Looks<'a> {
         }
     }
 
-    /// The texture of an image, or why there is none.
-    fn map(&mut self, path: &Path) -> Result<usize, String> {
+    /// Returns the message of an image that cannot be used, and records it if damage is refused.
+    fn refuse(&mut self, problem: Problem) -> String {
+        let message = problem.message.clone();
+        if problem.is_damage && self.images.assets.strict {
+            self.damage.get_or_insert(Problem::damage(&*message));
+        }
+        message
+    }
+
+    /// Returns the first damaged image, if damage is refused.
+    pub fn damage(&mut self) -> Option<Problem> {
+        self.damage.take()
+    }
+
+    /// Records warnings about a material.
+    fn tell(&mut self, own: &MtlMaterial, file: &Path, odd: principled::Odd) {
+        let place = format!("{}:{}: {:?}", self.shown(file).display(), own.line, cut(&own.name));
+        for (oddity, message) in odd {
+            let told = self.oddities.entry((file.to_owned(), oddity));
+            told.or_insert_with(|| (format!("{place}: {message}"), 0)).1 += 1;
+        }
+    }
+
+    /// Returns the texture of a part of an image, or why there is none.
+    fn map(&mut self, path: &Path, part: Part) -> Result<usize, String> {
         let file = self.shown(path).to_string_lossy().into_owned();
-        let place = self.images.assets.find(&file).map_err(|problem| problem.message)?;
-        if let Some(texture) = self.maps.get(&place) {
+        let place = self.images.assets.find(&file);
+        let place = place.map_err(|problem| self.refuse(problem))?;
+        if let Some(texture) = self.maps.get(&(place.clone(), part)) {
             return Ok(*texture);
         }
-        let image = TextureDescription::Image(ImageTextureDescription::new(file));
-        let texture = texture(&image, &mut self.images).map_err(|problem| problem.message)?;
+        let image = ImageTextureDescription::new(file);
+        let texture = image_texture(&image, part, &mut self.images);
+        let texture = texture.map_err(|problem| self.refuse(problem))?;
         self.textures.push(texture);
-        self.maps.insert(place, self.textures.len() - 1);
+        self.maps.insert((place, part), self.textures.len() - 1);
         Ok(self.textures.len() - 1)
     }
 

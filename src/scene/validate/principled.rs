@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::super::limits::{ABSORPTIONS, ATTENUATION_DISTANCES, PRINCIPLED_IORS, SHARES, THICKNESSES, TURNS};
-use super::super::{Principled, PrincipledDescription};
+use super::super::{AlphaMode, Color, Principled, PrincipledDescription, Value, VertexColors};
 use super::appearance::Textures;
 use super::{At, Checked, Problem, between, check};
 
@@ -45,6 +45,34 @@ impl Textures<'_> {
             vertex_colors: d.vertex_colors,
             double_sided: d.double_sided,
         })
+    }
+}
+
+/// Returns a rough dielectric of a color, with the defaults of the file's keys otherwise.
+pub(super) fn dielectric(base_color: Color, roughness: f64) -> Principled {
+    Principled {
+        base_color,
+        metallic: Value::Plain(0.0),
+        roughness: Value::Plain(roughness),
+        anisotropy: Value::Plain(0.0),
+        anisotropy_rotation: 0.0,
+        anisotropy_direction: None,
+        ior: 1.5,
+        specular: Value::Plain(1.0),
+        specular_color: Color::Plain(DVec3::ONE),
+        transmission: Value::Plain(0.0),
+        thin: true,
+        absorption: DVec3::ZERO,
+        clearcoat: Value::Plain(0.0),
+        clearcoat_roughness: Value::Plain(0.0),
+        clearcoat_normal_map: None,
+        sheen_color: Color::BLACK,
+        sheen_roughness: Value::Plain(0.0),
+        alpha: Value::Plain(1.0),
+        alpha_mode: AlphaMode::Opaque,
+        alpha_cutoff: 0.5,
+        vertex_colors: VertexColors::None,
+        double_sided: true,
     }
 }
 

@@ -45,12 +45,6 @@ impl Place {
         let name = self.path("s.toml");
         Scene::parse(&format!("{SCENE}{shapes}"), &name.display().to_string())
     }
-
-    /// What is wrong with the scene of the one mesh.
-    fn told(&self, more: &str) -> String {
-        let told = self.scene(&format!("{MESH}{more}")).unwrap_err().to_string();
-        told.split_once("shapes[0].").unwrap().1.to_owned()
-    }
 }
 
 /// The names of the materials of a shape's groups.
@@ -184,25 +178,19 @@ fn what_cannot_be_rendered_is_told_once() {
             "Ks 1\nNs 1e9",
             "\"red\": Ns: 1e9 must be from 1e-6 to 1e6; 1e6 stands for it",
         ),
+        ("Ke 0 0 2", "\"red\": Ke is ignored: it needs integrator = \"path\""),
+        ("Tr 0.5", "\"red\": d or Tr is ignored: it needs integrator = \"path\""),
         (
-            "Ke 0 0 2",
-            "\"red\": Ke: it does not shine; a material of the scene with emission, or [[lights]], may stand in for it",
+            "map_bump b.png",
+            "\"red\": map_Bump is ignored: it needs integrator = \"path\"",
         ),
-        (
-            "Tr 0.5",
-            "\"red\": d or Tr: it is rendered opaque; a material of type \"glass\" of the scene may stand in for it",
-        ),
-        ("map_bump b.png", "\"red\": map_Bump is not looked at"),
         ("map_Kd none.png", "\"red\": map_Kd: \"in/none.png\" cannot be read: "),
         (
             "map_Kd damaged.png",
             "\"red\": map_Kd: \"in/damaged.png\" must be a PNG, JPEG, WebP, EXR or HDR file; Kd stands for it",
         ),
         ("map_Kd ../../outside.png", "\"red\": map_Kd: \"in/../../outside.png\" "),
-        (
-            "map_Kd -s 2 red wood.png",
-            "\"red\": the options of map_Kd are not looked at",
-        ),
+        ("map_Kd -s 2 red wood.png", "\"red\": the options of map_Kd are ignored"),
     ] {
         let place = Place::new(&format!("newmtl red\n{mtl}\n# all of it\nnewmtl blue\n"));
         let scene = place.scene(MESH).unwrap();
@@ -236,31 +224,33 @@ fn a_map_needs_texture_coordinates() {
 }
 
 #[test]
-fn what_has_no_material_is_told() {
+fn a_default_stands_in_for_missing_materials() {
     let place = Place::new("newmtl red\n");
-    let message = |rest: &str| format!("material: is missing; \"in/a.obj\" has {rest}");
-    let expected = message("\"blue\", which materials does not name, nor do its MTL files");
-    assert_eq!(place.told(""), expected);
+    let note = |rest: &str| format!("in/a.obj: no material {rest}; a grey material stands in");
+    let notes = |keys: &str| place.scene(&format!("{MESH}{keys}")).unwrap().notes;
+    let scene = place.scene(MESH).unwrap();
+    assert_eq!(scene.notes, [note("\"blue\": its MTL files do not have it")]);
+    assert_eq!(names(&scene, 0), ["red", "red", "default"]);
+    let gray = Color::Plain(DVec3::splat(0.8));
+    assert_eq!(phong(named(&scene, "default")).1, gray);
     fs::remove_file(place.path("in/a.mtl")).unwrap();
-    let told = place.told("");
-    let expected = message("\"blue\" and \"red\", which materials does not name; its MTL file \"a.mtl\" is not read: ");
-    assert!(told.starts_with(&expected), "{told}");
+    let start = "in/a.obj: no material \"blue\", \"red\": its MTL file \"a.mtl\" cannot be read: ";
+    assert!(notes("").iter().any(|note| note.starts_with(start)), "{:?}", notes(""));
     place.write("in/a.obj", &OBJ.replace("mtllib a.mtl\n", ""));
-    let expected = message("\"blue\", which materials does not name, and the file names no MTL file that has");
-    assert_eq!(place.told("materials = { red = 'own' }"), expected);
-    // Triangles before the first name; and many names.
-    let text = OBJ.replace("usemtl red\n", "");
-    let text = (0..20).fold(text, |text, i| {
-        format!("{text}g part {i}\nusemtl\nf 1/1 2/1 {}/1\n", i % 6 + 4)
+    let expected = note("\"blue\": the file names no MTL file");
+    assert_eq!(notes("materials = { red = 'own' }"), [expected]);
+    // A group that names no material is no surprise.
+    place.write("in/a.obj", &OBJ.replace("mtllib a.mtl\n", "").replace("usemtl ", "g "));
+    assert_eq!(notes(""), Vec::<String>::new());
+    // Many names.
+    let many = (0..20).fold(OBJ.replace("mtllib a.mtl\n", ""), |text, i| {
+        format!("{text}usemtl m{i}\nf 1/1 2/1 {}/1\n", i % 6 + 4)
     });
-    place.write("in/a.obj", &text);
-    assert_eq!(
-        place.told("materials = { blue = 'own' }"),
-        message(
-            "\"door\", \"part 0\", \"part 1\", \"part 10\", \"part 11\", \"part 12\", \"part 13\", \"part 14\", 13 more \
-             and triangles without a name, which materials does not name"
-        )
-    );
+    place.write("in/a.obj", &many);
+    let rest =
+        "\"blue\", \"m0\", \"m1\", \"m10\", \"m11\", \"m12\", \"m13\", \"m14\" and 14 more: the file names no MTL file";
+    let found = notes("");
+    assert!(found.contains(&note(rest)), "{found:?}");
 }
 
 #[test]

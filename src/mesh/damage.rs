@@ -1,0 +1,61 @@
+//! Damage to mesh files for which a stand-in exists: it is reported, and the rest of the file is used.
+
+use super::error::{Fault, Place};
+
+pub(super) const VERTEX: &str = "faces with this vertex are left out";
+pub(super) const FACE: &str = "the face is left out";
+pub(super) const UV: &str = "(0, 0) stands in for the texture coordinates";
+pub(super) const NORMAL: &str = "the normal of the triangles stands in";
+pub(super) const LINE: &str = "the line is ignored";
+pub(super) const REST: &str = "the rest of the line is ignored";
+
+/// The damage to a file, by its stand-ins.
+#[derive(Default)]
+pub(super) struct Damages(Vec<Damage>);
+
+struct Damage {
+    stand_in: &'static str,
+    first: Fault,
+    count: usize,
+}
+
+impl Damages {
+    /// Records damage. The message is made for the first of a kind only.
+    #[cold]
+    pub fn add(&mut self, stand_in: &'static str, fault: impl FnOnce() -> Fault) {
+        match self.0.iter_mut().find(|damage| damage.stand_in == stand_in) {
+            Some(damage) => damage.count += 1,
+            None => self.0.push(Damage {
+                stand_in,
+                first: fault(),
+                count: 1,
+            }),
+        }
+    }
+
+    /// Returns the first fault of each kind, and all of them as notes.
+    pub fn into_parts(self) -> (Vec<Fault>, Vec<String>) {
+        let notes = self.0.iter().map(Damage::note).collect();
+        (self.0.into_iter().map(|damage| damage.first).collect(), notes)
+    }
+
+    /// Returns the fault that was recorded first.
+    pub fn first(&self) -> Option<&Fault> {
+        self.0.first().map(|damage| &damage.first)
+    }
+}
+
+impl Damage {
+    fn note(&self) -> String {
+        let place = match self.first.place {
+            Place::File => String::new(),
+            Place::Line(line) => format!("line {line}: "),
+            Place::Byte(offset) => format!("byte {offset}: "),
+        };
+        let more = match self.count {
+            1 => String::new(),
+            count => format!(" (and {} more)", count - 1),
+        };
+        format!("{place}{}; {}{more}", self.first.message, self.stand_in)
+    }
+}

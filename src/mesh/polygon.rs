@@ -1,0 +1,168 @@
+//! Triangulation of polygons.
+//!
+//! Readers store each polygon as a fan from its first corner. A fan that leaves the polygon is replaced by ear clipping in the polygon's
+//! plane, whose normal is Newell's: the sum of the fan's cross products (Tampieri, "Newell's Method for Computing the Plane Equation of a
+//! Polygon", Graphics Gems III, 1992).
+
+use earcut::Earcut;
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::draft::{Draft, counted};
+
+/// Largest area of fan triangles outside of the polygon, relative to its area, at which the fan is kept.
+const AREA_TOLERANCE: f64 = 1e-6;
+/// Largest deviation of corners from a plane, relative to the distance of the farthest corner, of a polygon that counts as planar.
+const PLANE_TOLERANCE: f64 = 0.05;
+/// Largest length of the normal, relative to the fan's cross products, of a polygon whose parts cancel.
+const CANCELLATION: f64 = 1e-6;
+/// Maximum number of corners of a polygon that is clipped: ear clipping takes quadratic time at worst.
+const MAX_CORNERS: usize = 1 << 14;
+
+/// A polygon of four corners or more, as a fan among the triangles of a draft.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Polygon {
+    /// The fan's first triangle.
+    pub first: u32,
+    /// The number of triangles.
+    pub count: u32,
+}
+
+/// The properties of a polygon that decide on its triangulation.
+struct Form {
+    normal: DVec3,
+    /// A corner has no position.
+    is_damaged: bool,
+    /// The fan leaves the polygon.
+    is_concave: bool,
+    /// The areas of its parts cancel, so that it has no plane.
+    cancels: bool,
+    is_planar: bool,
+}
+
+/// Replaces the fans of concave polygons, and adds notes about polygons that have no unique triangulation.
+pub(super) fn triangulate(draft: &mut Draft) {
+    let forms: Vec<Form> = (draft.polygons.par_iter())
+        .map(|polygon| form(fan(&draft.triangles, polygon), &draft.positions))
+        .collect();
+    let mut clipper = Clipper::default();
+    let (mut bent, mut crossing, mut large) = (0, 0, 0);
+    for (polygon, form) in draft.polygons.iter().zip(&forms) {
+        let (first, count) = (polygon.first as usize, polygon.count as usize);
+        let fan = &mut draft.triangles[first..first + count];
+        bent += usize::from(!form.is_planar);
+        if form.is_damaged {
+            mark_damaged(fan, &draft.positions);
+        } else if form.cancels {
+            crossing += 1;
+        } else if form.is_concave && count + 2 > MAX_CORNERS {
+            large += 1;
+        } else if form.is_concave && !clipper.clip(fan, form.normal, &draft.positions) {
+            crossing += 1;
+        }
+    }
+    let notes = [
+        (bent, "polygon is not planar", "polygons are not planar"),
+        (crossing, "polygon intersects itself", "polygons intersect themselves"),
+        (
+            large,
+            "concave polygon has more than 16384 corners and becomes a fan of triangles",
+            "concave polygons have more than 16384 corners and become fans of triangles",
+        ),
+    ];
+    let notes = notes.into_iter().filter(|(count, ..)| *count > 0);
+    draft
+        .notes
+        .extend(notes.map(|(count, one, several)| counted(count, one, several)));
+}
+
+fn fan<'a>(triangles: &'a [[u32; 3]], polygon: &Polygon) -> &'a [[u32; 3]] {
+    &triangles[polygon.first as usize..][..polygon.count as usize]
+}
+
+fn form(fan: &[[u32; 3]], positions: &[DVec3]) -> Form {
+    let first = positions[fan[0][0] as usize];
+    let from_first = |vertex: u32| positions[vertex as usize] - first;
+    let cross = |[_, a, b]: &[u32; 3]| from_first(*a).cross(from_first(*b));
+    let normal: DVec3 = fan.iter().map(cross).sum();
+    let squares: f64 = fan.iter().map(|triangle| cross(triangle).length_squared()).sum();
+    let outside: f64 = fan.iter().map(|triangle| cross(triangle).dot(normal).min(0.0)).sum();
+    let square = normal.length_squared();
+    let corners = || fan.iter().flat_map(|[_, a, b]| [*a, *b]).map(from_first);
+    let farthest = corners().map(DVec3::length_squared).fold(0.0, f64::max);
+    let (low, high) = corners()
+        .map(|corner| corner.dot(normal))
+        .fold((0.0_f64, 0.0_f64), |(low, high), height| {
+            (low.min(height), high.max(height))
+        });
+    Form {
+        normal,
+        is_damaged: !first.is_finite() || corners().any(|corner| !corner.is_finite()),
+        is_concave: outside < -AREA_TOLERANCE * square,
+        cancels: squares > 0.0 && square <= CANCELLATION * CANCELLATION * squares,
+        is_planar: !((high - low).powi(2) > PLANE_TOLERANCE * PLANE_TOLERANCE * square * farthest),
+    }
+}
+
+/// Makes all triangles of a fan refer to its corner without a position: the whole face is left out.
+fn mark_damaged(fan: &mut [[u32; 3]], positions: &[DVec3]) {
+    let is_bad = |vertex: &u32| !positions[*vertex as usize].is_finite();
+    if let Some(bad) = fan.iter().flatten().copied().find(is_bad) {
+        fan.fill([bad; 3]);
+    }
+}
+
+/// Ear clipping with its buffers.
+#[derive(Default)]
+struct Clipper {
+    earcut: Earcut<f64>,
+    corners: Vec<u32>,
+    flat: Vec<[f64; 2]>,
+    indices: Vec<u32>,
+}
+
+impl Clipper {
+    /// Replaces a fan by the triangles of its polygon. Returns false if the polygon intersects itself; then the triangles do not cover exactly
+    /// its area.
+    fn clip(&mut self, fan: &mut [[u32; 3]], normal: DVec3, positions: &[DVec3]) -> bool {
+        self.corners.clear();
+        self.corners.extend([fan[0][0], fan[0][1]]);
+        self.corners.extend(fan.iter().map(|[_, _, last]| *last));
+        let normal = normal.normalize();
+        let u = normal.any_orthonormal_vector();
+        let v = normal.cross(u);
+        let first = positions[fan[0][0] as usize];
+        self.flat.clear();
+        self.flat.extend(self.corners.iter().map(|corner| {
+            let p = positions[*corner as usize] - first;
+            [p.dot(u), p.dot(v)]
+        }));
+        self.earcut.earcut_slice(&self.flat, &[], &mut self.indices);
+        if self.indices.is_empty() {
+            return false;
+        }
+        let point = |i: u32| self.flat[i as usize];
+        let mut covered = 0.0;
+        let mut clipped = self.indices.chunks_exact(3).map(|of| {
+            let [a, b, c] = [of[0], of[1], of[2]];
+            let area = area(point(a), point(b), point(c));
+            covered += area.abs();
+            // Counter-clockwise, as the polygon is.
+            let ordered = if area < 0.0 { [a, c, b] } else { [a, b, c] };
+            ordered.map(|i| self.corners[i as usize])
+        });
+        let unused = [fan[0][0]; 3];
+        for triangle in fan.iter_mut() {
+            *triangle = clipped.next().unwrap_or(unused);
+        }
+        let whole: f64 = (1..self.flat.len() - 1)
+            .map(|i| area(self.flat[0], self.flat[i], self.flat[i + 1]))
+            .sum();
+        (covered - whole).abs() <= AREA_TOLERANCE * whole
+    }
+}
+
+/// Returns twice the signed area of a triangle.
+fn area([ax, ay]: [f64; 2], [bx, by]: [f64; 2], [cx, cy]: [f64; 2]) -> f64 {
+    (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+}

@@ -1,0 +1,180 @@
+//! Mesh files as scenes: a mesh is described as one shape in a neutral studio, with a camera that frames it.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+
+use super::error::{Problem, SceneError};
+use super::load::Overrides;
+use super::validate::turned_up;
+use super::{
+    CameraDescription, Description, EnvironmentDescription, EnvironmentName, Framing, GltfChoice, ImageDescription,
+    Integrator, MeshDescription, RenderDescription, SamplesDescription, ShapeDescription, Up, ViewTransform, framed,
+    is_gltf, mesh_file,
+};
+use crate::mesh::{Mesh, MeshError};
+
+/// The longer side of the image in pixels, and samples of a pixel, by default.
+pub(super) const SIDE: u32 = 1024;
+const SAMPLES: u32 = 64;
+/// Radiance of the background: the grey in the middle of what a display shows.
+const BACKGROUND: DVec3 = DVec3::splat(0.18);
+
+/// Maximum number of vertices that are framed one by one.
+const MAX_POINTS: usize = 1 << 20;
+
+/// The endings of mesh files, and the axis that points up in most files of each format. None of the formats defines one: OBJ and PLY files
+/// are mostly made for viewers, where it is y, and STL files for 3D printers, where it is z.
+const MESHES: [(&str, Up); 3] = [("obj", Up::Y), ("ply", Up::Y), ("stl", Up::Z)];
+
+/// Endings of files that cannot be read, and what to do.
+const UNSUPPORTED: [(&[&str], &str); 4] = [
+    (
+        &[
+            "3ds", "3mf", "abc", "blend", "c4d", "dae", "fbx", "iges", "igs", "lwo", "ma", "max", "mb", "off", "step",
+            "stp", "usd", "usda", "usdc", "usdz", "wrl", "x3d",
+        ],
+        "not supported; export glTF (.glb), OBJ, PLY or STL",
+    ),
+    (
+        &[
+            "avif", "bmp", "exr", "gif", "hdr", "jpeg", "jpg", "ktx2", "png", "tga", "tif", "tiff", "webp",
+        ],
+        "an image, not a scene; use it as a texture in a scene, or with --environment",
+    ),
+    (&["mtl"], "a material library; render the .obj file that names it"),
+    (&["bin"], "a buffer of a glTF file; render the .gltf file that names it"),
+];
+
+/// Returns whether a file of this name is a mesh file: it ends in `.obj`, `.ply` or `.stl`.
+pub fn is_mesh(name: &Path) -> bool {
+    up(name).is_some()
+}
+
+/// Returns whether a file of this name is a model that is rendered without a scene: a glTF file or a mesh file.
+pub fn is_model(name: &Path) -> bool {
+    is_gltf(name) || is_mesh(name)
+}
+
+fn has_ending(name: &Path, ending: &str) -> bool {
+    name.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending))
+}
+
+fn up(name: &Path) -> Option<Up> {
+    let known = MESHES.into_iter().find(|(ending, _)| has_ending(name, ending));
+    known.map(|(_, up)| up)
+}
+
+/// Rejects files with the ending of a format that cannot be a scene.
+pub(super) fn check_format(path: &Path) -> Result<(), SceneError> {
+    let is_of = |endings: &[&str]| endings.iter().any(|ending| has_ending(path, ending));
+    let Some((_, what)) = UNSUPPORTED.into_iter().find(|(endings, _)| is_of(endings)) else {
+        return Ok(());
+    };
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    Err(SceneError::Unsupported {
+        path: path.to_owned(),
+        message: format!(".{ending} is {what}"),
+    })
+}
+
+/// Returns a mesh file as a scene, and the mesh, which is kept until the scene has it.
+pub(super) fn describe(path: &Path, overrides: &Overrides) -> Result<(Description, Arc<Mesh>), SceneError> {
+    let others = GltfChoice {
+        view: None,
+        ..overrides.gltf.clone()
+    };
+    if let Some(option) = others.first() {
+        let rule = format!("only applies to glTF files, and {} is a mesh", path.display());
+        return Err(SceneError::Override(Problem::of(option, rule)));
+    }
+    let whole = path.canonicalize().map_err(|error| SceneError::Read {
+        path: path.to_owned(),
+        error,
+    })?;
+    let mesh = mesh_file::load(&whole, None).map_err(|error| SceneError::Mesh(error.at(path)))?;
+    if let (true, Some(damage)) = (overrides.strict, mesh.damage.first()) {
+        return Err(SceneError::Mesh(damage.clone().of(path)));
+    }
+    let presentation = &overrides.presentation;
+    let mut shape = MeshDescription {
+        up: up(path).unwrap_or_default(),
+        material: None,
+        ..MeshDescription::new("", path.file_name().unwrap_or_default().to_string_lossy())
+    };
+    let upright = turned_up(shape.up);
+    let turn = (presentation.up).and_then(|up| up.rotation(|axis| upright.transform_vector3(axis)));
+    let mut to_world = upright;
+    if let Some((rotation, turn)) = turn {
+        shape.rotate = Some(rotation);
+        to_world = DAffine3::from_mat3(turn) * upright;
+    }
+    let mut points = points(&mesh);
+    points
+        .iter_mut()
+        .for_each(|point| *point = to_world.transform_point3(*point));
+    let size = overrides.size.unwrap_or((SIDE, SIDE));
+    let aspect = f64::from(size.0.max(1)) / f64::from(size.1.max(1));
+    let framing = Framing {
+        turns: overrides.turntable.is_some(),
+        ..(presentation.framing(overrides.gltf.view, aspect)).map_err(SceneError::Override)?
+    };
+    let camera = framed(points.iter().copied(), framing);
+    Ok((
+        scene(overrides, size, camera, shape, &points).with_environment(studio(overrides)),
+        mesh,
+    ))
+}
+
+/// Returns a model as a scene without light.
+pub(super) fn scene(
+    overrides: &Overrides,
+    (width, height): (u32, u32),
+    camera: impl Into<CameraDescription>,
+    shape: impl Into<ShapeDescription>,
+    points: &[DVec3],
+) -> Description {
+    let mut description = Description::new(width, height, camera)
+        .with_render(RenderDescription {
+            integrator: Some(Integrator::Path),
+            pixel_samples: SamplesDescription::new(SAMPLES),
+            ..RenderDescription::default()
+        })
+        .with_shape(shape);
+    overrides.presentation.add_ground(&mut description, points);
+    description.image = ImageDescription {
+        view_transform: ViewTransform::KhronosPbrNeutral,
+        ..description.image
+    };
+    description
+}
+
+/// Returns the light of models that have none. The camera sees gray instead of the studio's lamps, unless an environment is asked for.
+pub(super) fn studio(overrides: &Overrides) -> EnvironmentDescription {
+    EnvironmentDescription {
+        background: overrides.environment.is_none().then_some(BACKGROUND),
+        ..EnvironmentDescription::named(EnvironmentName::Studio)
+    }
+}
+
+/// Returns the vertices in the file's coordinates, or the corners of their bounding box if they are many.
+fn points(mesh: &Arc<Mesh>) -> Vec<DVec3> {
+    match mesh.positions.len() <= MAX_POINTS {
+        true => (mesh.positions.iter())
+            .map(|point| point.as_dvec3() + mesh.center)
+            .collect(),
+        false => mesh.corners().collect(),
+    }
+}
+
+/// Returns the error of a described mesh file, about the file where its shape is meant.
+pub(super) fn error_of(path: &Path, problem: Problem) -> SceneError {
+    SceneError::Mesh(MeshError::File {
+        path: path.to_owned(),
+        message: match problem.key.to_string() == "shapes[0].file" {
+            true => problem.message,
+            false => problem.to_string(),
+        },
+    })
+}

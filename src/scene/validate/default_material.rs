@@ -1,0 +1,46 @@
+//! The material of meshes that have none.
+
+use glam::DVec3;
+
+use super::super::{Color, Integrator, Material, Principled, Reflection, VertexColors};
+use super::principled::dielectric;
+
+/// The share of light that it reflects.
+const GRAY: f64 = 0.8;
+/// Its exponent under `phong`, without effect as it has no highlight, and its roughness under `path`.
+const SHININESS: f64 = 16.0;
+const ROUGHNESS: f64 = 0.5;
+
+/// Returns the materials of meshes without and with colors of vertices. `phong` ignores these.
+pub(super) fn default_materials(integrator: Integrator) -> [Material; 2] {
+    [false, true].map(|has_colors| Material {
+        reflection: match integrator {
+            Integrator::Phong => phong(),
+            Integrator::Path => Reflection::Principled(Box::new(principled(has_colors))),
+        },
+        emission: Color::BLACK,
+        normal_map: None,
+        visible: true,
+    })
+}
+
+fn phong() -> Reflection {
+    let gray = Color::Plain(DVec3::splat(GRAY));
+    Reflection::Phong {
+        ambient: gray,
+        diffuse: gray,
+        specular: Color::BLACK,
+        shininess: SHININESS,
+    }
+}
+
+fn principled(has_colors: bool) -> Principled {
+    let (color, vertex_colors) = match has_colors {
+        true => (1.0, VertexColors::BaseColor),
+        false => (GRAY, VertexColors::None),
+    };
+    Principled {
+        vertex_colors,
+        ..dielectric(Color::Plain(DVec3::splat(color)), ROUGHNESS)
+    }
+}

@@ -1,0 +1,157 @@
+//! Materials of MTL files under `path`: as `principled`, with the extensions for physically based rendering of Exocortex, "Extending the
+//! Wavefront MTL format for physically based rendering", which Blender writes too.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::super::super::error::cut_to;
+use super::super::super::image_file::Part;
+use super::super::super::limits::BRIGHTEST;
+use super::super::super::{
+    AlphaMode, Channel, Color, Encoding, Material, NormalMap, Principled, Reflection, Texels, TextureKind, Value,
+    VertexColors,
+};
+use super::super::principled::dielectric;
+use super::super::{number, show};
+use super::{DIFFUSE, Looks, MAX_MAP_MESSAGE, Oddity, Traits, beside};
+use crate::mesh::MtlMaterial;
+
+/// Warnings about a material.
+pub(super) type Odd = Vec<(Oddity, String)>;
+
+/// A factor of `Ks` that makes 0.5, which exporters write for common dielectrics, their reflectance.
+const SPECULAR: f64 = 2.0;
+
+impl Looks<'_> {
+    /// Returns a material. `Ka` is ignored, as exporters write anything there.
+    pub(super) fn principled(&mut self, own: &MtlMaterial, file: &Path, traits: Traits) -> Material {
+        let mut odd = Odd::new();
+        let clamped = |odd: &mut Odd, name: &'static str, color: [f64; 3], limit: f64| {
+            let color = DVec3::from(color);
+            let inside = color.clamp(DVec3::ZERO, DVec3::splat(limit));
+            if inside != color {
+                let (color, limit, inside) = (show(color), number(limit), show(inside));
+                let rule = format!("{name}: each of {color} must be from 0 to {limit}; {inside} stands in");
+                odd.push((Oddity::Other(name), rule));
+            }
+            inside
+        };
+        let share = |odd: &mut Odd, name: &'static str, value: f64| {
+            let inside = value.clamp(0.0, 1.0);
+            if inside != value {
+                let rule = format!("{name}: {} must be from 0 to 1; {inside} stands in", number(value));
+                odd.push((Oddity::Other(name), rule));
+            }
+            inside
+        };
+        let diffuse = clamped(&mut odd, "Kd", own.diffuse.unwrap_or([DIFFUSE; 3]), 1.0);
+        let emission = clamped(&mut odd, "Ke", own.emission.unwrap_or_default(), BRIGHTEST);
+        let has_factors = own.metallic.is_some() || own.roughness.is_some();
+        let has_maps = own.metallic_map.is_some() || own.roughness_map.is_some();
+        let specular = match (own.illumination, own.specular) {
+            (Some(0 | 1), _) => 0.0,
+            (_, Some(color)) => {
+                let mean = clamped(&mut odd, "Ks", color, BRIGHTEST).element_sum() / 3.0;
+                (SPECULAR * mean).min(1.0)
+            }
+            (_, None) => f64::from(has_factors || has_maps),
+        };
+        let roughness = match (own.roughness, own.shininess) {
+            (Some(roughness), _) => share(&mut odd, "Pr", roughness),
+            // The width of a microfacet highlight by the exponent of a Blinn-Phong one.
+            (None, Some(exponent)) => (2.0 / (exponent.max(0.0) + 2.0)).powf(0.25),
+            (None, None) => 1.0,
+        };
+        let opacity = share(&mut odd, "d", own.opacity.unwrap_or(1.0));
+        let metallic = share(&mut odd, "Pm", own.metallic.unwrap_or(0.0));
+        for other in &own.others {
+            let verb = if other.starts_with("the ") { "are" } else { "is" };
+            odd.push((Oddity::Other(other), format!("{other} {verb} ignored")));
+        }
+        let mut map = |name: &'static str, map: &Option<String>, part: Part| {
+            let found = match traits.has_uvs {
+                true => self.map(&beside(file, map.as_ref()?), part),
+                false => Err("the mesh has no texture coordinates".to_owned()),
+            };
+            let why = match found {
+                Ok(texture) => return Some(texture),
+                Err(why) => why,
+            };
+            odd.push((
+                Oddity::Other(name),
+                format!("{name}: {}; it is ignored", cut_to(MAX_MAP_MESSAGE, &why)),
+            ));
+            None
+        };
+        let colors = Part::Colors(None);
+        let linear = Part::Colors(Some(Encoding::Linear));
+        let or_plain = |texture: Option<usize>, plain: f64| match texture {
+            Some(texture) => Value::Texture(texture, Channel::R),
+            None => Value::Plain(plain),
+        };
+        let of_color = |texture: Option<usize>, plain: DVec3| texture.map_or(Color::Plain(plain), Color::Texture);
+        let base_color = of_color(map("map_Kd", &own.diffuse_map, colors), diffuse);
+        let emission = of_color(map("map_Ke", &own.emission_map, colors), emission);
+        let metallic = or_plain(map("map_Pm", &own.metallic_map, linear), metallic);
+        let roughness_map = map("map_Pr", &own.roughness_map, linear);
+        let normal = map("norm", &own.normal_map, linear);
+        let bump = normal.or_else(|| map("map_Bump", &own.bump_map, linear));
+        let alpha = self.opacity(own, file, traits, &mut odd);
+        let normal_map = bump.filter(|texture| normal.is_some() || self.has_directions(*texture, &mut odd));
+        self.tell(own, file, odd);
+        let is_opaque = alpha.is_none() && opacity == 1.0;
+        Material {
+            reflection: Reflection::Principled(Box::new(Principled {
+                metallic,
+                roughness: or_plain(roughness_map, roughness),
+                specular: Value::Plain(specular),
+                alpha: alpha.unwrap_or(Value::Plain(opacity)),
+                alpha_mode: if is_opaque { AlphaMode::Opaque } else { AlphaMode::Blend },
+                vertex_colors: match traits.has_colors {
+                    true => VertexColors::BaseColor,
+                    false => VertexColors::None,
+                },
+                ..dielectric(base_color, roughness)
+            })),
+            emission,
+            normal_map: normal_map.map(|texture| NormalMap { texture, strength: 1.0 }),
+            visible: true,
+        }
+    }
+
+    /// Returns the opacity by `map_d`: the alpha channel of its image, or its red if it has none.
+    fn opacity(&mut self, own: &MtlMaterial, file: &Path, traits: Traits, odd: &mut Odd) -> Option<Value> {
+        let path = beside(file, own.opacity_map.as_ref()?);
+        let linear = Part::Colors(Some(Encoding::Linear));
+        let found = match traits.has_uvs {
+            true => (self
+                .map(&path, Part::Alpha)
+                .map(|texture| Value::Texture(texture, Channel::A)))
+            .or_else(|_| Ok(Value::Texture(self.map(&path, linear)?, Channel::R))),
+            false => Err("the mesh has no texture coordinates".to_owned()),
+        };
+        found
+            .map_err(|why| {
+                let why = cut_to(MAX_MAP_MESSAGE, &why);
+                odd.push((Oddity::Other("map_d"), format!("map_d: {why}; it is ignored")));
+            })
+            .ok()
+    }
+
+    /// Returns whether an image has normals: a gray one has heights, which are not supported.
+    fn has_directions(&self, texture: usize, odd: &mut Odd) -> bool {
+        let has_colors = match &self.textures[texture].kind {
+            TextureKind::Image { image, .. } => match &image.texels {
+                Texels::Bytes(_, texels) => texels.iter().any(|[r, g, b]| r != g || g != b),
+                Texels::Floats(texels) => texels.iter().any(|[r, g, b]| r != g || g != b),
+            },
+            _ => false,
+        };
+        if !has_colors {
+            let rule = "map_Bump: a map of heights is ignored; bake a normal map, and name it by norm";
+            odd.push((Oddity::Other("map_Bump"), rule.to_owned()));
+        }
+        has_colors
+    }
+}

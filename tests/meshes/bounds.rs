@@ -1,0 +1,99 @@
+//! Bounds of meshes that are away from the origin, compared with the vertices of the file in f64.
+
+use serde_json::json;
+use wgray::DVec3;
+use wgray::scene::Scene;
+
+use crate::gltf::build::{Builder, Packing, QUAD};
+use crate::random::Random;
+
+/// The box around points that were computed independently.
+fn around(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+    points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+        (low.min(p), high.max(p))
+    })
+}
+
+fn assert_bounds(scene: &Scene, truth: (DVec3, DVec3), what: &str) {
+    let (low, high) = scene.bounds().expect("bounds");
+    let size = (truth.1 - truth.0).max_element();
+    for (found, expected) in [(low, truth.0), (high, truth.1)] {
+        // Positions have 24 bits.
+        let error = (found - expected).abs().max_element();
+        assert!(error <= 1e-6 * size, "{what}: {found} must be {expected}");
+    }
+}
+
+const HEAD: &str = "image = { width = 4, height = 4 }\n\
+                    camera = { position = [0, -5, 0], look_at = [0, 0, 0], fov = 40 }\n\
+                    materials.m = { type = 'phong', color = [0.5, 0.5, 0.5] }\n";
+
+/// The file of a cloud of triangles around a point, and its vertices.
+fn cloud(random: &Random, center: DVec3, size: f64) -> (String, Vec<DVec3>) {
+    let coordinate = || size * random.between(-1.0, 1.0);
+    let points: Vec<DVec3> = (0..30)
+        .map(|_| center + DVec3::new(coordinate(), coordinate(), coordinate()))
+        .collect();
+    let mut text = String::new();
+    for p in &points {
+        text += &format!("v {} {} {}\n", p.x, p.y, p.z);
+    }
+    for i in 0..10 {
+        text += &format!("f {} {} {}\n", 3 * i + 1, 3 * i + 2, 3 * i + 3);
+    }
+    (text, points)
+}
+
+#[test]
+fn meshes_away_from_the_origin_have_their_bounds() {
+    let random = Random::new(81);
+    let folder = tempfile::tempdir().unwrap();
+    for (i, (center, size)) in [
+        (DVec3::new(10.5, 0.5, 0.0), 0.5),
+        (DVec3::new(-300.0, 20.0, 7.0), 2.0),
+        (DVec3::new(0.0, 0.0, 1e5), 1.0),
+        (DVec3::ZERO, 3.0),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let (text, points) = cloud(&random, center, size);
+        std::fs::write(folder.path().join(format!("{i}.obj")), text).unwrap();
+        let path = folder.path().join("scene.toml");
+        let file = format!("file = '{i}.obj'\n");
+        let placed = "material = 'm'\nscale = [2, 1, -3]\nrotate = [0, 0, 90]\ntranslate = [5, 6, 7]\n";
+        // x' = -y, y' = x of what is scaled.
+        let placement = |p: &DVec3| DVec3::new(-p.y + 5.0, 2.0 * p.x + 6.0, -3.0 * p.z + 7.0);
+
+        let shape = format!("{HEAD}[[shapes]]\ntype = 'mesh'\n{file}{placed}");
+        std::fs::write(&path, shape).unwrap();
+        let scene = Scene::load(&path).unwrap();
+        assert_bounds(&scene, around(points.iter().map(placement)), "a shape");
+
+        let two = format!(
+            "{HEAD}[meshes.a]\n{file}[[instances]]\nmesh = 'a'\n{placed}[[instances]]\nmesh = 'a'\nmaterial = 'm'\n"
+        );
+        std::fs::write(&path, two).unwrap();
+        let scene = Scene::load(&path).unwrap();
+        let both = points.iter().map(placement).chain(points.iter().copied());
+        assert_bounds(&scene, around(both), "two instances");
+        let one = scene.shapes[1].geometry.bounds().expect("bounds");
+        let truth = around(points.iter().copied());
+        assert!((one.0 - truth.0).abs().max_element() < 1e-5 * size, "{one:?} {truth:?}");
+    }
+}
+
+#[test]
+fn gltf_files_have_their_bounds() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut file = Builder::new();
+    let moved = QUAD.map(|[x, y, z]| [x + 20.0, y - 7.0, z + 3.0]);
+    let position = file.floats(&moved);
+    let mesh = file.quad_with(json!({ "POSITION": position }), None);
+    file.root_node(json!({ "mesh": mesh, "translation": [1, 2, 3], "scale": [2, 2, 2] }));
+    let path = file.write(folder.path(), "away", Packing::Binary);
+    let scene = Scene::load(&path).unwrap();
+    // glTF's (x, y, z) is (x, -z, y) here.
+    let placed = |[x, y, z]: [f64; 3]| DVec3::new(2.0 * x + 1.0, -(2.0 * z + 3.0), 2.0 * y + 2.0);
+    assert_bounds(&scene, around(moved.into_iter().map(placed)), "glTF");
+}

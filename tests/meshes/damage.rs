@@ -1,0 +1,182 @@
+//! Damaged mesh files: what can be used is, with a warning that names the first damage and its stand-in.
+
+use super::{corners, load};
+
+const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+const FIRST: [[f64; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]];
+
+#[test]
+fn damaged_lines_of_obj_files_have_stand_ins() {
+    for (lines, note) in [
+        (
+            "v nan 0 0\nf 1 2 3\n",
+            "line 5: x: NaN must be finite, from -1e9 to 1e9; faces with this vertex are left out",
+        ),
+        (
+            "v 0 inf 0\nv 0 0 1e10\nf 1 2 3\nf 1 2 5\nf 5 1 3 2 4\n",
+            "line 5: y: inf must be finite, from -1e9 to 1e9; faces with this vertex are left out (and 1 more)",
+        ),
+        (
+            "v 3.1+e2 0 0\nf 1 2 3\nf 3 2 5\n",
+            "line 5: x: \"3.1+e2\" must be a number; faces with this vertex are left out",
+        ),
+        (
+            "v 1\nf 1 2 3\n",
+            "line 5: y is missing; faces with this vertex are left out",
+        ),
+        (
+            "f 1 2 3\nf 1 2\nf 3\n",
+            "line 6: a face must have 3 corners or more; this one has 2; the face is left out (and 1 more)",
+        ),
+        (
+            "f 1 2 3\nf 1 2 9\n",
+            "line 6: vertex 9 of the face does not exist; there are 4 so far; the face is left out",
+        ),
+        (
+            "f 1 2 3\nf 1 2 x\n",
+            "line 6: \"x\" must be a corner of a face: v, v/t, v//n or v/t/n; the face is left out",
+        ),
+        (
+            "f 1/1 2/2 3/3\n",
+            "line 5: texture coordinate 1 of the face does not exist; there are 0 so far; \
+             (0, 0) stands in for the texture coordinates (and 2 more)",
+        ),
+        (
+            "f 1//1 2//2 3//3\n",
+            "line 5: normal 1 of the face does not exist; there are 0 so far; the normal of the triangles stands in (and 2 more)",
+        ),
+        (
+            "vt 0 nan\nf 1/1 2/1 3/1\n",
+            "line 5: v: NaN must be finite as a 32-bit float; (0, 0) stands in for the texture coordinates",
+        ),
+        (
+            "vn 0 1\nf 1//1 2//1 3//1\n",
+            "line 5: z is missing; the normal of the triangles stands in",
+        ),
+    ] {
+        let mesh = load("a.obj", format!("{SQUARE}{lines}"), None).unwrap();
+        assert_eq!(corners(&mesh), [FIRST], "{lines}");
+        assert_eq!(mesh.notes[0], note, "{lines}");
+    }
+}
+
+#[test]
+fn nothing_but_damage_is_an_error() {
+    for (text, message) in [
+        (
+            "v 0 0 nan\nf 1 1 1\n",
+            "a.obj:1: z: NaN must be finite, from -1e9 to 1e9",
+        ),
+        (
+            "v 0 0 0\nf 1 1\n",
+            "a.obj:2: a face must have 3 corners or more; this one has 2",
+        ),
+    ] {
+        assert_eq!(load("a.obj", text, None).unwrap_err(), message);
+    }
+}
+
+fn ply(vertices: &str, faces: &str) -> String {
+    let count = |lines: &str| lines.lines().count();
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {}\nproperty list uchar int vertex_indices\nend_header\n{vertices}{faces}",
+        count(vertices),
+        count(faces)
+    )
+}
+
+const POINTS: &str = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+
+#[test]
+fn damaged_rows_of_ply_files_have_stand_ins() {
+    for (vertices, faces, note) in [
+        (
+            "0 0 0\n1 0 0\n1 1 0\n0 nan 0\n",
+            "3 0 1 2\n3 0 1 3\n",
+            "line 13: vertex 3: y: NaN must be finite, from -1e9 to 1e9; faces with this vertex are left out",
+        ),
+        (
+            POINTS,
+            "3 0 1 2\n2 0 1\n",
+            "line 15: face 1: must have 3 vertices or more; it has 2; the face is left out",
+        ),
+        (
+            POINTS,
+            "3 0 1 4\n3 0 1 2\n",
+            "line 14: face 0: vertex 4 does not exist; there are 4, counted from 0; the face is left out",
+        ),
+    ] {
+        let mesh = load("a.ply", ply(vertices, faces), None).unwrap();
+        assert_eq!((corners(&mesh), &mesh.notes[..]), (vec![FIRST], &[note.to_owned()][..]));
+    }
+}
+
+#[test]
+fn ply_lines_may_have_more_values_than_declared() {
+    let wide = "0 0 0 255 1 2\n1 0 0 3\n1 1 0\n0 1 0 7 8\n";
+    let mesh = load("a.ply", ply(wide, "3 0 1 2 200 100 50\n"), None).unwrap();
+    assert_eq!(corners(&mesh), [FIRST]);
+    assert_eq!(
+        mesh.notes,
+        ["line 10: the line has more values than the header declares; the rest of the line is ignored (and 3 more)"]
+    );
+    // Rows over several lines, and several rows on a line.
+    for points in [POINTS.replace("1 1 0", "1 1\n\n0"), POINTS.replace("\n1", " 1")] {
+        let text = ply(POINTS, "3 0 1 2\n").replace(POINTS, &points);
+        let mesh = load("a.ply", text, None).unwrap();
+        assert_eq!((corners(&mesh), mesh.notes.len()), (vec![FIRST], 0), "{points}");
+    }
+}
+
+#[test]
+fn unknown_lines_of_ply_headers_are_ignored() {
+    let text = ply(POINTS, "3 0 1 2\n").replace("element face", "Created by a program\nelement face");
+    let mesh = load("a.ply", text, None).unwrap();
+    assert_eq!(corners(&mesh), [FIRST]);
+    assert!(mesh.notes[0].ends_with("; the line is ignored"), "{:?}", mesh.notes);
+}
+
+#[test]
+fn facets_of_stl_files_without_a_position_are_left_out() {
+    let facet = |z: &str| {
+        format!("facet normal 0 0 1\nouter loop\nvertex 0 0 {z}\nvertex 1 0 0\nvertex 1 1 0\nendloop\nendfacet\n")
+    };
+    let text = format!("solid a\n{}{}endsolid a\n", facet("0"), facet("nan"));
+    let mesh = load("a.stl", text, None).unwrap();
+    assert_eq!(corners(&mesh), [FIRST]);
+    assert_eq!(
+        mesh.notes,
+        ["line 11: z: NaN must be finite, from -1e9 to 1e9; the face is left out"]
+    );
+}
+
+#[test]
+fn texts_may_be_utf_16() {
+    let text = format!("{SQUARE}f 1 2 3\n");
+    for is_big in [true, false] {
+        let bytes = |unit: u16| if is_big { unit.to_be_bytes() } else { unit.to_le_bytes() };
+        let encoded: Vec<u8> = std::iter::once(0xfeff)
+            .chain(text.encode_utf16())
+            .flat_map(bytes)
+            .collect();
+        assert_eq!(corners(&load("a.obj", encoded, None).unwrap()), [FIRST]);
+    }
+}
+
+#[test]
+fn obj_files_may_have_colors() {
+    let text = "v 0 0 0 1 0 0.5\nv 1 0 0 0 1 0 1\nv 1 1 0 0.5\nf 1 2 3\n";
+    let mesh = load("a.obj", text, None).unwrap();
+    let colors: Vec<[f32; 4]> = mesh.colors.iter().map(|color| color.to_array()).collect();
+    // 0.5 as sRGB, by a table; a vertex without a color is white.
+    assert_eq!(colors[0][..2], [1.0, 0.0]);
+    assert!((colors[0][2] - 0.214_041).abs() < 1e-6);
+    assert_eq!(colors[1..], [[0.0, 1.0, 0.0, 1.0], [1.0; 4]]);
+    assert!(
+        load("a.obj", format!("{SQUARE}f 1 2 3\n"), None)
+            .unwrap()
+            .colors
+            .is_empty()
+    );
+}

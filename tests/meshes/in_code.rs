@@ -1,0 +1,181 @@
+//! Meshes that are made in code: edited clones, and rules that they break.
+
+use std::sync::Arc;
+
+use wgray::mesh::{Group, Mesh};
+use wgray::scene::{Assets, MeshDescription, PerspectiveDescription, PhongDescription, Scene};
+use wgray::{Aov, Channel, DVec3, Description, Device, Options};
+
+/// A square in the plane z = 0, seen by [`scene`]'s camera.
+fn square() -> Mesh {
+    let mut mesh = Mesh::default();
+    mesh.positions = [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+        .map(|[x, y]| glam::Vec3::new(x as f32, y as f32, 0.0))
+        .to_vec();
+    mesh.triangles = vec![[0, 1, 2], [0, 2, 3]];
+    mesh.groups = vec![Group::default()];
+    mesh
+}
+
+fn description() -> Description {
+    let camera = PerspectiveDescription {
+        up: DVec3::Y,
+        ..PerspectiveDescription::new([0.0, 0.0, 5.0], [0.0; 3], 20.0)
+    };
+    Description::new(8, 8, camera)
+        .with_material("m", PhongDescription::new([0.5; 3]))
+        .with_shape(MeshDescription::new("m", "it"))
+}
+
+fn scene(mesh: Arc<Mesh>) -> Result<Scene, String> {
+    let mut assets = Assets::default();
+    assets.meshes.insert("it".to_owned(), mesh);
+    description()
+        .validate_with(&assets)
+        .map_err(|problem| problem.to_string())
+}
+
+/// The distance of what is in the middle of the image.
+fn depth(mesh: &Arc<Mesh>) -> f32 {
+    let options = Options {
+        device: Device::Cpu,
+        aovs: vec![Aov::Depth],
+        ..Options::default()
+    };
+    let picture = wgray::render(&scene(Arc::clone(mesh)).unwrap(), &options).unwrap();
+    match picture.channel("depth.Z") {
+        Some(Channel::Floats(depths)) => depths[8 * 4 + 4],
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn an_edited_clone_is_rendered_as_it_is() {
+    let first = Arc::new(square());
+    assert!((depth(&first) - 5.0).abs() < 0.1);
+    let lower = |mesh: &mut Mesh| mesh.positions.iter_mut().for_each(|p| p.z -= 2.0);
+
+    let mut clone = Mesh::clone(&first);
+    lower(&mut clone);
+    assert!((depth(&Arc::new(clone)) - 7.0).abs() < 0.1, "a clone");
+
+    let mut unshared = Arc::clone(&first);
+    lower(Arc::make_mut(&mut unshared));
+    assert!((depth(&unshared) - 7.0).abs() < 0.1, "Arc::make_mut of what is shared");
+    lower(Arc::make_mut(&mut unshared));
+    assert!((depth(&unshared) - 9.0).abs() < 0.1, "Arc::make_mut of what is not");
+
+    let mut owned = Arc::try_unwrap(unshared).unwrap();
+    lower(&mut owned);
+    assert!((depth(&Arc::new(owned)) - 11.0).abs() < 0.1, "Arc::try_unwrap");
+    assert!((depth(&first) - 5.0).abs() < 0.1);
+}
+
+#[test]
+fn the_tree_of_a_mesh_is_kept() {
+    let mesh = Arc::new(square());
+    let pack = || Options::default().pack(&scene(Arc::clone(&mesh)).unwrap());
+    let [a, b] = [pack(), pack()];
+    assert!(Arc::ptr_eq(&a.meshes[0], &b.meshes[0]));
+}
+
+#[test]
+fn broken_rules_are_errors() {
+    type Break = fn(&mut Mesh);
+    let cases: [(Break, &str); 20] = [
+        (|m| *m = Mesh::default(), "triangles: must not be empty"),
+        (|m| m.groups.clear(), "groups: must not be empty"),
+        (
+            |m| m.group_of = vec![0, 1],
+            "group_of[1]: group 1 does not exist; groups has 1",
+        ),
+        (
+            |m| m.groups.push(Group::default()),
+            "group_of: 0 elements; must have one for each of 2 triangles, or none if there is one group",
+        ),
+        (
+            |m| m.group_of = vec![0],
+            "group_of: 1 elements; must have one for each of 2 triangles, or none if there is one group",
+        ),
+        (
+            |m| m.triangles[1] = [0, 99, 1],
+            "triangles[1]: vertex 99 does not exist; positions has 4",
+        ),
+        (
+            |m| m.positions.clear(),
+            "triangles[0]: vertex 0 does not exist; positions has 0",
+        ),
+        (
+            |m| m.positions[2].y = f32::NAN,
+            "positions[2]: [1, NaN, 0] must be finite, and with center from -1e9 to 1e9",
+        ),
+        (
+            |m| m.positions[3].z = f32::INFINITY,
+            "positions[3]: [-1, 1, inf] must be finite, and with center from -1e9 to 1e9",
+        ),
+        (
+            |m| m.positions[0].x = 2e9,
+            "positions[0]: [2000000000, -1, 0] must be finite, and with center from -1e9 to 1e9",
+        ),
+        (
+            |m| m.center.x = f64::NAN,
+            "center: [NaN, 0, 0] must be finite, and at most 1e9 from 0",
+        ),
+        (
+            |m| m.normals = vec![glam::Vec3::Z; 3],
+            "normals: 3 elements; must have one for each of 4 positions, or none",
+        ),
+        (
+            |m| m.normals = vec![glam::Vec3::ZERO; 4],
+            "normals[0]: [0, 0, 0] must be a unit vector",
+        ),
+        (
+            |m| m.normals = vec![glam::Vec3::NAN; 4],
+            "normals[0]: [NaN, NaN, NaN] must be a unit vector",
+        ),
+        (
+            |m| m.uvs = vec![glam::Vec2::ZERO],
+            "uvs: 1 elements; must have one for each of 4 positions, or none",
+        ),
+        (
+            |m| m.uvs = vec![glam::Vec2::NAN; 4],
+            "uvs[0]: [NaN, NaN] must be finite",
+        ),
+        (
+            |m| m.more_uvs = vec![vec![glam::Vec2::ZERO; 5]],
+            "more_uvs[0]: 5 elements; must have one for each of 4 positions, or none",
+        ),
+        (
+            |m| m.colors = vec![glam::Vec4::new(0.0, 0.0, 0.0, 1.5); 4],
+            "colors[0]: [0, 0, 0, 1.5] must be from 0 to 1e6, and its opacity from 0 to 1",
+        ),
+        (
+            |m| m.tangents = vec![glam::Vec4::X; 4],
+            "tangents[0]: [1, 0, 0, 0] must be a unit vector with 1 or -1, or zeros",
+        ),
+        (|m| m.triangles.clear(), "triangles: must not be empty"),
+    ];
+    for (break_it, expected) in cases {
+        let mut mesh = square();
+        break_it(&mut mesh);
+        let message = scene(Arc::new(mesh)).expect_err(expected);
+        assert_eq!(message, format!("shapes[0].file: \"it\": {expected}"));
+    }
+    assert!(scene(Arc::new(square())).is_ok());
+}
+
+#[test]
+fn odd_meshes_that_break_no_rule_are_rendered() {
+    let depth = |edit: fn(&mut Mesh)| {
+        let mut mesh = square();
+        edit(&mut mesh);
+        depth(&Arc::new(mesh))
+    };
+    let expected = depth(|_| {});
+    // Triangles without an area, and the same ones many times.
+    assert_eq!(depth(|m| m.triangles.extend([[0, 0, 0], [0, 1, 1]])), expected);
+    assert_eq!(depth(|m| m.triangles = m.triangles.repeat(5000)), expected);
+    assert_eq!(depth(|m| m.group_of = vec![0, 0]), expected);
+    // A vertex of no triangle.
+    assert_eq!(depth(|m| m.positions.push(glam::Vec3::splat(-0.5))), expected);
+}

@@ -1,0 +1,151 @@
+//! Materials of MTL files under `path`, with the extensions for physically based rendering.
+
+use std::fs;
+use std::path::Path;
+
+use wgray::DVec3;
+use wgray::scene::{AlphaMode, Channel, Color, Material, Overrides, Principled, Reflection, Scene, Value};
+
+const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n";
+
+fn write(folder: &Path, mtl: &str) {
+    fs::write(folder.join("a.obj"), OBJ).unwrap();
+    fs::write(folder.join("a.mtl"), format!("newmtl m\n{mtl}")).unwrap();
+    let color = image::RgbImage::from_fn(2, 2, |x, y| image::Rgb([100, 50 * x as u8, 200 * y as u8]));
+    color.save(folder.join("color.png")).unwrap();
+    let gray = image::RgbImage::from_pixel(2, 2, image::Rgb([90, 90, 90]));
+    gray.save(folder.join("gray.png")).unwrap();
+    let clear = image::RgbaImage::from_pixel(2, 2, image::Rgba([90, 90, 90, 128]));
+    clear.save(folder.join("clear.png")).unwrap();
+}
+
+/// The material of a mesh with this MTL file, and the notes.
+fn material(mtl: &str) -> (Material, Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), mtl);
+    let mut scene = Scene::load(folder.path().join("a.obj")).unwrap();
+    assert_eq!(scene.material_names, ["m"]);
+    (scene.materials.remove(0), scene.notes)
+}
+
+fn principled(material: &Material) -> &Principled {
+    match &material.reflection {
+        Reflection::Principled(principled) => principled,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn values_have_their_usual_meaning() {
+    let (material, notes) = material("Kd 0.5 0.25 0.125\nKs 0.25\nPr 0.3\nPm 0.75\nKe 2 3 4\nd 0.5\n");
+    assert_eq!(notes, Vec::<String>::new());
+    let principled = principled(&material);
+    assert_eq!(principled.base_color, Color::Plain(DVec3::new(0.5, 0.25, 0.125)));
+    assert_eq!(principled.specular, Value::Plain(0.5));
+    assert_eq!(
+        (principled.roughness, principled.metallic),
+        (Value::Plain(0.3), Value::Plain(0.75))
+    );
+    assert_eq!(
+        (principled.alpha, principled.alpha_mode),
+        (Value::Plain(0.5), AlphaMode::Blend)
+    );
+    assert_eq!(material.emission, Color::Plain(DVec3::new(2.0, 3.0, 4.0)));
+}
+
+#[test]
+fn defaults_are_a_rough_surface_without_highlights() {
+    for mtl in ["", "Ks 1\nillum 1\n"] {
+        let (material, _) = material(mtl);
+        let principled = principled(&material);
+        assert_eq!(principled.base_color, Color::Plain(DVec3::splat(0.8)));
+        assert_eq!(
+            (principled.specular, principled.roughness),
+            (Value::Plain(0.0), Value::Plain(1.0))
+        );
+        assert_eq!(
+            (principled.metallic, principled.alpha_mode),
+            (Value::Plain(0.0), AlphaMode::Opaque)
+        );
+        assert_eq!(material.emission, Color::BLACK);
+    }
+    // A sharper highlight is a smoother surface.
+    let roughness = |exponent: f64| match principled(&material(&format!("Ks 1\nNs {exponent}\n")).0).roughness {
+        Value::Plain(roughness) => roughness,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(roughness(0.0), 1.0);
+    assert!((roughness(30.0) - 0.5).abs() < 1e-12);
+    assert!(roughness(1000.0) < 0.25);
+    // Transparency is the rest of opacity.
+    assert_eq!(principled(&material("Tr 0.25\n").0).alpha, Value::Plain(0.75));
+}
+
+#[test]
+fn maps_stand_in_for_values() {
+    let (material, notes) = material(
+        "map_Kd color.png\nmap_Ke color.png\nmap_Pr gray.png\nmap_Pm color.png\nmap_d clear.png\nnorm color.png\n",
+    );
+    assert_eq!(notes, Vec::<String>::new());
+    let principled = principled(&material);
+    assert!(matches!(principled.base_color, Color::Texture(_)));
+    assert_eq!(material.emission, principled.base_color);
+    assert!(matches!(principled.roughness, Value::Texture(_, Channel::R)));
+    assert!(matches!(principled.metallic, Value::Texture(_, Channel::R)));
+    assert!(matches!(principled.alpha, Value::Texture(_, Channel::A)));
+    assert_eq!(principled.alpha_mode, AlphaMode::Blend);
+    // The texels of normals and of metals are linear: they are one texture, and the colors another one.
+    let Value::Texture(metallic, _) = principled.metallic else {
+        unreachable!("it is a texture")
+    };
+    assert_eq!(material.normal_map.map(|map| map.texture), Some(metallic));
+    assert_ne!(material.emission, Color::Texture(metallic));
+}
+
+#[test]
+fn maps_of_bumps_are_normals_or_noted() {
+    let (colored, notes) = material("map_Bump color.png\n");
+    assert!(colored.normal_map.is_some() && notes.is_empty(), "{notes:?}");
+    let (gray, notes) = material("bump gray.png\n");
+    assert_eq!(gray.normal_map, None);
+    assert_eq!(
+        notes,
+        ["a.mtl:1: \"m\": map_Bump: a map of heights is ignored; bake a normal map, and name it by norm"]
+    );
+    let (opaque, notes) = material("map_d gray.png\n");
+    assert!(matches!(principled(&opaque).alpha, Value::Texture(_, Channel::R)) && notes.is_empty());
+}
+
+#[test]
+fn strict_refuses_missing_maps() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "map_Kd none.png\n");
+    let overrides = Overrides {
+        strict: true,
+        ..Overrides::default()
+    };
+    let path = folder.path().join("a.obj");
+    let message = Scene::load_with(&path, &overrides).unwrap_err().to_string();
+    let start = format!("{}: \"none.png\" cannot be read: ", path.display());
+    assert!(message.starts_with(&start), "{message}");
+}
+
+#[test]
+fn bad_values_and_missing_maps_are_noted() {
+    for (mtl, note) in [
+        ("Pr 2\n", "Pr: 2 must be from 0 to 1; 1 stands in"),
+        (
+            "Kd 1 2 -1\n",
+            "Kd: each of [1, 2, -1] must be from 0 to 1; [1, 1, 0] stands in",
+        ),
+        ("map_Pr none.png\n", "map_Pr: \"none.png\" cannot be read: "),
+        ("map_d none.png\n", "map_d: \"none.png\" cannot be read: "),
+        ("norm ../x.png\n", "norm: \"../x.png\" "),
+    ] {
+        let (_, notes) = material(mtl);
+        let [found] = &notes[..] else {
+            panic!("{mtl}: {notes:?}")
+        };
+        assert!(found.starts_with(&format!("a.mtl:1: \"m\": {note}")), "{found}");
+    }
+}

@@ -1,0 +1,219 @@
+//! Mesh files that are rendered without a scene, and files that cannot be.
+
+use std::fs;
+use std::path::Path;
+
+use wgray::scene::{Geometry, GltfChoice, Overrides, Presentation, Reflection, Scene, Selection, VertexColors, View};
+use wgray::{Description, Device, Options};
+
+use super::readers::in_all_formats;
+
+fn load(path: &Path) -> Result<(Scene, Description), String> {
+    Scene::load_described(path, &Overrides::default()).map_err(|error| error.to_string())
+}
+
+/// The share of pixels that show something else than the background, by alpha.
+fn coverage(scene: &Scene) -> f64 {
+    let options = Options {
+        device: Device::Cpu,
+        ..Options::default()
+    };
+    let picture = wgray::render(scene, &options).unwrap();
+    let alpha = picture.alpha().expect("alpha");
+    alpha.iter().map(|a| f64::from(*a)).sum::<f64>() / alpha.len() as f64
+}
+
+#[test]
+fn mesh_files_of_all_formats_are_framed() {
+    let folder = tempfile::tempdir().unwrap();
+    let small = |view| Overrides {
+        size: Some((40, 30)),
+        pixel_samples: Some(4),
+        background: Some("none".parse().unwrap()),
+        gltf: GltfChoice {
+            view,
+            ..GltfChoice::default()
+        },
+        ..Overrides::default()
+    };
+    for (name, bytes) in in_all_formats() {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        for view in [None, Some(View::Front), Some(View::Top)] {
+            let scene = Scene::load_with(&path, &small(view)).unwrap();
+            assert_eq!(scene.notes, Vec::<String>::new(), "{name}");
+            let share = coverage(&scene);
+            assert!((0.1..0.9).contains(&share), "{name} {view:?}: {share}");
+        }
+    }
+}
+
+#[test]
+fn a_mesh_stands_upright() {
+    let folder = tempfile::tempdir().unwrap();
+    let tall = "v 0 0 0\nv 0.1 0 0\nv 0 9 1\nf 1 2 3\n";
+    let path = folder.path().join("tall.OBJ");
+    fs::write(&path, tall).unwrap();
+    let (low, high) = load(&path).unwrap().0.bounds().unwrap();
+    assert!((high - low - wgray::DVec3::new(0.1, 1.0, 9.0)).abs().max_element() < 1e-6);
+    let facet = "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 2 9\nendloop\nendfacet\nendsolid\n";
+    let path = folder.path().join("tall.stl");
+    fs::write(&path, facet).unwrap();
+    let (low, high) = load(&path).unwrap().0.bounds().unwrap();
+    assert!((high - low - wgray::DVec3::new(1.0, 2.0, 9.0)).abs().max_element() < 1e-6);
+}
+
+#[test]
+fn the_upright_may_be_another_axis() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.obj");
+    fs::write(&path, "v 0 0 0\nv 1 2 0\nv 0 0 5\nf 1 2 3\n").unwrap();
+    for (up, height) in [("x", 1.0), ("-y", 2.0), ("z", 5.0), ("-z", 5.0)] {
+        let overrides = Overrides {
+            presentation: Presentation {
+                up: Some(up.parse().unwrap()),
+                ..Presentation::default()
+            },
+            ..Overrides::default()
+        };
+        let scene = Scene::load_with(&path, &overrides).unwrap();
+        let (low, high) = scene.bounds().unwrap();
+        assert!((high.z - low.z - height).abs() < 1e-6, "{up}: {low} {high}");
+    }
+}
+
+#[test]
+fn colors_of_vertices_are_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.obj");
+    for (text, expected) in [
+        (
+            "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nf 1 2 3\n",
+            VertexColors::BaseColor,
+        ),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", VertexColors::None),
+    ] {
+        fs::write(&path, text).unwrap();
+        let (scene, _) = load(&path).unwrap();
+        let Reflection::Principled(principled) = &scene.materials[0].reflection else {
+            panic!("{:?}", scene.materials)
+        };
+        assert_eq!(principled.vertex_colors, expected);
+        assert_eq!(scene.material_names, ["default"]);
+    }
+}
+
+#[test]
+fn the_description_of_a_mesh_is_the_same_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.obj");
+    fs::write(folder.path().join("a.mtl"), "newmtl red\nKd 1 0 0\n").unwrap();
+    fs::write(
+        &path,
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nusemtl red\nf 1 2 3\nusemtl\nf 2 4 3\n",
+    )
+    .unwrap();
+    let (scene, description) = load(&path).unwrap();
+    let text = description.to_toml().unwrap();
+    let file = folder.path().join("a.toml");
+    fs::write(&file, text).unwrap();
+    let again = Scene::load(&file).unwrap();
+    assert_eq!(again.shapes, scene.shapes);
+    assert_eq!((&again.materials, &again.camera), (&scene.materials, &scene.camera));
+    assert_eq!(again.render, scene.render);
+    assert_eq!(scene.material_names, ["red", "default"]);
+    // Files that the mesh names are part of the scene.
+    let has = |name: &str| scene.files.iter().any(|file| file.ends_with(name));
+    assert!(has("a.obj") && has("a.mtl"), "{:?}", scene.files);
+    assert!(matches!(scene.shapes[0].geometry, Geometry::Mesh { .. }));
+}
+
+#[test]
+fn what_cannot_be_a_scene_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, message) in [
+        ("a.fbx", ".fbx is not supported; export glTF (.glb), OBJ, PLY or STL"),
+        ("a.USDZ", ".usdz is not supported; export glTF (.glb), OBJ, PLY or STL"),
+        (
+            "a.blend",
+            ".blend is not supported; export glTF (.glb), OBJ, PLY or STL",
+        ),
+        (
+            "a.png",
+            ".png is an image, not a scene; use it as a texture in a scene, or with --environment",
+        ),
+        (
+            "a.mtl",
+            ".mtl is a material library; render the .obj file that names it",
+        ),
+    ] {
+        let path = folder.path().join(name);
+        fs::write(&path, "x").unwrap();
+        assert_eq!(load(&path).unwrap_err(), format!("{}: {message}", path.display()));
+    }
+    let path = folder.path().join("a.obj");
+    assert!(
+        load(&path)
+            .unwrap_err()
+            .starts_with(&format!("{}: cannot be read: ", path.display()))
+    );
+    fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n").unwrap();
+    let expected = format!(
+        "{}:4: vertex 9 of the face does not exist; there are 3 so far",
+        path.display()
+    );
+    assert_eq!(load(&path).unwrap_err(), expected);
+}
+
+#[test]
+fn strict_refuses_damage() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.obj");
+    fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2\n").unwrap();
+    let scene = folder.path().join("s.toml");
+    let text = "image = { width = 4, height = 4 }\ncamera = { position = [0, -5, 0], look_at = [0, 0, 0], fov = 40 }\n\
+                [[shapes]]\ntype = 'mesh'\nfile = 'a.obj'\n";
+    fs::write(&scene, text).unwrap();
+    for strict in [false, true] {
+        let overrides = Overrides {
+            strict,
+            ..Overrides::default()
+        };
+        let load = |path: &Path| Scene::load_with(path, &overrides).map_err(|error| error.to_string());
+        let rule = "a face must have 3 corners or more; this one has 2";
+        match strict {
+            true => {
+                assert_eq!(load(&path).unwrap_err(), format!("{}:5: {rule}", path.display()));
+                let message = load(&scene).unwrap_err();
+                assert!(
+                    message.ends_with(&format!(": shapes[0].file: a.obj:5: {rule}")),
+                    "{message}"
+                );
+            }
+            false => {
+                let note = format!("line 5: {rule}; the face is left out");
+                assert_eq!(load(&path).unwrap().notes, [note.clone()]);
+                assert_eq!(load(&scene).unwrap().notes, [format!("a.obj: {note}")]);
+            }
+        }
+    }
+}
+
+#[test]
+fn options_of_gltf_files_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.stl");
+    fs::write(&path, "solid").unwrap();
+    let overrides = Overrides {
+        gltf: GltfChoice {
+            camera: Some(Selection::Number(0)),
+            ..GltfChoice::default()
+        },
+        ..Overrides::default()
+    };
+    let message = Scene::load_with(&path, &overrides).unwrap_err().to_string();
+    assert_eq!(
+        message,
+        format!("camera: only applies to glTF files, and {} is a mesh", path.display())
+    );
+}
