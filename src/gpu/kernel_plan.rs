@@ -1,4 +1,4 @@
-//! What a device would have to do for a scene, known without opening it.
+//! The kernel that a device would run for a scene, predicted without opening the device.
 
 use super::bake::bake_if_small;
 use super::compose::{ADAPTIVE, RENDER, Shaders};
@@ -6,20 +6,20 @@ use super::device::Info;
 use super::scene::bytes_of_scene;
 use crate::pack::Packed;
 
-/// The kernel of a scene, and what the scene takes.
+/// The kernel of a scene and its memory use.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KernelPlan {
     /// The kernel's entry point.
     pub entry: &'static str,
-    /// Whether the scene is written into it as constants.
+    /// The scene is part of the kernel's source, as constants.
     pub baked: bool,
     /// Lines of WGSL.
     pub lines: usize,
-    /// What the scene's buffers take, in bytes.
+    /// Size of the scene's buffers in bytes.
     pub scene_bytes: u64,
 }
 
-/// Looks ahead.
+/// Predicts the kernel for a packed scene on a device.
 pub fn plan_kernel(packed: &Packed, info: &Info) -> KernelPlan {
     let kernel = if packed.adaptive { &ADAPTIVE } else { &RENDER };
     let baked = (info.kind == "software").then(|| bake_if_small(packed)).flatten();

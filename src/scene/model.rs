@@ -150,7 +150,7 @@ pub(super) fn scene(
     description
 }
 
-/// Returns the light of models that have none. The camera sees gray instead of the studio's lamps, unless an environment is asked for.
+/// Returns the light of models that have none. The camera sees gray instead of the studio, unless an environment is selected.
 pub(super) fn studio(overrides: &Overrides) -> EnvironmentDescription {
     EnvironmentDescription {
         background: overrides.environment.is_none().then_some(BACKGROUND),
