@@ -288,7 +288,7 @@ fn bad_meshes_are_told_with_line_key_value_and_rule() {
 fn files_are_told_with_their_own_places() {
     let folder = folder();
     for (file, told) in [
-        ("broken.obj", "broken.obj:2: vertex 2 of the face is not there"),
+        ("broken.obj", "broken.obj:2: vertex 2 of the face does not exist"),
         ("far.obj", "\"far.obj\" reaches to "),
         ("small.obj", ""),
     ] {
