@@ -82,7 +82,11 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<
         b"ns" => material.shininess = Some(finite(words)?),
         b"ni" => material.index_of_refraction = Some(finite(words)?),
         b"d" => material.opacity = Some(finite(words)?),
-        b"tr" => material.opacity = Some(1.0 - finite(words)?),
+        b"tr" => {
+            // MeshLab writes 1 for opaque materials, and an invisible one has no use.
+            let opacity = 1.0 - finite(words)?;
+            material.opacity = Some(opacity).filter(|opacity| *opacity != 0.0).or(material.opacity);
+        }
         b"illum" => material.illumination = Some(finite(words)?.clamp(0.0, 255.0) as u8),
         b"pm" => material.metallic = Some(finite(words)?),
         b"pr" => material.roughness = Some(finite(words)?),

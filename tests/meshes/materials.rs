@@ -79,6 +79,8 @@ fn defaults_are_a_rough_surface_without_highlights() {
     assert!(roughness(1000.0) < 0.25);
     // Transparency is the rest of opacity.
     assert_eq!(principled(&material("Tr 0.25\n").0).alpha, Value::Plain(0.75));
+    // MeshLab writes this for an opaque material.
+    assert_eq!(principled(&material("Tr 1.000000\n").0).alpha, Value::Plain(1.0));
 }
 
 #[test]
