@@ -385,7 +385,7 @@ fn the_program_without_the_feature_gpu_renders_on_the_cpu() {
     let (code, listed, told) = run(&["devices"]);
     assert_eq!((code, told.as_str()), (Some(0), ""));
     assert!(
-        listed.contains("auto chooses: cpu") && listed.contains("feature \"gpu\""),
+        listed.contains("auto selects: cpu") && listed.contains("feature \"gpu\""),
         "{listed}"
     );
     let (code, good, told) = run(&["check", "s.toml"]);

@@ -1,5 +1,5 @@
-//! The global allocator: the system's, except that the program ends with exit code 7 when memory runs out where no caller
-//! handles it. The standard library would abort instead, and leave temporary files behind.
+//! The global allocator: the system allocator, except that an allocation failure that no caller handles ends the program
+//! with exit code 7. The standard library would abort and leave temporary files behind.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fmt::{self, Write as _};
@@ -13,10 +13,10 @@ struct Allocator;
 #[global_allocator]
 static ALLOCATOR: Allocator = Allocator;
 
-// SAFETY: the system allocator fulfils the contract, and its results are passed on.
+// SAFETY: the system allocator upholds the contract, and its results are returned unchanged.
 unsafe impl GlobalAlloc for Allocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        // SAFETY: the caller's promises are those that the system's allocator needs.
+        // SAFETY: the caller upholds the same contract for the system allocator.
         checked(unsafe { System.alloc(layout) }, layout.size())
     }
 
@@ -62,7 +62,7 @@ pub fn end(size: usize) -> ! {
     wgray::image::remove_temporary_files();
     line.print();
     #[cfg(unix)]
-    // SAFETY: it ends the process, and runs nothing of it.
+    // SAFETY: `_exit` ends the process without running any of its code.
     unsafe {
         libc::_exit(7)
     }
@@ -70,7 +70,7 @@ pub fn end(size: usize) -> ! {
     std::process::exit(7)
 }
 
-/// A line in fixed memory.
+/// A line of text in a fixed-size buffer.
 struct Line {
     bytes: [u8; 256],
     len: usize,
@@ -86,7 +86,7 @@ impl Default for Line {
 }
 
 impl Line {
-    /// Writes the line to standard error, past locks that this thread may hold.
+    /// Writes the line to standard error without the lock of `std::io::stderr`, which this thread may hold.
     fn print(&self) {
         let bytes = &self.bytes[..self.len];
         #[cfg(unix)]

@@ -21,12 +21,12 @@ pub struct Args {
     #[arg(value_name = "SCENE", required = true)]
     scenes: Vec<PathBuf>,
 
-    /// Check the shaders in DIR, which has the same files as the project's shaders/
+    /// Check the shaders in DIR, a modified copy of the project's shaders/
     #[cfg(feature = "gpu")]
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     shaders: Option<PathBuf>,
 
-    /// Allow the files of the scenes to lie anywhere in DIR instead of only in each scene's folder
+    /// Allow the scenes to read textures and meshes below DIR
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 
@@ -41,7 +41,7 @@ pub struct Args {
 /// Maximum number of frames of a camera path to check.
 const MAX_FRAMES: f64 = 100_000.0;
 
-/// Checks all files. The exit code is that of the first invalid one.
+/// Checks all files. Returns the exit code of the first invalid file.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     #[cfg(feature = "gpu")]
     let shaders = match &args.shaders {
@@ -70,7 +70,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                     visible(&format!("{}: ok: {summary}", path.display()))
                 );
             }
-            Ok(_) => {} // the reader of standard output has gone
+            Ok(_) => {} // the reader of standard output has closed it
             Err(error) => {
                 super::report(&error, super::exit_code(&error));
                 code.get_or_insert(ExitCode::from(super::exit_code(&error)));
@@ -122,7 +122,7 @@ fn image(scene: &Scene, packed: &Packed) -> String {
     )
 }
 
-/// Returns the number of shapes, and of these the instances of meshes with their memory use.
+/// Describes the shapes: their number, and the number and memory use of mesh instances.
 fn shapes(scene: &Scene, packed: &Packed) -> String {
     let all = count(scene.shapes.len(), "shape");
     if packed.instances.is_empty() {
@@ -139,7 +139,7 @@ fn shapes(scene: &Scene, packed: &Packed) -> String {
     )
 }
 
-/// Returns what is special about the camera, if anything.
+/// Describes a panoramic camera or a lens; `None` for other cameras.
 fn camera(scene: &Scene) -> Option<String> {
     match (scene.camera.projection, scene.camera.lens) {
         (Projection::Panorama, _) => Some("panorama".to_owned()),
@@ -151,7 +151,7 @@ fn camera(scene: &Scene) -> Option<String> {
     }
 }
 
-/// Checks the camera at all frames from the first key of its path to the last, and returns which these are.
+/// Checks the camera at each frame of its path, and returns a description of the frame range.
 fn check_path(scene: &Scene) -> Result<Option<String>, SceneError> {
     let Some((first, last)) = scene.camera_path.as_ref().map(CameraPath::frames) else {
         return Ok(None);
@@ -163,7 +163,7 @@ fn check_path(scene: &Scene) -> Result<Option<String>, SceneError> {
     Ok(Some(format!("the camera moves from frame {first} to {last}")))
 }
 
-/// Returns a number with a noun in the singular or plural.
+/// Formats a count with its noun in the singular or plural.
 fn count(n: usize, noun: &str) -> String {
     match (n, noun.ends_with("sh")) {
         (1, _) => format!("1 {noun}"),
@@ -172,7 +172,7 @@ fn count(n: usize, noun: &str) -> String {
     }
 }
 
-/// Returns a length with four digits.
+/// Rounds a length to four significant digits.
 fn short(x: f64) -> f64 {
     format!("{x:.3e}").parse().unwrap_or(x)
 }

@@ -20,7 +20,7 @@ pub fn run(args: &Args) -> ExitCode {
     super::ended(io::stdout().lock().write_all(&text), ExitCode::SUCCESS)
 }
 
-/// Returns the command line with values to complete that the options themselves do not list.
+/// Returns the command line definition with the completions that the arguments do not define themselves.
 fn command() -> Command {
     let all = below(super::Cli::command());
     let names: Vec<String> = all
@@ -33,12 +33,12 @@ fn command() -> Command {
     })
 }
 
-/// Adds the values of a command and of its subcommands.
+/// Adds the completions of a command and its subcommands.
 fn below(command: Command) -> Command {
     command.mut_args(offered).mut_subcommands(below)
 }
 
-/// Limits file names to options that are paths, and adds the fixed names of devices.
+/// Completes device names, and file names only for arguments that are paths.
 fn offered(arg: Arg) -> Arg {
     if arg.get_id() == "device" {
         return arg.value_parser(PossibleValuesParser::new(["auto", "gpu", "cpu"]));

@@ -23,7 +23,7 @@ pub struct Args {
     /// Scene or model file: .toml, .json, .gltf, .glb, .obj, .ply or .stl
     scene: PathBuf,
 
-    /// File to write. It refers to the model, images and meshes of the scene
+    /// File to write, which references the model, textures and meshes of the scene
     #[arg(short, long, value_name = "SCENE.toml")]
     output: PathBuf,
 
@@ -39,7 +39,7 @@ pub struct Args {
     #[arg(long, visible_alias = "spp", value_name = "N")]
     pixel_samples: Option<u32>,
 
-    /// Allow the files of the scene to lie anywhere in DIR instead of only in the scene's own folder
+    /// Allow the scene to read textures and meshes below DIR
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 
@@ -80,7 +80,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         ))
         .into());
     }
-    // The folder of the file behind links.
+    // The folder of the output file after symbolic links are resolved.
     let folder = (output.path().and_then(Path::parent))
         .unwrap_or(Path::new("."))
         .to_owned();
@@ -93,7 +93,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let needed_root = common_root(&description, &root);
     let mut file = Pending::start(output).map_err(RenderError::Output)?;
     let head = format!(
-        "# {}, as a scene. Absent keys have their defaults.\n\n",
+        "# {}, as a scene. Omitted keys have their defaults.\n\n",
         name_of(&args.scene)
     );
     let written = file
@@ -103,13 +103,13 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     if let Some(needed) = needed_root {
         let (name, folder) = (args.output.display(), folder.display());
         let option = word(&from_here(&needed).to_string_lossy());
-        let text = format!("{name}: names files outside of {folder}; to use it, pass --asset-root {option}");
+        let text = format!("{name}: refers to files outside of {folder}; pass --asset-root {option} to render it");
         log::say(Level::Note, &text);
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the folder that holds all files of a scene in `folder`, if `folder` itself does not.
+/// Returns the closest ancestor of `folder` that contains all files of the scene, or `None` if `folder` contains them.
 fn common_root(description: &Description, folder: &Path) -> Option<PathBuf> {
     let files = description.files(folder).filter_map(|file| file.canonicalize().ok());
     let outside: Vec<PathBuf> = files.filter(|file| !file.starts_with(folder)).collect();
@@ -120,7 +120,7 @@ fn common_root(description: &Description, folder: &Path) -> Option<PathBuf> {
     folder.ancestors().find(holds_all).map(Path::to_owned)
 }
 
-/// Returns a folder as typed in the current one: relative if it is the current folder, below it or above it.
+/// Returns a path to the folder: relative if it is the current folder, a descendant or an ancestor, else absolute.
 fn from_here(folder: &Path) -> PathBuf {
     let Ok(here) = std::env::current_dir().and_then(|here| here.canonicalize()) else {
         return folder.to_owned();
@@ -137,7 +137,7 @@ fn from_here(folder: &Path) -> PathBuf {
     }
 }
 
-/// Returns the name of a file on one line.
+/// Returns the name of a file with control characters replaced by spaces.
 fn name_of(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()

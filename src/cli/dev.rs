@@ -25,7 +25,7 @@ use super::signal;
 #[derive(Debug, clap::Args)]
 #[command(after_help = super::EXIT_CODES)]
 pub struct Args {
-    /// Scene file
+    /// Scene or model file
     scene: PathBuf,
 
     /// Serve the page at this address
@@ -61,7 +61,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 
-    /// Open source lines in an editor by this URL
+    /// Use this URL to open source lines in an editor
     ///
     /// The URL contains {file} and optionally {line} and {column}, such as idea://open?file={file}&line={line}. off disables
     /// the links.
@@ -72,7 +72,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "listen")]
     no_page: bool,
 
-    /// Measure the time from a save to the image on copies of the files, print it, and exit
+    /// Measure the latency from a save to the image, using copies of the files, and exit
     #[arg(long, conflicts_with_all = ["listen", "out", "no_page"])]
     measure: bool,
 
@@ -108,7 +108,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.no_page && args.out.is_none() {
         return Err(Usage("--no-page requires --out FILE.png".to_string()).into());
     }
-    // TimeRecord until the session has read the scene, so that its meshes are read once.
+    // Kept until the session has read the scene, so that its meshes are read only once.
     let scene = args
         .out
         .as_ref()
@@ -164,7 +164,7 @@ fn listen_error(address: &str, error: &io::Error) -> anyhow::Error {
     }
 }
 
-/// URL schemes that browsers and operating systems give other meanings.
+/// URL schemes with a meaning of their own to browsers and operating systems.
 const NON_EDITOR_SCHEMES: [&str; 14] = [
     "javascript",
     "data",
@@ -206,12 +206,12 @@ fn editor(template: &str) -> anyhow::Result<Option<String>> {
         .iter()
         .fold(rest.to_string(), |rest, known| rest.replace(known, ""));
     if unknown.contains(['{', '}']) || !rest.contains("{file}") {
-        return refuse("must contain {file}, may contain {line} and {column}, and no other braces");
+        return refuse("must contain {file}, may contain {line} and {column}, and must not contain other braces");
     }
     Ok(Some(template.to_string()))
 }
 
-/// Resolves the links of `--out`, and refuses watched files and anything but a PNG file.
+/// Resolves symbolic links in `--out`. Rejects watched files and files other than PNG.
 fn check_output(out: &Path, sources: &Sources, loaded: Option<&Scene>) -> anyhow::Result<PathBuf> {
     let is_png = |path: &Path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
     if !is_png(out) {
@@ -221,7 +221,7 @@ fn check_output(out: &Path, sources: &Sources, loaded: Option<&Scene>) -> anyhow
     let Some(path) = output.path() else {
         return Err(Usage(format!("--out: {}: must be a regular file", out.display())).into());
     };
-    let text = std::fs::read_to_string(&sources.scene).unwrap_or_default(); // the text of a glTF file is not a description
+    let text = std::fs::read_to_string(&sources.scene).unwrap_or_default(); // empty for a binary file
     let described = Description::parse(&text, &sources.scene.display().to_string()).ok();
     let folder = sources.scene.parent().unwrap_or(Path::new(""));
     let named = described.iter().flat_map(|described| described.files(folder));
@@ -330,7 +330,7 @@ impl Terminal {
         say(&format!("{} {head}\n{excerpt}", clock()));
     }
 
-    /// Returns an excerpt with its marks in red.
+    /// Returns an excerpt with the underlines of its errors in red.
     fn marked(self, excerpt: &str) -> String {
         let lines = excerpt.lines().map(|line| match line.find('^') {
             Some(at) if !line.starts_with(char::is_numeric) => {
@@ -359,7 +359,7 @@ impl Terminal {
 }
 
 fn say(text: &str) {
-    let _ = io::stderr().lock().write_all(text.as_bytes()); // without standard error there is nowhere to report that
+    let _ = io::stderr().lock().write_all(text.as_bytes()); // a failure to write to standard error cannot be reported
 }
 
 /// Returns the time of day in UTC.

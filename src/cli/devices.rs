@@ -16,7 +16,7 @@ fn list(out: &mut impl Write) -> io::Result<()> {
     list_adapters(out, &adapters)?;
     list_cpu(out)?;
     let chosen = adapters.first().map_or("cpu", |info| &info.name);
-    writeln!(out, "auto chooses: {chosen}")?;
+    writeln!(out, "auto selects: {chosen}")?;
     if adapters.is_empty() {
         writeln!(out, "{}", gpu::HOW_TO_GET_VULKAN)?;
     }
@@ -26,7 +26,7 @@ fn list(out: &mut impl Write) -> io::Result<()> {
 #[cfg(not(feature = "gpu"))]
 fn list(out: &mut impl Write) -> io::Result<()> {
     list_cpu(out)?;
-    writeln!(out, "auto chooses: cpu")?;
+    writeln!(out, "auto selects: cpu")?;
     writeln!(
         out,
         "this program was built without the feature \"gpu\" and cannot use GPUs"
@@ -54,7 +54,7 @@ fn list_adapters(out: &mut impl Write, adapters: &[Info]) -> io::Result<()> {
             out,
             "    arithmetic      {}",
             if *exact {
-                "IEEE 754 as written"
+                "exact (IEEE 754)"
             } else {
                 "driver-dependent (--exact-rounding makes it exact)"
             }

@@ -19,7 +19,7 @@ pub const EXIT_CODES: [(&str, &str); 11] = [
     ("8", "an output could not be written"),
     (
         "value of --requeue-exit",
-        "instead of 6 and 143: the same command may succeed later or on another machine",
+        "replaces 6 and 143: the same command may succeed later or on another machine",
     ),
     (
         "128 + n",

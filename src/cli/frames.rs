@@ -6,11 +6,11 @@ use std::str::FromStr;
 
 use crate::cli::Usage;
 
-/// Maximum number of a frame, and maximum number of frames: their names are checked before the first is rendered.
+/// Largest frame number, and maximum number of frames: all file names are checked before the first frame is rendered.
 pub const MAX_NUMBER: u32 = 999_999_999;
 const MAX_COUNT: usize = 100_000;
 
-/// Frames in the order of the option, each once: `5`, `1-10`, `1-10:2`, `1-3,7`.
+/// Frame numbers in the order given, without duplicates: `5`, `1-10`, `1-10:2`, `1-3,7`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frames(Vec<u32>);
 
@@ -20,7 +20,7 @@ impl Frames {
         Frames((1..=count).collect())
     }
 
-    /// Returns the frames in ascending order as few ranges: first, last and step.
+    /// Returns the frames as ranges (first, last, step), as few as possible.
     pub fn ranges(&self) -> Vec<(u32, u32, u32)> {
         let mut sorted = self.0.clone();
         sorted.sort_unstable();
@@ -32,7 +32,7 @@ impl Frames {
                 count += 1;
             }
             if count == 2 && step > 1 {
-                count = 1; // the second may start a range with another step
+                count = 1; // not yet a range; the second number may begin one with another step
             }
             let range = &rest[..count];
             ranges.push((*first, range[count - 1], if count > 1 { step } else { 1 }));
@@ -84,7 +84,7 @@ fn range(text: &str) -> Result<impl Iterator<Item = u32>, String> {
         None => (number(ends)?, number(ends)?),
     };
     if first > last {
-        return Err(format!("{text} must ascend, from {last} to {first}"));
+        return Err(format!("{text} must be in ascending order, {last}-{first}"));
     }
     match step {
         Some(0) => Err(format!("{text} needs a step of at least 1")),
@@ -105,14 +105,14 @@ fn number(text: &str) -> Result<u32, String> {
 /// One of the images of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// The number of the frame; none without `--frames`.
+    /// The frame number; `None` without `--frames`.
     pub number: Option<u32>,
-    /// Position in the run, from 1, and the number of frames.
+    /// Position in the run, counted from 1, and the number of frames in the run.
     pub place: (usize, usize),
 }
 
 impl Frame {
-    /// Returns the images of a run: a single one without `--frames`.
+    /// Returns the images of a run: one without a number if `frames` is `None`.
     pub fn all(frames: Option<&Frames>) -> Vec<Frame> {
         let numbers = match frames {
             Some(frames) => frames.0.iter().copied().map(Some).collect(),
@@ -130,8 +130,8 @@ impl Frame {
         Frame { number, place: (1, 1) }
     }
 
-    /// Returns a file name with `#` replaced by the number of the frame, zero-padded to the number of `#`; folders stay as they
-    /// are. The names of several frames must differ. `option` is named in messages.
+    /// Returns a file name with `#` replaced by the number of the frame, zero-padded to the number of `#`. Folder
+    /// names are unchanged. The names of several frames must differ. Error messages name `option`.
     pub fn name(&self, option: &str, pattern: &Path) -> Result<PathBuf, Usage> {
         let Some(number) = self.number else {
             return Ok(pattern.to_owned());
@@ -240,7 +240,7 @@ mod tests {
             ("1-10:-1", "-1: must be whole numbers"),
             ("1-10:0", "1-10:0 needs a step of at least 1"),
             ("5:2", "5:2 needs a range before the step"),
-            ("10-1", "10-1 must ascend, from 1 to 10"),
+            ("10-1", "10-1 must be in ascending order, 1-10"),
             ("0-999999999", "must be at most 100000 frames"),
             ("1-100000,0", "must be at most 100000 frames"),
         ] {

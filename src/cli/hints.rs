@@ -6,7 +6,7 @@ use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use wgray::visible::visible;
 
-/// Options of other renderers, and what to use here.
+/// Options of other renderers and their equivalents.
 const OPTIONS: [(&str, &str); 9] = [
     ("--width", "--size WIDTHxHEIGHT"),
     ("--height", "--size WIDTHxHEIGHT"),
@@ -19,13 +19,13 @@ const OPTIONS: [(&str, &str); 9] = [
     ("--resolution-x", "--size WIDTHxHEIGHT"),
 ];
 
-/// Extensions of files that `wgray render` may be asked to show.
+/// Extensions of scene and model files, which suggest that the subcommand `render` was omitted.
 const SCENES: [&str; 7] = ["toml", "json", "gltf", "glb", "obj", "ply", "stl"];
 
-/// Maximum length of a word of the command line in a message, in characters.
+/// Maximum length, in characters, at which messages quote an argument.
 const MAX_WORD_LEN: usize = 200;
 
-/// Adds a hint to an error, and makes its words printable and short.
+/// Adds a hint to an error, and escapes and shortens the arguments that it quotes.
 pub fn improve(mut error: clap::Error) -> clap::Error {
     if let Some(hint) = hint(&error) {
         error.remove(ContextKind::SuggestedArg);
@@ -50,7 +50,7 @@ pub fn improve(mut error: clap::Error) -> clap::Error {
         };
         if shown != *word {
             error.insert(kind, ContextValue::String(shown));
-            error.remove(ContextKind::Suggested); // it repeats the word as it is
+            error.remove(ContextKind::Suggested); // the suggestion repeats the unescaped word
         }
     }
     error

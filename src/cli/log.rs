@@ -34,13 +34,13 @@ pub enum Level {
     Note,
     /// The progress of a render.
     Progress,
-    /// Messages of `--verbose`, and the end of a render.
+    /// Messages of `--verbose`, and the summary after a render.
     Info,
     Debug,
 }
 
 impl Level {
-    /// Returns the prefix of a line of text.
+    /// Returns the prefix of a message in text format.
     fn prefix(self) -> &'static str {
         match self {
             Level::Error => "error: ",
@@ -51,7 +51,7 @@ impl Level {
     }
 }
 
-/// Further facts, printed in JSON only.
+/// Additional fields of a JSON message, not printed as text.
 pub type Facts = Map<String, Value>;
 
 static JSON: AtomicBool = AtomicBool::new(false);
@@ -88,7 +88,7 @@ pub fn say(level: Level, message: &str) {
     tell(level, message, Facts::new());
 }
 
-/// Prints a message with facts.
+/// Prints a message with additional JSON fields.
 pub fn tell(level: Level, message: &str, facts: Facts) {
     if !is_json() {
         write(&visible(&format!("{}{message}", level.prefix())));
@@ -116,7 +116,7 @@ pub fn tell(level: Level, message: &str, facts: Facts) {
     write(&serde_json::to_string(&line).unwrap_or_default());
 }
 
-/// Prints text that belongs to the previous message, whose facts contain it in JSON.
+/// Prints text that continues the previous message; a JSON message has it in its fields instead.
 pub fn explain(text: &str) {
     if !is_json() {
         write(&visible_lines(text));

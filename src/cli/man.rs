@@ -93,7 +93,7 @@ fn page(command: &clap::Command) -> io::Result<Vec<u8>> {
     let name = name_of(command);
     let is_program = name == "wgray";
     let man = Man::new(command.clone());
-    // Written by hand with an empty date, for reproducible builds; `clap_mangen` would shift the next words into its place.
+    // Written by hand: reproducible builds need an empty date, which `clap_mangen` would omit, shifting the other fields.
     let (title, version) = (name.to_uppercase(), env!("CARGO_PKG_VERSION"));
     let mut text = format!(".TH {title} 1 \"\" \"wgray {version}\" \"User Commands\"\n").into_bytes();
     man.render_name_section(&mut text)?;
@@ -151,7 +151,7 @@ fn page(command: &clap::Command) -> io::Result<Vec<u8>> {
     Ok(text)
 }
 
-/// Returns a command's own text on exit codes, if it has one.
+/// Returns the exit codes that a command documents itself, if any.
 fn own_exit_codes(command: &clap::Command) -> Option<String> {
     let text = command.get_after_help()?.to_string();
     let own = text.strip_prefix("Exit codes: ")?;
@@ -172,7 +172,7 @@ fn paragraphs(roff: &mut Roff, text: &str) {
     }
 }
 
-/// Writes terms with their meanings.
+/// Writes a list of terms and definitions.
 fn entries<'a>(roff: &mut Roff, all: impl Iterator<Item = (&'a str, &'a str)>) {
     for (term, meaning) in all {
         roff.control("TP", []);

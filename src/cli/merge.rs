@@ -17,13 +17,13 @@ use super::{Interrupted, Usage, signal};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = super::EXIT_CODES)]
-#[command(allow_negative_numbers = true)] // so that a number out of range is reported as such
+#[command(allow_negative_numbers = true)] // report negative numbers as out of range
 pub struct Args {
     /// All parts of an image, written by wgray render --tile, or folders of parts
     #[arg(value_name = "PART", required = true)]
     parts: Vec<PathBuf>,
 
-    /// Replace # in output names by N: out.####.png becomes out.0007.png
+    /// Replace # in output names with the number N: out.####.png becomes out.0007.png
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=i64::from(frames::MAX_NUMBER)))]
     frame: Option<u32>,
 
@@ -35,7 +35,7 @@ pub struct Args {
     quiet: bool,
 }
 
-/// Writes the image and the layers of the parts: the same bytes as a single render.
+/// Joins the parts into the image and its layers, byte-identical to a single render.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let frame = Frame::one(args.frame);
     let named = args.pictures.output.iter().map(|output| frame.name("--output", output));
@@ -59,7 +59,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let begun = outputs.begin().map_err(RenderError::Output)?;
     let stop = signal::stop().context("signal handler")?;
     let Files::Pictures(targets) = begun.files else {
-        return Ok(ExitCode::SUCCESS); // `Outputs::find` returns no part
+        return Ok(ExitCode::SUCCESS); // unreachable: merge does not write parts
     };
     let options = args.pictures.save_options(parts.told());
     let written = image::save(targets, &layout, &options, &mut |sink| {
@@ -80,7 +80,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// Returns the parts, including those in folders. Files that another process is writing have hidden names.
+/// Returns the parts, including those in folders. Skips hidden files, which another process may still be writing.
 fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in paths {

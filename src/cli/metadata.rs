@@ -8,13 +8,13 @@ use wgray::job::{hash_of_scene, hash_of_shaders};
 use wgray::pack::Packed;
 use wgray::scene::Scene;
 
-/// The metadata that is known before a render.
+/// Metadata that is known before rendering.
 pub struct RenderMetadata {
     metadata: Metadata,
 }
 
 impl RenderMetadata {
-    /// Returns the metadata of a scene, and the version of the program.
+    /// Returns the metadata of a scene and the program version.
     pub fn of(scene: &Scene, packed: &Packed, time_limit: Option<Duration>) -> RenderMetadata {
         let mut pairs = vec![(
             Metadata::SOFTWARE.to_owned(),
@@ -47,7 +47,7 @@ impl RenderMetadata {
         self.metadata.clone()
     }
 
-    /// Returns the metadata with the device, unless the image is to be reproducible.
+    /// Returns the metadata, including the device except under `--reproducible`.
     pub fn on(&self, device: &DeviceInfo, reproducible: bool) -> Metadata {
         let mut metadata = self.metadata.clone();
         if !reproducible {

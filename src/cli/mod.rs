@@ -83,7 +83,7 @@ enum Command {
     Convert(Box<convert::Args>),
     /// Compare two images; fail if they differ
     Diff(Box<diff::Args>),
-    /// List the adapters to render on and the one that auto selects
+    /// List the devices and the one that auto selects
     #[command(after_help = EXIT_CODES)]
     Devices,
     /// Print the JSON Schema of scene files, for editors
@@ -105,12 +105,12 @@ enum Command {
 #[error("interrupted by {}", signal::name(*.0))]
 struct Interrupted(i32);
 
-/// A contradiction in a command line that parses.
+/// A usage error that is not a parse error, such as contradictory options.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 struct Usage(String);
 
-/// The operating system does not start threads, usually for want of memory.
+/// Threads could not be started, usually because memory is exhausted.
 #[derive(Debug, thiserror::Error)]
 #[error("out of memory: cannot start threads: {0} (--threads)")]
 struct NoThreads(rayon::ThreadPoolBuildError);
@@ -135,7 +135,7 @@ pub fn main() -> ExitCode {
     };
     prepare_environment(threads);
     signal::file_size_limit_is_an_error();
-    wgray::contain::install_quiet_hook(); // the panics of a lost device become errors
+    wgray::contain::install_quiet_hook(); // panics caused by a lost device are converted to errors
     let result = start_threads(threads).and_then(|()| match cli.command {
         Command::Render(args) => render::run(*args, start),
         Command::Check(args) => check::run(&args),
@@ -177,14 +177,14 @@ fn parse() -> Result<Cli, clap::Error> {
     Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
 }
 
-/// Makes the help of a command list the options that `-h` leaves out.
+/// Includes the options that `-h` hides in the help of a command and its subcommands.
 fn with_all_options(command: clap::Command) -> clap::Command {
     command
         .mut_args(|option| option.hide_short_help(false))
         .mut_subcommands(with_all_options)
 }
 
-/// Prints the help, the version, or an error in the command line.
+/// Prints the help, the version, or a command line error.
 fn explain(error: &clap::Error) -> ExitCode {
     log::choose(log::asked(std::env::args_os()));
     if !error.use_stderr() {
@@ -203,7 +203,7 @@ fn explain(error: &clap::Error) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// Sets the environment of drivers, before any other thread exists.
+/// Sets the environment variables of drivers, before other threads are started.
 fn prepare_environment(threads: Option<u16>) {
     let set = |name: &str, value: &std::ffi::OsStr| {
         // SAFETY: the process has only this thread so far.
@@ -213,19 +213,19 @@ fn prepare_environment(threads: Option<u16>) {
         set("LP_NUM_THREADS", threads.to_string().as_ref());
     }
     if cfg!(target_os = "linux") && std::env::var_os("XDG_RUNTIME_DIR").is_none() {
-        // Mesa prints a warning if it is unset, and does not use it without a window.
+        // Mesa warns if it is unset, although it is only used for windows.
         set("XDG_RUNTIME_DIR", std::env::temp_dir().as_os_str());
     }
 }
 
-/// Starts the threads of parallel work, which would panic without them.
+/// Starts the global thread pool. Without this check rayon would panic if threads cannot be started.
 fn start_threads(threads: Option<u16>) -> anyhow::Result<()> {
     let count = threads.map_or(0, usize::from); // 0: all
     let pool = rayon::ThreadPoolBuilder::new().num_threads(count);
     Ok(pool.build_global().map_err(NoThreads)?)
 }
 
-/// Reads a scene file, with overridden values.
+/// Reads a scene file and applies the overrides.
 fn load(path: &Path, overrides: &Overrides) -> anyhow::Result<Scene> {
     Scene::load_with(path, overrides).map_err(|error| plain(error.into()))
 }
@@ -240,7 +240,7 @@ fn plain(error: Error) -> anyhow::Error {
     }
 }
 
-/// Converts a problem of an option.
+/// Converts an invalid option value into a usage error.
 fn option(problem: &Problem) -> Usage {
     let key = problem.key.to_string();
     let (name, rest) = key.split_once('.').unwrap_or((&key, ""));
@@ -256,7 +256,7 @@ fn option(problem: &Problem) -> Usage {
     let hint = match (name.as_str(), rest) {
         ("aov", "sample_count" | "variance") => " (--adaptive ERROR)",
         ("aov", _) => " (--integrator path)",
-        ("adaptive", "") => " (--pixel-pattern sobol)", // the option's own value was checked
+        ("adaptive", "") => " (--pixel-pattern sobol)", // the value itself has been validated
         _ => "",
     };
     Usage(format!("--{name}{place}: {}{hint}", problem.message))
@@ -306,7 +306,7 @@ fn report(error: &anyhow::Error, code: u8) {
     }
 }
 
-/// Returns facts by name.
+/// Builds the additional fields of a JSON message.
 fn facts_of<const N: usize>(facts: [(&str, Value); N]) -> Facts {
     facts
         .map(|(name, value)| (name.to_owned(), value))

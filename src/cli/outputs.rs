@@ -1,5 +1,5 @@
-//! The destinations of a render, checked before it begins: no inputs, no duplicates, and no files of other programs by a
-//! default name.
+//! The destinations of a render, checked before it begins: none may be an input or occur twice, and a default name must
+//! not replace another program's file.
 
 use std::io::{self, IsTerminal as _};
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ struct Picture {
     files: Vec<(String, Output)>,
 }
 
-/// Destinations that are open.
+/// Opened destinations.
 pub struct OpenOutputs {
     pub files: Files,
     pub stats: Option<Pending>,
@@ -53,12 +53,12 @@ impl Files {
     }
 }
 
-/// The reason for layers among the outputs.
+/// Determines whether every layer must be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layered {
-    /// They are requested, so an output must accept them.
+    /// Layers were requested: an output must support them.
     Requested,
-    /// They exist, for the outputs that accept them.
+    /// Layers are available, for the outputs that support them.
     Available,
 }
 
@@ -119,7 +119,7 @@ impl Outputs {
         Ok(outputs)
     }
 
-    /// Rejects images by default names that exist, unless this program wrote them.
+    /// Rejects default output files that exist, unless wgray wrote them.
     fn keep_files_of_others(&self) -> Result<(), Usage> {
         let mut files = self.pictures.iter().flat_map(|picture| &picture.files);
         let of_others = |(_, output): &&(String, Output)| {
@@ -170,7 +170,7 @@ impl Outputs {
 
     /// Rejects destinations that would replace an input or another output.
     pub fn check(&self, inputs: &[PathBuf], checkpoint: Option<&Path>) -> anyhow::Result<()> {
-        // In a folder its name is unique.
+        // A folder gives each checkpoint a unique name.
         let checkpoint = checkpoint.filter(|path| !path.is_dir());
         let checkpoint = checkpoint.map(find_checkpoint).transpose()?;
         let checkpoint = checkpoint
@@ -199,7 +199,7 @@ impl Outputs {
         Ok(())
     }
 
-    /// Returns true if all files exist, and are complete therefore. Streams never exist, except that one for statistics is
+    /// Returns true if all files exist, which means that they are complete. Image streams never exist; a statistics stream is
     /// ignored.
     pub fn exist(&self) -> bool {
         let exists = |output: &Output| output.path().is_some_and(Path::is_file);
@@ -209,7 +209,7 @@ impl Outputs {
         all.all(exists)
     }
 
-    /// Returns the path of the part, if this is one and a file.
+    /// Returns the path of the part if the destination is a part in a file.
     pub fn part(&self) -> Option<&Path> {
         self.part.as_ref()?.path()
     }
@@ -231,7 +231,7 @@ impl Outputs {
         outputs.map(|output| output.name().to_owned()).collect()
     }
 
-    /// Opens all. A pipe waits for its reader, so this happens while signals still end the program at once.
+    /// Opens all destinations. Opening a pipe blocks until it has a reader, so signals must still end the program at once.
     pub fn begin(mut self) -> io::Result<OpenOutputs> {
         let pictures = self.pictures.iter_mut().flat_map(|picture| &mut picture.files);
         for output in pictures
@@ -272,7 +272,7 @@ fn find_checkpoint(path: &Path) -> anyhow::Result<Output> {
     Ok(checkpoint)
 }
 
-/// Rejects names that are probably mistakes.
+/// Rejects names that are probably unintended.
 fn forbid_pictures(option: &str, path: &Path, output: &Output) -> Result<(), Usage> {
     forbid_ending(option, path, output, "toml", "names a scene")?;
     forbid_ending(option, path, output, PART, "names a part")?;
@@ -303,11 +303,11 @@ fn output(path: &Path) -> Result<Output, RenderError> {
     }
 }
 
-/// Returns the formats by extension, else by --format; other streams get a PNG.
+/// Returns the formats, determined by extension, else by --format. Streams default to PNG.
 fn formats(pictures: &[(&Path, Output)], option: Option<Format>) -> Result<Vec<Format>, Usage> {
     let named: Vec<Option<Format>> = pictures.iter().map(|(path, _)| Format::of(path)).collect();
     if let (Some(option), false) = (option, named.contains(&None)) {
-        // No output needs it, so it must agree with all.
+        // All outputs have known extensions, which --format must not contradict.
         let other = pictures.iter().zip(&named).find(|(_, named)| **named != Some(option));
         if let Some(((path, _), _)) = other {
             let (name, ending) = (path.display(), path.extension().unwrap_or_default().display());
@@ -331,7 +331,7 @@ fn formats(pictures: &[(&Path, Output)], option: Option<Format>) -> Result<Vec<F
     pictures.iter().zip(named).map(format).collect()
 }
 
-/// Rejects layers that none of the outputs accepts.
+/// Rejects layers that no output supports.
 fn check_layers(aovs: &[Aov], pictures: &[(&Path, Output)], formats: &[Format]) -> Result<(), Usage> {
     let mut layers = pictures
         .iter()

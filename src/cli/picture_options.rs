@@ -1,4 +1,4 @@
-//! The options for the images that are written, shared by `render` and `merge`.
+//! Output image options, shared by `render` and `merge`.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use wgray::scene::{ViewSettings, ViewTransform};
 
 use super::Usage;
 
-/// The options as they are written.
+/// The options as parsed.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Output images")]
 pub struct PictureOptions {
@@ -32,7 +32,7 @@ pub struct PictureOptions {
     #[arg(long, value_name = "BITS", value_parser = depth_parser(), hide_short_help = true)]
     pub bit_depth: Option<BitDepth>,
 
-    /// Set the number type of an EXR [default: float]
+    /// Set the channel type of an EXR [default: float]
     #[arg(long, value_name = "TYPE", value_parser = named(ExrType::ALL, ExrType::name), hide_short_help = true)]
     pub exr_type: Option<ExrType>,
 
@@ -69,11 +69,11 @@ impl PictureOptions {
         }
     }
 
-    /// Reports values that a format could not hold.
+    /// Warns about values that exceeded the range of a format.
     pub fn warn(&self, saved: &Saved, say: &mut dyn FnMut(&str)) {
         for (name, count) in &saved.too_large {
             say(&format!(
-                "{name}: {count} values exceed 65504, the maximum of 16 bits, and are written as infinity; use --exr-type float"
+                "{name}: {count} values exceed 65504, the maximum of 16 bits, and were written as infinity; use --exr-type float"
             ));
         }
     }

@@ -14,20 +14,20 @@ use super::log::{self, Level};
 /// The form of progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Mode {
-    // A bar on a terminal; else a line every ten seconds, or as for Plain if messages are JSON.
+    // A bar on a terminal; otherwise a line every ten seconds. JSON messages use the intervals of Plain.
     Auto,
-    // A line at every tenth of the work and every ten seconds.
+    // A line after every tenth of the work and every ten seconds.
     Plain,
     // Lines that Open Job Description reads: openjd_progress: PERCENT.
     Openjd,
     None,
 }
 
-/// Work that is shorter than this has no bar.
+/// Duration of work before the bar appears.
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Interval between lines.
 const INTERVAL: Duration = Duration::from_secs(10);
-/// Time before the first estimate: the first pixels are seldom typical.
+/// Time before the first estimate: the first pixels are rarely representative.
 const SETTLING: Duration = Duration::from_secs(3);
 /// Number of steps of the bar.
 const STEPS: f64 = 1000.0;
@@ -37,12 +37,12 @@ pub struct Progress {
     form: Form,
     /// Label printed before each line, with a colon; empty when rendering a single image.
     label: String,
-    /// The number of the frame.
+    /// The frame number.
     frame: Option<u32>,
     start: Instant,
-    /// The fraction that was done at the start: read from a checkpoint.
+    /// The initial fraction, read from a checkpoint.
     first: Option<f64>,
-    /// The tenths, or hundredths, at the last line, and its time.
+    /// The tenths (or hundredths) completed at the last printed line, and its time.
     printed: (u32, Instant),
 }
 
@@ -54,7 +54,7 @@ enum Form {
 }
 
 impl Progress {
-    /// Returns the progress of an image, or of one of several frames by their label.
+    /// Returns the progress of an image; `label` names the frame if several are rendered.
     pub fn new(mode: Mode, label: Option<String>, frame: Option<u32>) -> Progress {
         let form = match mode {
             Mode::Auto if log::is_json() => Form::Lines { at_tenths: true },
@@ -81,7 +81,7 @@ impl Progress {
         let first = *self.first.get_or_insert(fraction);
         let remaining = remaining(elapsed, first, fraction);
         match &mut self.form {
-            // Each of several frames may be short.
+            // With several frames, short ones have a bar too.
             Form::Bar(bar) if elapsed > PATIENCE || !self.label.is_empty() => {
                 let bar = bar.get_or_insert_with(|| new_bar(elapsed, &self.label));
                 bar.set_position((fraction * STEPS) as u64);
@@ -154,7 +154,7 @@ impl Drop for Progress {
     }
 }
 
-/// Runs work without measurable progress. On a terminal its name and time are shown once it takes longer than a second.
+/// Runs work whose progress cannot be measured. On a terminal its name and time are shown once it takes longer than a second.
 pub fn named<T>(mode: Mode, name: &'static str, work: impl FnOnce() -> T) -> T {
     if mode != Mode::Auto || log::is_json() || !std::io::stderr().is_terminal() {
         return work();

@@ -1,4 +1,4 @@
-//! The options that choose what a scene or model file shows, shared by all commands that read scenes.
+//! Options that configure a scene or model file, shared by all commands that read scenes.
 
 use clap::ValueHint;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
@@ -6,7 +6,7 @@ use wgray::scene::{
     Background, EnvironmentDescription, GltfChoice, Orbit, Overrides, Presentation, Scene, Selection, UpAxis, View,
 };
 
-/// The options as they are written.
+/// The options as parsed.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Scene")]
 pub struct SceneOptions {
@@ -14,11 +14,11 @@ pub struct SceneOptions {
     #[arg(long, value_name = "ENV", value_hint = ValueHint::FilePath)]
     pub environment: Option<EnvironmentDescription>,
 
-    /// Show COLOR where nothing is hit; none is transparent
+    /// Show COLOR where no surface is hit; none is transparent
     #[arg(long, value_name = "COLOR", allow_hyphen_values = true)]
     pub background: Option<Background>,
 
-    /// Reject damaged inputs instead of rendering stand-ins with a warning
+    /// Reject damaged inputs instead of rendering placeholders
     #[arg(long)]
     pub strict: bool,
 
@@ -33,7 +33,7 @@ pub struct SceneOptions {
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Scene")]
 struct PresentationOptions {
-    /// Look at the whole model from this direction: 0,0 is the front, 90,0 the right, 0,90 above
+    /// View the model from azimuth AZ and elevation EL, in degrees: 0,0 is front, 90,0 right, 0,90 top
     #[arg(long, hide_short_help = true, value_name = "AZ,EL", allow_hyphen_values = true, conflicts_with_all = ["view", "camera"])]
     orbit: Option<Orbit>,
 
@@ -41,11 +41,11 @@ struct PresentationOptions {
     #[arg(long, hide_short_help = true, value_name = "DEGREES", allow_negative_numbers = true)]
     fov: Option<f64>,
 
-    /// Turn this axis of the model upwards: x, y, z, -x, -y or -z
+    /// Set the up axis of the model: x, y, z, -x, -y or -z
     #[arg(long, hide_short_help = true, value_name = "AXIS", allow_hyphen_values = true)]
     up: Option<UpAxis>,
 
-    /// Put a grey disk below the model, which catches its shadow
+    /// Add a gray ground disk below the model that catches its shadow
     #[arg(long, hide_short_help = true)]
     ground: bool,
 }
@@ -62,7 +62,7 @@ struct GltfOptions {
     #[arg(long, value_name = "NAME|N", value_parser = selection, conflicts_with = "view")]
     camera: Option<Selection>,
 
-    /// Show glTF animations at this second
+    /// Show glTF animations at this time, in seconds
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time: Option<f64>,
 
@@ -85,7 +85,7 @@ impl SceneOptions {
         self.gltf.time.is_some()
     }
 
-    /// Returns true if the automatic camera shows a model, rather than one of the file.
+    /// Returns true if the automatic camera is used instead of a camera of the model file.
     pub fn is_framed(&self, scene: &Scene) -> bool {
         self.gltf.view.is_some() || self.presentation.orbit.is_some() || !scene.has_model_cameras()
     }
@@ -127,7 +127,7 @@ impl GltfOptions {
     }
 }
 
-/// Parses a number, or else a name; never fails.
+/// Parses a number or a name; never fails.
 fn selection(text: &str) -> Result<Selection, String> {
     Ok(Selection::from(text))
 }

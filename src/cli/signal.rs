@@ -1,4 +1,4 @@
-//! The signals that end the program, after it has removed its temporary files.
+//! Signals, which end the program after it has removed its temporary files.
 
 use std::io;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ impl Stop {
         }
     }
 
-    /// Returns a flag that is true once a signal was received.
+    /// Returns a flag that becomes true when a signal is received.
     #[cfg(feature = "dev")]
     pub fn flag(&self) -> &AtomicBool {
         &self.asked
@@ -76,7 +76,7 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Returns signals that end the program at once.
+    /// Registers handlers that end the program at once.
     pub fn immediate(terminated: Option<u8>) -> io::Result<Signals> {
         let ends = Arc::new(AtomicBool::new(true));
         if let Some(code) = terminated.filter(|_| !is_ignored(SIGTERM)) {

@@ -23,18 +23,18 @@ pub struct Stats {
     pub height: u32,
     /// Samples per pixel; under adaptive sampling the maximum.
     pub pixel_samples: u32,
-    /// The fewest samples of a pixel.
+    /// Minimum samples per pixel.
     pub min_samples: u32,
     /// The former name of `min_samples`, until 0.3.
     #[serde(rename = "least_samples")]
     pub former_min_samples: u32,
     /// Light samples at every hit, over all lights.
     pub light_samples: u64,
-    /// Seconds from the start of the process, or of a further frame, until the device is ready.
+    /// Seconds until the device is ready, from the start of the process, or of the frame for later frames.
     pub setup_s: f64,
     /// Seconds of rendering.
     pub render_s: f64,
-    /// Seconds from the start until the image is written.
+    /// Seconds from the same start until the image is written.
     pub total_s: f64,
     /// Camera rays of the image.
     pub camera_rays: u64,
@@ -43,7 +43,7 @@ pub struct Stats {
     /// The former name of `fraction_rendered`, until 0.3.
     #[serde(rename = "share_rendered")]
     pub former_fraction_rendered: f64,
-    /// Shadow rays; not counted by the kernels.
+    /// Number of shadow rays; `None` because kernels do not count them.
     pub shadow_rays: Option<u64>,
     /// camera_rays * fraction_rendered * (1 + light_samples) / render_s / 1e6
     pub nominal_mrays_per_s: f64,

@@ -7,13 +7,13 @@ fn devices_are_listed() {
     let place = Place::new();
     let ran = place.run(&["devices"]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
-    for word in ["driver", "largest buffer", "cpu", "auto chooses: "] {
+    for word in ["driver", "largest buffer", "cpu", "auto selects: "] {
         assert!(ran.stdout.contains(word), "{word} is missing in {}", ran.stdout);
     }
-    assert!(!ran.stdout.contains("auto chooses: cpu"));
+    assert!(!ran.stdout.contains("auto selects: cpu"));
     let none = place.run_with(&["devices"], &NO_DRIVER);
     assert_eq!(none.code, 0);
-    assert!(none.stdout.contains("auto chooses: cpu") && none.stdout.contains("mesa-vulkan-drivers"));
+    assert!(none.stdout.contains("auto selects: cpu") && none.stdout.contains("mesa-vulkan-drivers"));
 }
 
 #[test]

@@ -204,7 +204,7 @@ fn wrong_command_lines_exit_with_2() {
         (&["a.png", "b.png", "--fail", "rmse"], "must be METRIC=X"),
         (
             &["a.png", "b.png", "--fail", "rmse=-1"],
-            "rmse must be a number of 0 or more",
+            "rmse must be a number of at least 0",
         ),
         (
             &["a.png", "b.png", "--fail", "ssim=NaN"],
@@ -213,7 +213,7 @@ fn wrong_command_lines_exit_with_2() {
         (&["a.png", "b.png", "--metrics", "rmse,mse"], metrics),
         (
             &["a.png", "b.png", "--threshold", "-1"],
-            "must be a number of 0 or more",
+            "must be a number of at least 0",
         ),
         (&["a.png", "b.png", "--ppd", "0"], "must be a number from 1 to 1000"),
         (
@@ -345,7 +345,7 @@ fn channels_that_one_lacks_differ_unless_left_out() {
     );
     // the picture shows the layer
     let ran = place.run(&["diff", "both.exr", "deeper.exr", "--out", "out.png"]);
-    says(&ran, 5, "note: out.png: shows the layer depth\n");
+    says(&ran, 5, "note: out.png: shows layer depth\n");
     assert!(place.path("out.png").exists());
 }
 
@@ -585,7 +585,7 @@ fn an_exr_is_compared_with_a_png_as_it_would_be_written() {
         says(
             &ran,
             0,
-            "note: out.exr: linear; compared after conversion to a PNG of 8 bits with gamma22\n",
+            "note: out.exr: linear; converted to a PNG with 8 bits and gamma22 for the comparison\n",
         );
         says(&ran, 0, "identical\n");
     }

@@ -307,12 +307,12 @@ fn tiles_are_as_long_as_was_asked() {
     let (all, warned, text) = tiles("1h", 30);
     assert_eq!((all, warned.as_str()), (1, ""));
     assert!(
-        text.contains("# A task takes about ") && text.contains("by a trial on cpu"),
+        text.contains("# A task takes about ") && text.contains("by a test render on cpu"),
         "{text}"
     );
     assert!(text.contains("#SBATCH --time=10 "), "{text}");
     let (_, warned, _) = tiles("0", 30);
-    assert!(warned.starts_with("warning: --task-time: each task needs "), "{warned}");
+    assert!(warned.starts_with("warning: --task-time: startup takes "), "{warned}");
 }
 
 #[test]
@@ -320,16 +320,12 @@ fn why_tasks_are_not_as_long_as_was_asked_is_told() {
     let place = Place::new();
     for (size, samples, told) in [
         // By far more than what a task's beginning takes, and by far less.
-        (
-            "64x1",
-            "65536",
-            "a part has at least one row, which takes longer than 0 ms\n",
-        ),
-        ("1x1", "1", " to start; the image is a single task\n"),
+        ("64x1", "65536", "a single row takes longer than 0 ms\n"),
+        ("1x1", "1", "; the image is a single task\n"),
         (
             "16x2000",
             "64",
-            " to start; tasks are made longer, so that this is at most half of them\n",
+            "; tasks are lengthened so that it takes at most half\n",
         ),
     ] {
         let more = [
@@ -457,17 +453,17 @@ fn what_is_not_for_farms_is_refused() {
         (
             &["small.toml", "-o", "x.png", "--tile", "1/2"],
             2,
-            "error: --tile: does not apply to farms, whose tasks set it\n",
+            "error: --tile: cannot be used with wgray farm, which sets it for each task\n",
         ),
         (
             &["small.toml", "-o", "x.png", "--resume"],
             2,
-            "error: --resume: does not apply to farms, whose tasks set it\n",
+            "error: --resume: cannot be used with wgray farm, which sets it for each task\n",
         ),
         (
             &["small.toml", "-o", "x.png", "--quiet"],
             2,
-            "error: --quiet: does not apply to farms",
+            "error: --quiet: cannot be used with wgray farm",
         ),
         (
             &["small.toml", "-o", "x.png", "--tiles", "7"],
@@ -556,7 +552,7 @@ fn files_that_are_there_stay() {
         fs::write(place.path(file), "mine").expect("a file");
         let ran = farm(&place, engine, &options);
         let told = format!(
-            "error: --to: {file}: already exists; pass --overwrite to replace it, or choose another name by --to\n"
+            "error: --to: {file}: already exists; pass --overwrite to replace it, or choose another name with --to\n"
         );
         assert_eq!((ran.code, ran.stderr), (2, told));
         assert_eq!(place.read(file), b"mine");

@@ -182,7 +182,7 @@ fn names_that_do_not_tell_frames_apart_are_refused() {
         ),
         ("-3", "must be whole numbers"),
         ("-3--1", "must be whole numbers"),
-        ("2-1", "2-1 must ascend, from 1 to 2"),
+        ("2-1", "2-1 must be in ascending order, 1-2"),
         ("1-2:0", "1-2:0 needs a step of at least 1"),
         ("1-4000000000", "4000000000: must be whole numbers from 0 to 999999999"),
         ("0-999999999", "must be at most 100000 frames"),

@@ -372,8 +372,9 @@ fn a_conversion_keeps_what_it_reads_and_names_files_from_where_it_is() {
     ]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(
-        ran.stderr.starts_with("note: sub/box.toml: names files outside of ")
-            && ran.stderr.ends_with("/sub; to use it, pass --asset-root .\n"),
+        ran.stderr
+            .starts_with("note: sub/box.toml: refers to files outside of ")
+            && ran.stderr.ends_with("/sub; pass --asset-root . to render it\n"),
         "{}",
         ran.stderr
     );

@@ -286,7 +286,7 @@ fn halves_that_are_too_large_are_counted() {
     // What is nearer to 65504 than to the next step, 65536, is that.
     assert_eq!((infinite("R"), infinite("G")), (0, 0));
     let told = format!(
-        "warning: h.exr: {of_blue} values exceed 65504, the maximum of 16 bits, and are written as infinity; use --exr-type float\n"
+        "warning: h.exr: {of_blue} values exceed 65504, the maximum of 16 bits, and were written as infinity; use --exr-type float\n"
     );
     assert_eq!(ran.stderr, told);
     place.quietly(&[

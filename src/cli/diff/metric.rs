@@ -28,7 +28,7 @@ pub const METRICS: [Metric; 8] = [
 ];
 
 impl Metric {
-    /// Returns the name in options, text and JSON.
+    /// Returns the name used in options, text and JSON.
     pub fn name(self) -> &'static str {
         match self {
             Metric::Different => "different",
@@ -57,10 +57,10 @@ impl Metric {
         matches!(self, Metric::Psnr | Metric::Ssim)
     }
 
-    /// Returns the smallest and the largest value, and the rule in messages.
+    /// Returns the minimum and the maximum, and the rule for error messages.
     fn range(self) -> (f64, f64, &'static str) {
         match self {
-            Metric::Different | Metric::Largest | Metric::Rmse | Metric::RelMse => (0.0, f64::MAX, "of 0 or more"),
+            Metric::Different | Metric::Largest | Metric::Rmse | Metric::RelMse => (0.0, f64::MAX, "of at least 0"),
             Metric::Share | Metric::Flip => (0.0, 1.0, "from 0 to 1"),
             Metric::Psnr => (f64::MIN, f64::MAX, "of decibels"),
             Metric::Ssim => (-1.0, 1.0, "from -1 to 1"),
@@ -74,7 +74,7 @@ impl fmt::Display for Metric {
     }
 }
 
-/// The worst value of a metric that passes.
+/// A limit of a metric: worse values fail.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
     pub metric: Metric,

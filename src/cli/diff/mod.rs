@@ -32,7 +32,7 @@ const MAX_FLIP_PIXELS: u64 = 1 << 24;
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
-#[command(allow_negative_numbers = true)] // so that a number out of range is reported as such
+#[command(allow_negative_numbers = true)] // report negative numbers as out of range
 pub struct Args {
     /// Image to test: PNG, EXR, JPEG or WebP; - reads standard input
     #[arg(value_name = "A")]
@@ -75,13 +75,13 @@ pub struct Args {
     #[arg(long, value_name = "DIFF.png")]
     out: Option<PathBuf>,
 
-    /// Print one JSON object
+    /// Print the report as one JSON object
     #[arg(long)]
     json: bool,
 }
 
 fn threshold(text: &str) -> Result<f64, String> {
-    number(text, 0.0, f64::MAX).map_err(|()| "must be a number of 0 or more".to_owned())
+    number(text, 0.0, f64::MAX).map_err(|()| "must be a number of at least 0".to_owned())
 }
 
 fn ppd(text: &str) -> Result<f64, String> {
@@ -157,7 +157,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     {
         report
             .notes
-            .push(format!("{}: shows the layer {}", output.name(), layer.name));
+            .push(format!("{}: shows layer {}", output.name(), layer.name));
     }
     let text = match args.json {
         true => serde_json::to_string_pretty(&report)? + "\n",
@@ -189,7 +189,8 @@ fn has_colors(picture: &Picture) -> bool {
     picture.colors().is_some()
 }
 
-/// Converts a linear image to display values if the other has those. Without an alpha channel, a display image is opaque.
+/// Converts a linear image to display values if the other image has display values. Display images without alpha are
+/// opaque.
 fn alike(a: Picture, b: Picture, report: &mut Report) -> anyhow::Result<(Picture, Picture)> {
     let mut shown = |linear: Picture, bits: u8, name: String| -> anyhow::Result<Picture> {
         let displayed = linear
@@ -202,7 +203,7 @@ fn alike(a: Picture, b: Picture, report: &mut Report) -> anyhow::Result<(Picture
             false => format!("; not compared: {}", left.join(" ")),
         };
         report.notes.push(format!(
-            "{name}: linear; compared after conversion to a PNG of {bits} bits with gamma22{left}"
+            "{name}: linear; converted to a PNG with {bits} bits and gamma22 for the comparison{left}"
         ));
         Ok(displayed)
     };

@@ -16,7 +16,7 @@ pub struct Report {
     pub b: String,
     size_a: [u32; 2],
     size_b: [u32; 2],
-    /// Positions of the first pixels.
+    /// Positions of the images' top left pixels in the whole image.
     #[serde(skip)]
     positions: [(i32, i32); 2],
     /// True if the exit code is 0.
@@ -25,7 +25,7 @@ pub struct Report {
     fails: Vec<String>,
     /// Conversions and omissions.
     pub notes: Vec<String>,
-    /// Channels that only one of the images has.
+    /// Channels that exist in only one of the images.
     only_a: Vec<String>,
     only_b: Vec<String>,
     pub layers: Vec<LayerReport>,
@@ -148,7 +148,7 @@ impl Serialize for Number {
 }
 
 impl fmt::Display for Number {
-    /// Writes six digits, and all digits of a whole number.
+    /// Formats with six significant digits; integers in full.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let size = self.0.abs();
         if size == 0.0 || !size.is_finite() {
@@ -164,7 +164,7 @@ impl fmt::Display for Number {
             let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
             format!("{}e{exponent}", short(digits))
         };
-        // A value close to a whole number is not rounded to it.
+        // Rounding must not turn a fraction into an integer.
         match size < 1e6 && self.0.fract() != 0.0 && text.parse::<i64>().is_ok() {
             true => write!(f, "{}", self.0),
             false => f.write_str(&text),

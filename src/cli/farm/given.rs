@@ -36,10 +36,10 @@ const COMMON: [&str; 8] = [
     "frames",
 ];
 
-/// Options that the files express in their own way.
+/// Options that the generated files pass per task instead.
 const IN_FILES: [&str; 2] = ["frames", "output"];
 
-/// An option of the command line: its name, and its value if it has one.
+/// A command line option: its name, and its value, if any.
 pub type Given = (String, Option<OsString>);
 
 /// The options of `wgray render`, parsed and as given.
@@ -51,7 +51,7 @@ pub struct Rendering {
     pub render: Vec<Given>,
     /// Options for writing the image.
     pub merge: Vec<Given>,
-    /// First option that does not apply to farms.
+    /// First option that cannot be used with `wgray farm`.
     pub refused: Option<String>,
 }
 
@@ -148,7 +148,7 @@ mod tests {
         Line::try_parse_from([&["farm"], words].concat()).unwrap().rendering
     }
 
-    /// Every option of `wgray render` is passed on, refused, or expressed in the files. A new one is passed on by default.
+    /// Every option of `wgray render` is passed on, refused, or set per task. New options are passed on by default.
     #[test]
     fn every_option_is_known() {
         let all = ids(&render::Args::augment_args(Command::new("render")));

@@ -37,8 +37,8 @@ pub enum Engine {
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = super::EXIT_CODES)]
-#[command(allow_negative_numbers = true)] // so that a number out of range is reported as such
-#[group(id = "farm")] // beside those of wgray render, which are among these
+#[command(allow_negative_numbers = true)] // report negative numbers as out of range
+#[group(id = "farm")] // the default id is that of the flattened options of wgray render
 pub struct Args {
     #[command(flatten)]
     own: Own,
@@ -47,7 +47,7 @@ pub struct Args {
     rendering: Rendering,
 }
 
-/// Options of the farm itself.
+/// Options specific to `wgray farm`.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Farm")]
 struct Own {
@@ -57,17 +57,17 @@ struct Own {
     #[arg(long, value_name = "PATH")]
     to: Option<PathBuf>,
 
-    /// Split each image into N parts [default: by --task-time and a trial of some seconds]
+    /// Split each image into N parts [default: estimated from --task-time by a short test render]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     tiles: Option<u32>,
 
-    /// Set the duration of a task on a machine like this one: 90s, 1.5m, 2h
+    /// Set the target duration of a task on a machine like this one: 90s, 1.5m, 2h
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "10m", conflicts_with = "tiles")]
     task_time: Duration,
 
     /// Set the time limit of a task, 2m or more
     ///
-    /// The default is four times the duration found by the trial, but at least 10m; with --tiles, the engine's default.
+    /// The default is four times the estimated duration, but at least 10m; with --tiles, the engine's default.
     #[arg(long, value_name = "TIME", value_parser = parse_limit)]
     limit: Option<Duration>,
 
@@ -87,12 +87,12 @@ fn parse_limit(text: &str) -> Result<Duration, String> {
 }
 
 const MIN_LIMIT: Duration = Duration::from_secs(120);
-/// Factor and minimum of the time limit of tasks with a known duration.
+/// Default time limit of tasks: this multiple of the estimated duration, but at least the minimum.
 const LIMIT_FACTOR: u32 = 4;
 const MIN_DEFAULT_LIMIT: Duration = Duration::from_secs(600);
 
 impl Engine {
-    /// Threads of the CPU and of software Vulkan, if not all.
+    /// Returns the number of threads of the CPU and software Vulkan; `None` for all.
     pub fn threads(&self) -> Option<u16> {
         self.args().rendering.args.threads
     }
@@ -104,9 +104,9 @@ impl Engine {
     }
 }
 
-/// The contents of the files. All texts are free of control characters.
+/// The contents of the files. No string contains control characters.
 struct Work {
-    /// Folder that names are relative to.
+    /// Base folder of relative paths.
     folder: String,
     /// Folder for parts and checkpoints.
     place: String,
@@ -117,11 +117,11 @@ struct Work {
     program: String,
     tiles: u32,
     frames: Option<Frames>,
-    /// Options of `wgray render` and of `wgray merge`, as words of a shell.
+    /// Options of `wgray render` and `wgray merge`, quoted for the shell.
     render: Vec<String>,
     merge: Vec<String>,
     limit: Option<Duration>,
-    /// Lines about the trial.
+    /// Lines that report the estimate.
     trial: Vec<String>,
 }
 
@@ -137,7 +137,10 @@ pub fn run(engine: &Engine, start: Instant) -> anyhow::Result<ExitCode> {
     let args = engine.args();
     let (own, rendering) = (&args.own, &args.rendering);
     if let Some(option) = &rendering.refused {
-        return Err(Usage(format!("{option}: does not apply to farms, whose tasks set it")).into());
+        return Err(Usage(format!(
+            "{option}: cannot be used with wgray farm, which sets it for each task"
+        ))
+        .into());
     }
     let outputs = &rendering.args.pictures.output;
     if outputs.is_empty() {
@@ -160,7 +163,7 @@ pub fn run(engine: &Engine, start: Instant) -> anyhow::Result<ExitCode> {
         Engine::Slurm(_) => plain("--to", to.as_os_str())?,
     };
     let mut work = work(args, place)?;
-    // Checked before the trial, which takes seconds.
+    // Checked before the test render, which takes seconds.
     let files = match engine {
         Engine::Openjd(_) => openjd::files(&work, &to)?,
         Engine::Slurm(_) => slurm::files(&work, &to),
@@ -204,7 +207,7 @@ pub fn run(engine: &Engine, start: Instant) -> anyhow::Result<ExitCode> {
     Ok(ended(io::stdout().lock().write_all(text.as_bytes()), ExitCode::SUCCESS))
 }
 
-/// Collects the contents that are known before the scene is read. There is a single part.
+/// Collects the contents that are known before the scene is read, with a single part per image.
 fn work(args: &Args, place: String) -> anyhow::Result<Work> {
     let (
         own,
@@ -242,7 +245,7 @@ fn work(args: &Args, place: String) -> anyhow::Result<Work> {
     })
 }
 
-/// Determines the number of parts per image, by a trial if none is given.
+/// Determines the number of parts per image, by a test render unless --tiles is given.
 fn size(work: &mut Work, own: &Own, job: &mut Job, start: Instant) -> anyhow::Result<()> {
     let frame = match work.frames.as_ref().and_then(Frames::middle) {
         None => super::frames::Frame::one(None),
@@ -265,13 +268,13 @@ fn size(work: &mut Work, own: &Own, job: &mut Job, start: Instant) -> anyhow::Re
     }
     let trial = Trial::of(job, frame, start)?;
     let (fixed, all) = (trial.fixed.as_secs_f64(), own.task_time.as_secs_f64());
-    let rendering = (all - fixed).max(fixed); // at most half of a task is spent on its start
+    let rendering = (all - fixed).max(fixed); // startup takes at most half of a task
     work.tiles = (trial.rendering / rendering).ceil().clamp(1.0, f64::from(rows)) as u32;
     let of_a_task = trial.rendering / f64::from(work.tiles);
     let surely = Duration::from_secs_f64(((fixed + of_a_task) * f64::from(LIMIT_FACTOR)).min(1e9));
     work.limit = work.limit.or(Some(surely.max(MIN_DEFAULT_LIMIT)));
     work.trial.push(format!(
-        "A task takes about {}: {} to start, {} to render; the slowest rows take {:.1} times the mean.",
+        "A task takes about {}: {} of startup and {} of rendering. The slowest rows take {:.1} times the mean.",
         seconds(fixed + of_a_task),
         seconds(fixed),
         seconds(of_a_task),
@@ -287,19 +290,19 @@ fn size(work: &mut Work, own: &Own, job: &mut Job, start: Instant) -> anyhow::Re
         .map(|c| if c.is_control() { ' ' } else { c })
         .collect();
     work.trial.push(format!(
-        "Estimated by a trial{of} on {device}; a whole image takes {}.",
+        "Estimated by a test render{of} on {device}; a whole image takes {}.",
         seconds(fixed + trial.rendering)
     ));
     let (of, begins) = (seconds(all), seconds(fixed));
     let warning = if trial.rendering > rendering * f64::from(rows) {
-        Some(format!("a part has at least one row, which takes longer than {of}"))
+        Some(format!("a single row takes longer than {of}"))
     } else if all < 2.0 * fixed && work.tiles == 1 {
         Some(format!(
-            "each task needs {begins} of {of} to start; the image is a single task"
+            "startup takes {begins}, more than half of {of}; the image is a single task"
         ))
     } else if all < 2.0 * fixed {
         Some(format!(
-            "each task needs {begins} of {of} to start; tasks are made longer, so that this is at most half of them"
+            "startup takes {begins}, more than half of {of}; tasks are lengthened so that it takes at most half"
         ))
     } else {
         None
@@ -319,7 +322,7 @@ impl Work {
         self.images() * u64::from(self.tiles)
     }
 
-    /// Describes what the tasks render together.
+    /// Describes the images that the job renders.
     fn what(&self) -> String {
         match self.tiles {
             1 => format!("{} of {}", self.count_of_images(), self.name),
@@ -335,7 +338,7 @@ impl Work {
         }
     }
 
-    /// Returns the first lines of each file.
+    /// Returns the header lines of a file.
     fn head(&self, what: &str) -> Vec<String> {
         let mut lines = vec![
             what.to_owned(),
@@ -361,7 +364,7 @@ fn comments(lines: &[String]) -> String {
     lines.iter().map(|line| format!("# {line}\n")).collect()
 }
 
-/// Breaks a command into several lines.
+/// Formats a command as several lines.
 fn command(indent: &str, words: &[String]) -> String {
     words.join(&format!(" \\\n{indent}    "))
 }
@@ -376,7 +379,7 @@ fn check(files: &[File], inputs: &[PathBuf], overwrite: bool) -> anyhow::Result<
             return Err(Usage(format!("--to: {name}: must be a regular file or a new name")).into());
         }
         if !overwrite && fs::symlink_metadata(path).is_ok() {
-            let rule = "already exists; pass --overwrite to replace it, or choose another name by --to";
+            let rule = "already exists; pass --overwrite to replace it, or choose another name with --to";
             return Err(Usage(format!("--to: {name}: {rule}")).into());
         }
     }

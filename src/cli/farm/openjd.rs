@@ -44,7 +44,7 @@ pub fn next(work: &Work, to: &Path) -> String {
     words.join(" ")
 }
 
-/// Returns a path that cannot be taken for an option.
+/// Returns a path that cannot be mistaken for an option.
 fn dashed(path: &str) -> String {
     match path.starts_with('-') {
         true => format!("./{path}"),
@@ -105,7 +105,7 @@ fn parameters(work: &Work, to: &Path) -> String {
         parameter(
             "Folder",
             "PATH",
-            "The folder that names are relative to, shared by all machines",
+            "The base folder of relative paths, shared by all machines",
             &path("DIRECTORY", "INOUT", folder(work, to)),
         ),
     ];
@@ -121,12 +121,12 @@ fn parameters(work: &Work, to: &Path) -> String {
         all.push(parameter(
             "Frames",
             "STRING",
-            "The frames: A-B:STEP, with commas between",
+            "The frames: comma-separated numbers and ranges A-B:STEP",
             &text(&frames),
         ));
     }
     let tiles = [("minValue", "1".to_owned()), ("default", work.tiles.to_string())];
-    all.push(parameter("Tiles", "INT", "Parts of each image: whole rows", &tiles));
+    all.push(parameter("Tiles", "INT", "The number of parts of each image", &tiles));
     all.push(parameter(
         "Program",
         "STRING",
@@ -143,7 +143,7 @@ fn output_name(number: usize) -> String {
     }
 }
 
-/// Formats the script of a step: the words passed to the shell, and the lines.
+/// Formats the script of a step from the arguments of the shell and the lines.
 fn step(indent: &str, words: &[&str], limit: &str, script: &str) -> String {
     let list: Vec<String> = words.iter().map(|word| scalar(word)).collect();
     let lines: String = script
@@ -231,10 +231,10 @@ fn template(work: &Work, to: &Path) -> Result<String, Usage> {
         "# Renders a part of an image. Finished work is not repeated.
 set -eu
 {names}
-# the remaining words are the scene and the number of the part
+# the remaining arguments are the scene and the number of the part
 cd -- \"$folder\"
 parts={place}/parts/{stem}-of-$tiles
-kept={place}/checkpoints/{stem}-of-$tiles/$2   # a folder: a changed scene has a file of its own
+kept={place}/checkpoints/{stem}-of-$tiles/$2   # a folder: each version of the scene gets its own checkpoint
 mkdir -p -- \"$parts\" \"$kept\"
 {}
 ",
@@ -261,11 +261,11 @@ mkdir -p -- \"$parts\" \"$kept\"
         "# Joins the parts of an image.
 set -eu
 {names}
-# the remaining words are the images to write
+# the remaining arguments are the images to write
 cd -- \"$folder\"
 parts={place}/parts/{stem}-of-$tiles
 {}
-rm -rf -- {place}/checkpoints/{stem}-of-$tiles   # the parts stay; remove {place} when all is done
+rm -rf -- {place}/checkpoints/{stem}-of-$tiles   # parts are kept; delete {place} when the job is done
 ",
         command("", &merge)
     );

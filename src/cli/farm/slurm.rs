@@ -32,7 +32,7 @@ pub fn next(to: &Path) -> String {
     word(&name)
 }
 
-/// Returns the variables of both kinds of tasks.
+/// Returns the shell variables that both scripts set.
 fn names(work: &Work) -> String {
     let ranges = work.frames.as_ref().map(|frames| {
         let lists = frames
@@ -45,7 +45,7 @@ fn names(work: &Work) -> String {
         format!("frames=({})\n", lists.collect::<Vec<_>>().join(" "))
     });
     format!(
-        "folder={}   # names are relative to it\nplace={}   # parts and checkpoints\ntiles={}   # parts of an image\n{}",
+        "folder={}   # base of relative paths\nplace={}   # parts and checkpoints\ntiles={}   # parts per image\n{}",
         word(&work.folder),
         word(&work.place),
         work.tiles,
@@ -53,7 +53,7 @@ fn names(work: &Work) -> String {
     )
 }
 
-/// Returns the line that sets the frame from a task's number, and the start of the names of an image's folders.
+/// Returns the line that sets the frame from the task number, and the prefix of the names of an image's folders.
 fn stem(work: &Work, index: &str) -> (String, &'static str) {
     match work.frames {
         None => (String::new(), "picture"),
@@ -68,7 +68,7 @@ fn tile(work: &Work) -> String {
     )));
     let limit = work.limit.map(|limit| {
         format!(
-            "#SBATCH --time={}   # minutes; a task that reaches it is requeued and resumes\n",
+            "#SBATCH --time={}   # minutes; a task that reaches this limit is requeued and resumes\n",
             limit.as_secs().div_ceil(60)
         )
     });
@@ -96,18 +96,18 @@ fn tile(work: &Work) -> String {
 {head}#SBATCH --job-name=wgray-tile
 #SBATCH --requeue
 #SBATCH --open-mode=append
-{limit}#SBATCH --signal=B:USR1@60   # a minute before, wgray writes a checkpoint and the task is requeued: see the last lines
+{limit}#SBATCH --signal=B:USR1@60   # signal a minute before the limit, handled below
 
 {names}
-task=$(( ${{1:-0}} + SLURM_ARRAY_TASK_ID ))   # counted from 0 over all arrays; the size of an array is limited
+task=$(( ${{1:-0}} + SLURM_ARRAY_TASK_ID ))   # from 0, across all arrays: Slurm limits their size
 tile=$(( task % tiles + 1 ))
 {frame}parts=$place/parts/{stem}-of-$tiles
-kept=$place/checkpoints/{stem}-of-$tiles/$tile   # a folder: a changed scene has a file of its own
+kept=$place/checkpoints/{stem}-of-$tiles/$tile   # a folder: each version of the scene gets its own checkpoint
 
 cd -- "$folder" || exit
 mkdir -p -- "$parts" "$kept" || exit
 
-# After a lost device or a time limit wgray ends with code 75, and the task is tried again. Finished work is not repeated.
+# wgray exits with code 75 after a lost device or a signal, and the task is requeued. Finished work is not repeated.
 again=(--requeue-exit=75)
 if [ "${{SLURM_RESTART_COUNT:-0}}" -ge {MAX_RESTARTS} ]; then
     again=()
@@ -115,13 +115,13 @@ fi
 {command}
 wgray=$!
 trap 'kill -TERM $wgray' USR1
-trap 'cancelled=1' TERM   # by scancel, which signals wgray too
+trap 'cancelled=1' TERM   # sent by scancel, also to wgray
 while kill -0 $wgray 2>/dev/null; do
-    wait $wgray   # or until a signal
+    wait $wgray   # returns early after a signal
 done
 wait $wgray
 code=$?
-# A task that ends with a code (RequeueExit of slurm.conf does too) would count as failed for the job that joins the parts.
+# Requeue before exiting: the merge job would count a task that exits with an error code as failed, even with RequeueExit.
 if [ $code = 75 ] && [ -z "${{cancelled:-}}" ]; then
     scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID" && sleep 60   # Slurm ends this at once
 fi
@@ -154,7 +154,7 @@ fn merge(work: &Work) -> String {
 
 cd -- "$folder" || exit
 {command}
-rm -rf -- "$place/checkpoints/{stem}-of-$tiles"   # the parts stay for another try; remove $place at the end
+rm -rf -- "$place/checkpoints/{stem}-of-$tiles"   # parts are kept for another merge; delete $place when the job is done
 "#,
         names = names(work),
         command = command("", &words),
@@ -163,7 +163,7 @@ rm -rf -- "$place/checkpoints/{stem}-of-$tiles"   # the parts stay for another t
 
 fn submit(work: &Work) -> String {
     let head = comments(&work.head(&format!(
-        "{}. Submits the job; options are passed to sbatch: ./submit --partition=gpu --gres=gpu:1",
+        "{}. Submits the job and passes options to sbatch: ./submit --partition=gpu --gres=gpu:1",
         work.what()
     )));
     format!(
@@ -172,8 +172,8 @@ fn submit(work: &Work) -> String {
 cd -- "$(dirname -- "$0")"
 mkdir -p logs
 
-# Submits a script for a number of tasks, in as few arrays as the cluster allows; prints their numbers with colons before them.
-max=$(( $(scontrol show config | sed -n 's/^MaxArraySize *= *//p') ))   # an array's indices are less than this
+# Submits a script as arrays of tasks, as few as the cluster allows, and prints the job IDs, each after a colon.
+max=$(( $(scontrol show config | sed -n 's/^MaxArraySize *= *//p') ))   # upper bound of array indices, exclusive
 if [ "$max" -lt 1 ]; then
     echo "$0: scontrol does not report MaxArraySize" >&2
     exit 1
@@ -188,7 +188,7 @@ arrays() {{
     done
 }}
 
-# What was submitted before something failed is cancelled.
+# Cancels the submitted arrays after a failure.
 merges=
 give_up() {{
     if [ -n "$tiles$merges" ]; then

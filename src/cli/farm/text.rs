@@ -1,10 +1,10 @@
-//! Quoting of names and values as words of a shell and scalars of YAML.
+//! Quoting of names and values for shell scripts and YAML.
 
 use std::ffi::OsStr;
 
 use crate::cli::Usage;
 
-/// Returns a value as text that can be written to a script. Messages call it `what`.
+/// Returns a value as text that can be written to a script; error messages name it `what`.
 pub fn plain(what: &str, value: &OsStr) -> Result<String, Usage> {
     // Line breaks, and characters that YAML excludes.
     let is_excluded =
@@ -12,12 +12,12 @@ pub fn plain(what: &str, value: &OsStr) -> Result<String, Usage> {
     let text = value.to_str().filter(|text| !text.contains(is_excluded));
     text.map(str::to_owned).ok_or_else(|| {
         Usage(format!(
-            "{what}: {value:?}: must be UTF-8 without line breaks or control characters, as it is written to a script"
+            "{what}: {value:?}: must be UTF-8 without line breaks or control characters to be written to a script"
         ))
     })
 }
 
-/// Quotes a word for a shell. Doubled braces are separated, as Open Job Description would expand them.
+/// Quotes a word for a shell, with doubled braces split because Open Job Description would expand them.
 pub fn word(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./:=,@%+".contains(c);
     if !text.is_empty() && text.chars().all(is_plain) {
@@ -38,7 +38,7 @@ pub fn word(text: &str) -> String {
     quoted + "'"
 }
 
-/// Quotes a scalar of YAML.
+/// Quotes a YAML scalar.
 pub fn scalar(text: &str) -> String {
     serde_json::Value::from(text).to_string() // every JSON string is valid YAML
 }

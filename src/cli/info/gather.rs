@@ -18,7 +18,7 @@ use super::kernel::features;
 
 type Counts = BTreeMap<&'static str, u64>;
 
-/// Everything that is printed. Angles are in degrees, memory in bytes.
+/// The contents of `wgray info --json`. Angles are in degrees, memory in bytes.
 #[derive(Debug, Serialize)]
 pub struct Info {
     pub scene: String,
@@ -38,7 +38,7 @@ pub struct Info {
     pub device: Device,
     /// Warnings that a render prints.
     pub notes: Vec<String>,
-    /// Files that the scene refers to.
+    /// Files that the scene references.
     pub files: Vec<String>,
 }
 
@@ -51,7 +51,7 @@ pub struct Picture {
     pub pixel_samples: u32,
     /// Maximum samples per pixel, which differs from `pixel_samples` under adaptive sampling.
     pub max_samples: u32,
-    /// The same under its name up to version 0.2.
+    /// The former name of `max_samples`, until 0.3.
     #[serde(rename = "most_samples")]
     old_max_samples: u32,
     /// Light samples per hit, over all lights.
@@ -106,14 +106,14 @@ pub struct Shapes {
     pub meshes: u64,
     /// Triangles of the distinct meshes.
     pub mesh_triangles: u64,
-    /// Triangles of all instances of meshes.
+    /// Triangles of all mesh instances.
     pub instanced_triangles: u64,
-    /// The same under its name up to version 0.2.
+    /// The former name of `instanced_triangles`, until 0.3.
     #[serde(rename = "placed_mesh_triangles")]
     old_instanced_triangles: u64,
-    /// All triangles, with those of triangles and tetrahedra.
+    /// Triangles of all mesh instances, triangle shapes and tetrahedra.
     pub triangles: u64,
-    /// Primitives outside of meshes: shapes, four triangles for a tetrahedron, and rectangles of area lights.
+    /// Primitives outside of meshes: shapes (a tetrahedron counts as four triangles) and rectangles of area lights.
     pub primitives: u64,
 }
 
@@ -140,17 +140,17 @@ pub struct Lights {
 
 #[derive(Debug, Serialize)]
 pub struct Memory {
-    /// The packed scene and the largest film.
+    /// Total of the packed scene and the largest film.
     pub total: u64,
     /// The packed scene, which includes BVHs and texels.
     pub scene: u64,
     pub trees: u64,
     pub texels: u64,
-    /// The scene on the device, unless that is the CPU.
+    /// The scene in device memory; `None` for the CPU.
     pub scene_on_device: Option<u64>,
-    /// The largest film.
+    /// Film memory of the largest band.
     pub film: u64,
-    /// Number of bands that the image is rendered in.
+    /// Number of bands into which the image is split.
     pub bands: u64,
 }
 
@@ -179,7 +179,7 @@ pub struct Device {
 }
 
 impl Info {
-    /// Gathers the facts about a scene and the device that would render it.
+    /// Gathers information about a scene and the device that would render it.
     pub fn of(path: &Path, scene: &Scene, packed: &Packed, plan: &DevicePlan) -> Info {
         let whole = Region::whole(scene.width, scene.height);
         let cut = Cut::of(packed.form());
@@ -291,7 +291,7 @@ fn form(geometry: &Geometry) -> &'static str {
     }
 }
 
-/// Returns whether half axes are those of a sphere, along x, y and z.
+/// Returns true if the half axes describe an axis-aligned sphere.
 fn is_sphere(axes: &[DVec3; 3]) -> bool {
     *axes == [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * axes[0].x)
 }

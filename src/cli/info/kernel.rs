@@ -1,11 +1,11 @@
-//! Names of the features that a kernel is compiled with.
+//! Names of the optional features of a kernel.
 
 use wgray::pack::{
     BACKGROUND, LOBE_ANISOTROPY, LOBE_COAT, LOBE_SHEEN, LOBE_SPECULAR, LOBE_TRANSMISSION, Packed, Specialization,
 };
 use wgray::scene::Integrator;
 
-/// Returns all features of kernels, each with whether the scene uses it.
+/// Returns all kernel features, each with a flag that is true if the scene uses it.
 pub fn features(packed: &Packed) -> Vec<(&'static str, bool)> {
     let Specialization {
         in_tree,

@@ -25,11 +25,11 @@ pub struct Args {
     /// Scene or model file: .toml, .json, .gltf, .glb, .obj, .ply or .stl
     scene: PathBuf,
 
-    /// Print one JSON object
+    /// Print the information as one JSON object
     #[arg(long)]
     json: bool,
 
-    /// Print sampling, memory, kernel and driver details too
+    /// Also print sampling, memory, kernel and driver details
     #[arg(short, long)]
     verbose: bool,
 
@@ -41,11 +41,11 @@ pub struct Args {
     #[arg(long, visible_alias = "spp", value_name = "N")]
     pixel_samples: Option<u32>,
 
-    /// Choose the device, as for wgray render
+    /// Render on auto, gpu, cpu or a device of `wgray devices`
     #[arg(long, value_name = "auto|gpu|cpu|NAME", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
     device: String,
 
-    /// Allow the files of the scene to lie anywhere in DIR instead of only in the scene's own folder
+    /// Allow the scene to read textures and meshes below DIR
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     asset_root: Option<PathBuf>,
 

@@ -21,7 +21,7 @@ impl Table {
     }
 }
 
-/// Returns the table: what users need, and with `verbose` what developers need.
+/// Returns the table; `verbose` adds sampling, memory, kernel and driver details.
 pub fn table(info: &Info, verbose: bool) -> String {
     let mut table = Table(format!("{}\n", info.scene));
     image(&mut table, info, verbose);
@@ -148,7 +148,7 @@ fn lights(table: &mut Table, info: &Info, verbose: bool) {
     }
 }
 
-/// Adds what can be selected in a glTF file, with the numbers and names that options accept.
+/// Adds the scenes, cameras, animations and variants of a glTF file, with the numbers and names that options accept.
 fn contents(table: &mut Table, model: &ModelContents) {
     table.row("glTF file", &model.file);
     let ModelContents {
@@ -273,7 +273,7 @@ fn point(point: &[f64; 3]) -> String {
     format!("[{}]", numbers.join(", "))
 }
 
-/// Returns a number rounded to six digits.
+/// Rounds a number to six significant digits.
 fn short(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x)
 }

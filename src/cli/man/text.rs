@@ -1,13 +1,13 @@
-//! Texts of the manual pages beyond the help.
+//! Sections of the manual pages that are not part of the help.
 
 /// The section on scenes.
 pub const SCENES: &str = "\
-A scene is a TOML file, a glTF file (.gltf, .glb), or a JSON file of a course on path tracing. docs/scene-format.md \
-documents every key; wgray schema prints a JSON Schema for editors; wgray check validates files.
+A scene is a TOML file, a glTF file (.gltf, .glb), or a JSON file with the course format of docs/scene-format.md, \
+which also documents every TOML key; wgray schema prints a JSON Schema for editors; wgray check validates files.
 
 The files that a scene refers to must lie in its folder or below, unless --asset-root names another folder.";
 
-/// Environment variables that the program or its libraries read, each with the commands that do.
+/// Environment variables that the program or its libraries read: name, description, and the commands that read it.
 pub const ENVIRONMENT: &[(&str, &str, &[&str])] = &[
     (
         "VK_DRIVER_FILES",
@@ -31,7 +31,7 @@ pub const ENVIRONMENT: &[(&str, &str, &[&str])] = &[
     ),
     (
         "XDG_RUNTIME_DIR",
-        "Read by Mesa, which prints a warning if it is not set; the program then sets it to the folder of temporary files.",
+        "Read by Mesa, which warns if it is unset; wgray then sets it to the temporary folder.",
         DEVICES,
     ),
     (
@@ -63,11 +63,11 @@ const DEVICES: &[&str] = &[
 pub const FILES: &[(&str, &str)] = &[
     (
         "NAME.png, NAME.exr, NAME.jpg, NAME.webp",
-        "Images. A file appears when it is complete; until then a hidden temporary file, .wgray-*, is written beside it.",
+        "Images. Files are written under a hidden temporary name, .wgray-*, in the same folder and renamed when complete.",
     ),
     (
         "NAME.checkpoint",
-        "Progress of an unfinished image, written by --checkpoint under any name; --resume continues from it. It remains after success.",
+        "Saved progress of an image, written by --checkpoint under any name; --resume continues from it. It is kept after success.",
     ),
     (
         "NAME.part",
@@ -84,7 +84,7 @@ pub struct Example {
 }
 
 impl Example {
-    /// Returns whether the example belongs on the page of a command, such as `wgray-render`. The program's page has a selection.
+    /// Returns whether the example belongs on the page of a command, such as `wgray-render`. The page `wgray` has a selection.
     pub fn of(&self, command: &str) -> bool {
         match command {
             "wgray" => PROGRAM.contains(&self.line),
@@ -110,7 +110,7 @@ pub const EXAMPLES: &[Example] = &[
         line: "wgray render model.glb -o image.png",
     },
     Example {
-        what: "Render linear values with layers, at another size and with more samples:",
+        what: "Render a linear EXR with normal and depth layers, with size and samples overridden:",
         line: "wgray render scene.toml --size 1920x1200 --spp 64 -o image.exr --aov normal,depth",
     },
     Example {
@@ -138,7 +138,7 @@ pub const EXAMPLES: &[Example] = &[
         line: "wgray info scene.toml",
     },
     Example {
-        what: "Print the same as JSON:",
+        what: "Print the same information as JSON:",
         line: "wgray info scene.toml --json",
     },
     Example {
@@ -154,7 +154,7 @@ pub const EXAMPLES: &[Example] = &[
         line: "wgray farm slurm scene.toml -o image.exr --task-time 5m",
     },
     Example {
-        what: "Write a scene to edit that renders the same bits as a model:",
+        what: "Convert a model to an editable scene that renders the same bits:",
         line: "wgray convert model.glb -o scene.toml",
     },
     Example {

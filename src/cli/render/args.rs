@@ -19,10 +19,10 @@ use crate::cli::picture_options::PictureOptions;
 use crate::cli::progress::Mode;
 use crate::cli::scene_options::SceneOptions;
 
-/// The arguments as they are written. Options that `-h` leaves to `--help` have `hide_short_help`.
+/// The arguments as parsed. Options that `-h` leaves to `--help` have `hide_short_help`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = crate::cli::EXIT_CODES)]
-#[command(allow_negative_numbers = true)] // so that a number out of range is reported as such
+#[command(allow_negative_numbers = true)] // report negative numbers as out of range
 pub struct Args {
     /// Scene (.toml, .json) or model to render
     pub scene: PathBuf,
@@ -35,11 +35,11 @@ pub struct Args {
     #[arg(long = "spp", visible_aliases = ["samples", "pixel-samples"], display_order = 2, value_name = "N", value_parser = parse_count)]
     pub pixel_samples: Option<u32>,
 
-    /// Render on auto, gpu, cpu or a name of `wgray devices`
+    /// Render on auto, gpu, cpu or a device of `wgray devices`
     #[arg(long, display_order = 4, value_name = "DEVICE", default_value = "auto", value_parser = NonEmptyStringValueParser::new())]
     pub device: String,
 
-    /// Use phong (direct light only) or path (global illumination)
+    /// Use integrator phong (direct light) or path (global illumination)
     #[arg(long, display_order = 5, value_name = "NAME", value_parser = integrator_parser(), hide_possible_values = true)]
     pub integrator: Option<Integrator>,
 
@@ -78,7 +78,7 @@ pub struct Args {
     #[arg(long, help_heading = "Sampling", value_name = "N", value_parser = parse_count, hide_short_help = true)]
     pub light_samples: Option<u32>,
 
-    /// Set the sampling pattern of pixels
+    /// Set the sampling pattern within a pixel
     #[arg(long, help_heading = "Sampling", value_name = "PATTERN", value_parser = pattern_parser(), hide_short_help = true)]
     pub pixel_pattern: Option<Pattern>,
 
@@ -86,7 +86,7 @@ pub struct Args {
     #[arg(long, help_heading = "Sampling", value_name = "N", value_parser = parse_count)]
     pub seed: Option<u32>,
 
-    /// Render frames such as 5, 1-10 or 1-10:2; # in names is the number
+    /// Render frames such as 5, 1-10 or 1-10:2, numbered by # in names
     #[arg(long, help_heading = "Animation", value_name = "FRAMES", allow_hyphen_values = true)]
     pub frames: Option<Frames>,
 
@@ -105,7 +105,7 @@ pub struct Args {
     #[command(flatten)]
     pub pictures: PictureOptions,
 
-    /// Also write layers, such as depth,normal: into an EXR or beside a PNG
+    /// Also write layers, such as depth,normal, into an EXR or beside a PNG
     #[arg(long, help_heading = "Output images", value_name = "LAYERS", value_delimiter = ',', value_parser = aov_parser(), hide_possible_values = true)]
     pub aov: Vec<Aov>,
 
@@ -113,7 +113,7 @@ pub struct Args {
     #[arg(long, help_heading = "Output images", value_name = "x0,y0,x1,y1", value_parser = parse_crop, allow_hyphen_values = true)]
     pub crop: Option<Region>,
 
-    /// Save finished work in FILE or in DIR, for --resume
+    /// Save progress in FILE, or in a file in DIR, for --resume
     #[arg(long, help_heading = LONG_RENDERS, value_name = "FILE|DIR")]
     pub checkpoint: Option<PathBuf>,
 
@@ -129,7 +129,7 @@ pub struct Args {
     #[arg(long, help_heading = LONG_RENDERS, value_name = "i/n", value_parser = parse_tile)]
     pub tile: Option<Tile>,
 
-    /// Exit with CODE after a lost device or SIGTERM, when another attempt may succeed
+    /// Exit with CODE after a lost device or SIGTERM, so that a farm retries
     #[arg(long, help_heading = LONG_RENDERS, value_name = "CODE", value_parser = clap::value_parser!(u8).range(9..=125), hide_short_help = true)]
     pub requeue_exit: Option<u8>,
 
@@ -137,7 +137,7 @@ pub struct Args {
     #[arg(long, help_heading = LONG_RENDERS, value_name = "FILE|-", hide_short_help = true)]
     pub stats: Option<PathBuf>,
 
-    /// Show progress as a bar on a terminal, else as lines (auto); or as chosen
+    /// Show progress: auto is a bar on a terminal and lines elsewhere
     #[arg(long, help_heading = LONG_RENDERS, value_enum, value_name = "MODE", default_value_t = Mode::Auto, hide_short_help = true)]
     pub progress: Mode,
 
@@ -145,16 +145,16 @@ pub struct Args {
     #[arg(long, help_heading = LONG_RENDERS, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), hide_short_help = true)]
     pub threads: Option<u16>,
 
-    /// Round in software, for identical bits on more GPUs; slower, Vulkan only
+    /// Round in software for identical bits on more GPUs (slower, Vulkan only)
     #[arg(long, help_heading = LONG_RENDERS, hide_short_help = true)]
     pub exact_rounding: bool,
 }
 
-/// Heading of the options for renders that are long, divided or measured.
+/// Heading of the options for long, tiled or measured renders.
 const LONG_RENDERS: &str = "Long renders and farms";
 
 impl Args {
-    /// Returns the requested layers without repetitions.
+    /// Returns the requested layers without duplicates.
     pub fn aovs(&self) -> Vec<Aov> {
         let mut aovs = Vec::new();
         for aov in &self.aov {
@@ -175,12 +175,12 @@ impl Args {
         }
     }
 
-    /// Returns the progress mode, given --quiet.
+    /// Returns the progress mode; --quiet disables progress.
     pub fn shown_progress(&self) -> Mode {
         if self.quiet { Mode::None } else { self.progress }
     }
 
-    /// Returns the frames to render: a single one without a number unless frames are requested.
+    /// Returns the frames to render: one without a number unless frames are requested.
     pub fn frames(&self) -> Vec<Frame> {
         let around = self.turntable.map(Frames::first);
         Frame::all(self.frames.as_ref().or(around.as_ref()))
@@ -189,7 +189,7 @@ impl Args {
     /// Returns the frames per second if the frames play the animations of a glTF file.
     pub fn fps(&self, scene: &Scene) -> Result<Option<f64>, Usage> {
         let refused = |rule: &str| Err(Usage(format!("--fps: {rule}")));
-        // A scene that includes the model chooses the time itself.
+        // A scene file that includes a model sets the animation time itself.
         let is_animated = scene.has_animations() && is_gltf(&self.scene);
         match self.fps {
             Some(_) if self.frames.is_none() && self.turntable.is_none() => refused("needs --frames or --turntable"),
@@ -225,7 +225,7 @@ impl Args {
         }
     }
 
-    /// Returns the name of an image without --output: that of the scene.
+    /// Returns the default name of the image, derived from the name of the scene.
     fn default_name(&self, frame: Frame) -> anyhow::Result<PathBuf> {
         let name = PathBuf::from(self.scene.file_stem().unwrap_or("scene".as_ref()));
         Ok(match frame.number {
@@ -292,7 +292,7 @@ pub fn parse_count(text: &str) -> Result<u32, String> {
         .map_err(|_| "must be a whole number, such as 64".to_owned())
 }
 
-/// Parses the error that adaptive sampling aims at.
+/// Parses the error threshold of adaptive sampling.
 fn parse_error(text: &str) -> Result<f64, String> {
     let error = text.parse().ok().filter(|error| (0.0..=1.0).contains(error));
     error.ok_or("must be a number from 0 to 1, such as 0.01".to_owned())

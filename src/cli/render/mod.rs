@@ -102,12 +102,12 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// Returns the pixels to render of an image.
+    /// Returns the region of the image to render.
     pub fn region(&self) -> Result<Region, Problem> {
         self.args.rendering().region(&self.scene)
     }
 
-    /// Moves the scene to a frame.
+    /// Sets the scene to a frame.
     pub fn go_to(&mut self, frame: Frame) -> anyhow::Result<()> {
         if let Some((number, fps)) = frame.number.zip(self.fps) {
             let mut overrides = self.args.overrides();
@@ -161,7 +161,7 @@ fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame
             if let Some(other) = files.insert(path.to_owned(), frame.number) {
                 let [this, other] = [frame.number, other].map(Option::unwrap_or_default);
                 let rule = format!(
-                    "{option}: {name}: frames {other} and {this} would be written to this file; put # into the name"
+                    "{option}: {name}: frames {other} and {this} would be written to this file; add # to the name"
                 );
                 return Err(Usage(rule).into());
             }
@@ -173,7 +173,7 @@ fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame
     Ok(())
 }
 
-/// Renders one image, or a part of one. Signals are deferred from the first image on, and end the command.
+/// Renders one image, or a part of one. Signals are deferred from the first image on, and end the command after cleanup.
 fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant) -> anyhow::Result<()> {
     let before = signals.deferred().cloned();
     let mut checkpoint = plan.open_checkpoint(before.as_ref())?;
@@ -225,7 +225,7 @@ fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant)
     Ok(())
 }
 
-/// Returns a line about a written image: `box.png: 1024 x 1024, 64 spp, 12.3 s`.
+/// Returns the summary of a written image: `box.png: 1024 x 1024, 64 spp, 12.3 s`.
 fn summary(images: &[String], stats: &Stats, requested: u32) -> String {
     let samples = match stats.min_samples {
         min if min < requested => format!("{min}-{requested}"), // adaptive sampling

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use crate::cli::log::{Facts, Level, say, tell};
 
-/// The messages of a command and the lines that it printed.
+/// A log of messages that remembers the lines it printed.
 pub struct OnceLog {
     quiet: bool,
     lines: RefCell<BTreeSet<String>>,
@@ -32,7 +32,7 @@ impl OnceLog {
         self.log_with(level, line, Facts::new());
     }
 
-    /// Prints a line with facts for programs.
+    /// Prints a line with additional JSON fields.
     pub fn log_with(&self, level: Level, line: &str, facts: Facts) {
         if !self.quiet {
             tell(level, line, facts);

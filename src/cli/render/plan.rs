@@ -28,12 +28,12 @@ use crate::cli::{Interrupted, Usage, option, plain};
 /// The settings of a render, except its destinations.
 pub struct Plan<'a> {
     pub scene: Packed,
-    /// The pixels of the image.
+    /// The region of the image.
     pub picture: Region,
     /// The part to render, and its rows.
     pub tile: Option<(Tile, Region)>,
     pub options: Options,
-    /// Time to stop rendering at.
+    /// Time at which rendering stops.
     pub deadline: Option<Instant>,
     pub checkpoint: Option<PathBuf>,
     checkpoint_interval: Duration,
@@ -80,7 +80,7 @@ impl<'a> Plan<'a> {
         })
     }
 
-    /// Returns the pixels to render.
+    /// Returns the region to render.
     pub fn region(&self) -> Region {
         self.tile.map_or(self.picture, |(_, rows)| rows)
     }
@@ -98,7 +98,7 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Returns true if a file is the part that this render would write, by its header.
+    /// Returns true if the header of a file identifies it as the part that this render would write.
     pub fn is_done(&self, path: &Path) -> bool {
         let (Some((tile, _)), Ok((identity, found))) = (self.tile, job::read_part_header(path)) else {
             return false;
@@ -112,13 +112,13 @@ impl<'a> Plan<'a> {
         Identity::of(&self.scene, self.picture, self.options.exact_rounding)
     }
 
-    /// Opens the checkpoint, if any, and waits while another process writes it. The checkpoint of a part is that of an image
-    /// with its rows.
+    /// Opens the checkpoint, if any, and waits while another process writes it. The checkpoint of a part equals that of
+    /// an image cropped to its rows.
     pub fn open_checkpoint<'b>(&'b self, stop: Option<&'b Stop>) -> anyhow::Result<Option<Checkpoint<'b>>> {
         let Some(path) = &self.checkpoint else {
             return Ok(None);
         };
-        // Signals that are not deferred yet end the program at once.
+        // Without deferred signals a signal ends the program at once.
         let signal = move || stop.and_then(Stop::signal);
         let opening = Opening {
             path: path.clone(),

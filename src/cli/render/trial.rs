@@ -1,4 +1,4 @@
-//! Estimates the time of a job on this machine, by rendering strips of one image for a moment.
+//! Estimates the time of a job on this machine by rendering strips of one image for a few seconds.
 
 use std::time::{Duration, Instant};
 
@@ -15,16 +15,16 @@ use crate::cli::signal;
 
 /// Number of strips, spread evenly over the image.
 const STRIPS: u32 = 16;
-/// Maximum time for each strip.
+/// Time limit per strip.
 const PATIENCE: Duration = Duration::from_millis(250);
 /// Maximum number of pixels of a strip: enough to fill a device.
 const PIXELS: u64 = 1 << 16;
 
-/// The result of a trial.
+/// The result of a test render.
 pub struct Trial {
     /// The name of the device.
     pub device: String,
-    /// Time from the start of the program until the device is ready, needed by every task.
+    /// Startup time of each task: from the start of the program until the device is ready.
     pub fixed: Duration,
     /// Seconds to render all pixels.
     pub rendering: f64,
@@ -33,7 +33,7 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// Renders strips of one frame, in a program that was started at `start`.
+    /// Renders strips of one frame. `start` is the start time of the program.
     pub fn of(job: &mut Job, frame: Frame, start: Instant) -> anyhow::Result<Trial> {
         job.go_to(frame)?;
         let plan = Plan::resolve(job.args, &job.scene, &job.log, frame, start)?;
@@ -59,7 +59,7 @@ impl Trial {
     }
 }
 
-/// Returns strips of whole rows, as parts have.
+/// Returns the strips, which consist of whole rows like parts.
 fn strips(region: Region) -> impl Iterator<Item = Region> {
     let height = region.height();
     let count = height.min(STRIPS);

@@ -19,16 +19,16 @@ use crate::cli::signal::Stop;
 /// Times and counts of a render.
 #[derive(Default)]
 pub struct RenderTotals {
-    /// Time without writing.
+    /// Time spent on rendering, excluding the writing of files.
     pub time: Duration,
-    /// Camera rays of the image, and the fraction of them that was not read from a checkpoint.
+    /// Camera rays of the image, and the fraction of them that was rendered instead of read from a checkpoint.
     pub camera_rays: u64,
     pub fraction_rendered: f64,
-    /// Number of pixels that are not finite.
+    /// Number of pixels with non-finite values.
     invalid_pixels: usize,
-    /// The fewest samples of a pixel.
+    /// Minimum samples per pixel.
     pub min_samples: u32,
-    /// The samples that every pixel was to have: fewer than all if the time limit was reached.
+    /// Requested samples per pixel; fewer than the scene's if the time limit was reached.
     pub requested_samples: u32,
 }
 

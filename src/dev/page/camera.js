@@ -3,7 +3,7 @@
 import { ask, element, lastState, onState } from "/link.js";
 import { enable, make } from "/parts.js";
 
-const MAX_BOOKMARKS = 32; // per scene
+const MAX_BOOKMARKS = 32; // maximum number of bookmarks per scene
 
 export function setUpCamera(picture, onKey, showNotice) {
   const tools = { o: "orbit", p: "pan", d: "dolly", v: "fly", h: "hand" };
@@ -53,7 +53,7 @@ async function copyCamera(showNotice) {
     await navigator.clipboard.writeText(lastState().camera);
     showNotice("Camera copied");
   } catch {
-    // The clipboard needs a secure connection. Without one, the text is selected for the user to copy.
+    // The clipboard needs a secure connection. Without one, the text is selected so that the user can copy it.
     getSelection().selectAllChildren(element("camera-text"));
     showNotice("Press Ctrl+C to copy the selected camera");
   }

@@ -4,7 +4,7 @@ const AROUND = ".row, fieldset, ul, #object-groups, #sliders, #panels, details, 
 
 let wanted = null; // the element that the user focused
 let around = []; // its containers, innermost first
-let home = null; // the container that has the focus in its place
+let home = null; // the container that holds the focus while the control is unavailable
 
 const isAvailable = (node) => node.isConnected && !node.matches(":disabled") && node.checkVisibility();
 
@@ -14,7 +14,7 @@ export function setUpFocus() {
     [wanted, around, home] = [target, [], null];
     for (let node = target.parentElement; node; node = node.parentElement) if (node.matches(AROUND)) around.push(node);
   });
-  // A user who leaves an available control wants the focus nowhere.
+  // A user who moves the focus away from an available control does not want it back.
   document.addEventListener("focusout", ({ target }) => setTimeout(() => {
     if (document.activeElement === document.body && isAvailable(target)) [wanted, home] = [null, null];
   }));

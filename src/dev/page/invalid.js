@@ -1,4 +1,4 @@
-// Invalid pixels: NaN, infinite or negative values. Their numbers in the panel, and a badge on the image that leads there.
+// Invalid pixels: counts of NaN, infinite and negative values in the panel, and a badge on the image that scrolls to them.
 
 import { ask, element, onFrame, onState } from "/link.js";
 
@@ -13,7 +13,7 @@ export function setUpInvalid() {
   onFrame(show);
 }
 
-// Scrolls to the numbers and gives them the focus.
+// Scrolls to the counts and focuses them.
 function reveal() {
   element("display").open = true;
   const faults = element("faults");

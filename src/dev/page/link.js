@@ -1,7 +1,7 @@
 // The WebSocket to the program: distributes its messages to listeners and matches answers to requests.
 
-const RETRY = 500; // milliseconds before a lost connection is opened again
-const ANSWER = 2000; // milliseconds that a running program needs at most to answer a request
+const RETRY = 500; // milliseconds before a reconnection attempt
+const ANSWER = 2000; // timeout in milliseconds of an HTTP request to the program
 const ANSWERS = ["asked", "refused", "pixel", "object", "objects"]; // messages that answer a request
 const listeners = { state: [], frame: [], link: [], refused: [] };
 const named = new Map(); // listeners for all other messages, by message name
@@ -32,13 +32,13 @@ function send(message, isCommand) {
 // Sends a command; resolves to its number.
 export const ask = (command) => send(command, true);
 
-// Sends a question that changes nothing. Listeners for the answer's message receive it too.
+// Sends a read-only request. The answer is also passed to the listeners of its message.
 export const put = (question) => send(question, false);
 
 // Resolves to the values of a pixel: {x, y, values}.
 export const askPixel = (pixel) => put({ pixel });
 
-// Returns whether the program has executed all commands of this page: an older state must not undo a newer choice.
+// Returns whether the program has executed all commands of this page. Until then its state must not replace newer input.
 export const isHeard = () => !answers.some(({ isCommand }) => isCommand) && state !== null && state.heard >= asked;
 export const lastState = () => state;
 
@@ -102,7 +102,7 @@ async function showFrame(data) {
     drawn = order;
     emit("frame", header, images);
   } finally {
-    acknowledge(from, header.number); // even if decoding fails: the program must not wait for this frame for ever
+    acknowledge(from, header.number); // even if decoding fails; otherwise the program would wait for this frame forever
   }
 }
 

@@ -1,9 +1,9 @@
-// Camera moves by hand: collected between two frames of the screen, then sent together.
+// Camera moves: accumulated between animation frames and sent together.
 
 import { ask } from "/link.js";
 
-const FLY_SPEED = 0.7; // distances to the look-at point per second
-const FAST = 4; // factor of the speed while Shift is held
+const FLY_SPEED = 0.7; // flight speed: distances to the look-at point per second
+const FAST = 4; // speed multiplier while Shift is held
 
 // Flight directions of the keys: right, up, forward.
 const FLIGHT = {

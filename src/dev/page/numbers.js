@@ -1,9 +1,9 @@
 // Number boxes that accept typing, horizontal drags and key steps.
 
-const SLACK = 3; // pixels before a press becomes a drag
-const PIXELS = 10; // pixels of a drag per step
-const FINE = 0.1; // factor of a step while Shift is held
-const LINE = 20; // pixels per line of a wheel event that counts lines
+const SLACK = 3; // movement in pixels after which a press becomes a drag
+const PIXELS = 10; // drag distance in pixels per step
+const FINE = 0.1; // step multiplier while Shift is held
+const LINE = 20; // pixels per line, for wheel events with deltaMode DOM_DELTA_LINE
 const KEYS = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10 };
 const HINT = "Drag sideways or press ↑/↓. Shift: 0.1×. Page Up/Down: 10×.";
 
@@ -24,7 +24,7 @@ export function fit({ kind, range, gap, squares }, x, from) {
 // Returns the square number that is `steps` squares away from `x`.
 const square = (x, steps) => Math.max((steps > 0 ? Math.floor : Math.ceil)(Math.sqrt(Math.max(x, 0))) + steps, 0) ** 2;
 
-// Returns the step size of a number. The numbers of a list share one magnitude.
+// Returns the step size of a number, which depends on the largest magnitude in its list.
 function stepOf({ kind, unit, range, step }, list) {
   if (step) return step;
   if (kind === "whole") return 1;
@@ -105,10 +105,10 @@ function steppable(box, field, numbers, use) {
     // In a focused box the pointer selects text.
     if (event.button !== 0 || box.disabled || document.activeElement === box) return;
     const size = stepOf(field, [...numbers(), now()]) / PIXELS;
-    box.setPointerCapture(event.pointerId); // a fast pointer leaves the box at once
+    box.setPointerCapture(event.pointerId); // a fast drag leaves the box immediately
     press = { id: event.pointerId, left: event.clientX, top: event.clientY, at: event.clientX, from: now(), moved: 0, size, dragged: false };
   });
-  // A possible drag must not select text. On touch screens this event follows the release.
+  // Prevents a drag from selecting text. On touch screens `mousedown` is fired after the release.
   box.addEventListener("mousedown", (event) => press && event.preventDefault());
   box.addEventListener("pointermove", (event) => {
     if (press?.id !== event.pointerId) return;

@@ -8,15 +8,15 @@ const MOVING = /^(Arrow|Page|Home$|End$)/; // keys that change a control's value
 const TYPED = 250; // milliseconds after the last key before matching names are requested
 
 let asked = null; // the request for the shown object: a pixel, or a name and a material
-let scenes = null; // the scene's number at that request
-let shown = null; // the object's last answer
+let scenes = null; // the scene's number when `asked` was sent
+let shown = null; // the last answer about the object
 let groups = new Map(); // the tables that are shown, by name
-let gesture = Math.floor(Math.random() * 2 ** 40); // changes of one gesture are one undo step
-let held = null; // the path whose control is being moved
-let [pointer, key] = [false, false]; // whether a pointer or a held key moves it
-let stale = false; // whether the tables are rebuilt once the control is released
+let gesture = Math.floor(Math.random() * 2 ** 40); // number of the current gesture, whose changes form one undo step
+let held = null; // the path of the value whose control is held
+let [pointer, key] = [false, false]; // whether a pointer or a key holds it
+let stale = false; // whether the tables must be rebuilt when the control is released
 let sending = null; // the change that awaits the program's answer
-let waiting = new Map(); // changes to send after it: the newest per value and gesture
+let waiting = new Map(); // later changes: the newest per value and gesture
 
 // Selects the object at a pixel of the image.
 export function select(pixel) {
@@ -49,7 +49,7 @@ export function setUpObject() {
     event.preventDefault();
     ask(event.shiftKey ? "redo_write" : "undo_write");
   });
-  // A press may end anywhere: by a click, a scroll, or in another window. A key may be held by then.
+  // A press can end with a click, a scroll or outside of the window, while a key is still held.
   for (const end of ["pointerup", "pointercancel", "blur"]) {
     window.addEventListener(end, () => setTimeout(() => {
       if (pointer && !key) letGo();
@@ -90,7 +90,7 @@ function setUpSearch() {
   });
 }
 
-// Another program's change of the file drops the undo history: the buttons then give that reason.
+// A change of the file by another program clears the undo history; the tooltips of the buttons then give this reason.
 function showUndo({ undo, redo, undo_blocked }) {
   for (const [id, what, word, keys] of [["undo-write", undo, "Undo", "Ctrl+Z"], ["redo-write", redo, "Redo", "Ctrl+Shift+Z"]]) {
     const button = element(id);
@@ -100,8 +100,8 @@ function showUndo({ undo, redo, undo_blocked }) {
   }
 }
 
-// Writes a value, or element `i` of a list, so that other viewers' changes of the other elements stay. The next change is sent
-// when the last one was executed, so that a slider never runs ahead of the file.
+// Writes a value, or element `i` of a list, to keep other viewers' changes of the other elements. The next change is sent after
+// the previous one was executed, so that a slider never runs ahead of the file.
 function write(field, value, i, note) {
   const isPart = i !== undefined && valueOf(field) !== undefined;
   const set = { path: isPart ? `${field.path}[${i}]` : field.path, value: isPart ? value[i] : value, gesture };
@@ -149,7 +149,7 @@ function showObject(object) {
   element("object-name").textContent = object.name;
   shown = object;
   showNote();
-  stale = held !== null; // while a control is held none is added or removed
+  stale = held !== null; // controls are not added or removed while one is held
   groups = keep(groups, object.groups, ({ name }) => name, groupOf);
   for (const group of object.groups) groups.get(group.name).show(group, object.file);
   if (!stale) place([element("object-groups"), [...groups.values()].map(({ item }) => item)]);

@@ -1,6 +1,6 @@
 // Marks drawn over the image: frames around pixels, rings around invalid pixels, and the divider of a wipe.
 
-const MAX_RINGS = 8; // more invalid pixels than this are visible without rings
+const MAX_RINGS = 8; // maximum number of invalid pixels that get rings; more are visible without
 const HANDLE = 11; // radius of the divider's handle, in CSS pixels
 
 // Draws a path in black and, thinner, in white, so that it is visible on any image.
@@ -23,7 +23,7 @@ export function frame(context, pixel, scale, distance) {
   }
 }
 
-// Draws rings around the invalid pixels of a part, so that a single one is not overlooked.
+// Draws rings around invalid pixels, so that single ones are not overlooked.
 export function rings(context, part, { width, height, sent, faults }, scale) {
   const found = faults.find(([name]) => name === part)?.[1];
   if (!found || found.nan + found.infinite + found.negative > MAX_RINGS) return;

@@ -19,7 +19,7 @@ import { setUpView, viewName } from "/view.js";
 let isLinked = null; // null until the first connection attempt has finished
 let isFull = false; // whether the viewer limit is reached
 let noticesSeen = null;
-let numberShown = 0; // the number of the frame on the screen
+let numberShown = 0; // the number of the displayed frame
 // Actions of keys: available everywhere, and only while the image has the focus.
 const [everywhere, atPicture] = [new Map(), new Map()];
 
@@ -60,13 +60,13 @@ onFrame((header, images) => {
   element("smaller").parentElement.hidden = width === header.width && height === header.height;
   element("smaller").textContent = `${width} × ${height}`;
   numberShown = header.number;
-  // For scripts that drive the page.
+  // Attributes for scripts that drive the page.
   const { revision, samples, done } = header;
   Object.assign(element("panels").dataset, { revision, samples, done, view: viewName(header.view), sent: header.sent.join("x") });
 });
 
-// For scripts that drive the page: returns whether all commands of this page, and at least `commands` commands of all viewers, are
-// executed and shown, and no further frame will follow.
+// For scripts that drive the page: returns whether the image is final and shows all commands of this page and at least
+// `commands` commands of all viewers.
 window.isSettled = (commands) => {
   const state = lastState();
   return isHeard() && state.heard >= commands && picture.isSettled() && !state.busy && state.frame > 0 && numberShown >= state.frame;
@@ -123,7 +123,7 @@ function setOff(control, off) {
 }
 
 let noticeTimer = 0;
-// Shows a notice for some seconds. An empty text hides an error notice.
+// Shows a notice for a few seconds. An empty text hides an error notice.
 function showNotice(text, bad) {
   const notice = element("notice");
   if (!text) {

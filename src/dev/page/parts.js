@@ -1,4 +1,4 @@
-// Parts of the page that are added and removed while the user works in others.
+// Adds and removes parts of the page without disturbing the user's work in other parts.
 
 import { forget } from "/numbers.js";
 
@@ -8,7 +8,7 @@ export const make = (tag, values = {}, ...children) => {
   return made;
 };
 
-// Enables or disables a control for a reason of its own. `setOff` in page.js disables all controls without a connection.
+// Enables or disables a single control. `setOff` in page.js disables all controls while the connection is lost.
 export function enable(control, isEnabled) {
   control.disabled = !isEnabled;
   delete control.dataset.off;

@@ -7,23 +7,23 @@ import { viewName } from "/view.js";
 
 const STEP = 1.25; // zoom factor per notch of the wheel
 const MAX_SCALE = 64;
-const CLICK = 4; // CSS pixels that the pointer may move during a click
-const PAUSE = 400; // milliseconds between two gestures of the wheel
-const GRIP = { mouse: 7, touch: 22 }; // distance in CSS pixels from which the divider is dragged
+const CLICK = 4; // maximum pointer movement of a click, in CSS pixels
+const PAUSE = 400; // minimum pause between two wheel gestures, in milliseconds
+const GRIP = { mouse: 7, touch: 22 }; // maximum distance in CSS pixels at which a press grabs the divider
 
 export class Picture {
   constructor(figures) {
     this.panels = figures.map((figure) => new Panel(figure));
-    this.pointed = () => {}; // called when the pointer reaches another pixel
-    this.clicked = () => {}; // called with a pixel that was clicked without a drag
+    this.pointed = () => {}; // called when the pointer moves to another pixel
+    this.clicked = () => {}; // called with the clicked pixel
     this.zoomed = () => {};
     this.wiping = () => {}; // called with the divider's position while it is dragged
     this.tool = () => "orbit";
     this.header = null;
     this.marks = true; // whether invalid pixels get rings
-    this.pins = []; // pixels that are marked
+    this.pins = []; // pinned pixels, which are marked
     this.gain = 1;
-    this.layout = "side"; // of a comparison
+    this.layout = "side"; // layout of a comparison
     this.wiped = 0.5; // position of a wipe's divider, 0 to 1
     this.swapped = false; // whether a flicker shows the second image
     this.motion = new Motion();
@@ -286,7 +286,7 @@ export class Picture {
   #drag(panel, tool, dx, dy) {
     const view = this.#view(panel);
     const { pending } = this.motion;
-    // The shorter side of the panel is half a turn.
+    // A drag across the shorter side of the panel orbits by half a turn.
     const turn = Math.PI / Math.min(panel.canvas.clientWidth, panel.canvas.clientHeight);
     if (tool === "hand") {
       const [x, y] = this.scale === null ? [this.header.width / 2, this.header.height / 2] : this.middle;

@@ -4,7 +4,7 @@ import { askPixel, element, onFrame, onLink } from "/link.js";
 import { enable } from "/parts.js";
 
 const MAX_PINS = 16;
-const HISTORY = 60; // number of values that a pin keeps
+const HISTORY = 60; // maximum number of values in the history of a pin
 let asking = false;
 let pins = []; // {pixel, history: [{revision, samples, view, values}]}
 
@@ -21,7 +21,7 @@ export function setUpProbes(picture, onKey) {
   showPins(picture);
 }
 
-// Keeps one question in flight; the next one waits for the answer.
+// Reads the pixel under the pointer, with at most one request pending.
 async function read(picture) {
   const pixel = picture.cursor;
   enable(element("pin"), Boolean(pixel));
@@ -92,7 +92,7 @@ function showPins(picture) {
   }));
 }
 
-// Shows a pin's newest values in full, a curve of their first number, and a list of earlier values, newest first.
+// Shows all current values of a pin, the curve of the first value, and its earlier values, newest first.
 function showPin(pin) {
   const make = (tag, text) => Object.assign(document.createElement(tag), { textContent: text });
   const newest = pin.history.at(-1);

@@ -54,7 +54,7 @@ function showProgress(header) {
   }
 }
 
-// A download link without an address cannot be followed.
+// Enables a download link, or disables it by removing its URL.
 function allowSave(kind, isAllowed) {
   const link = element(`save-${kind}`);
   link.setAttribute("aria-disabled", !isAllowed);

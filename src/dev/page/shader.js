@@ -1,4 +1,4 @@
-// Sliders of the constants that shaders mark.
+// Sliders for annotated shader constants.
 
 import { colorOf, hexOf } from "/color.js";
 import { editorLink } from "/editor.js";

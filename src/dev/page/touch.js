@@ -1,6 +1,6 @@
 // Sliders on touch screens: a finger that scrolls the page does not move the slider under it.
 
-const SLACK = 3; // pixels of sideways movement before a touch becomes a drag
+const SLACK = 3; // sideways movement in pixels after which a touch becomes a drag
 
 let press = null; // the touch on a slider: its initial value, and whether input events are held back
 
@@ -20,7 +20,7 @@ export function setUpTouch() {
     if (press.waits && x > SLACK && x > y) release();
   }));
   on("pointerup", ofPress(() => press.waits && release()));
-  // The browser scrolls.
+  // The browser takes over the touch for scrolling.
   on("pointercancel", ofPress(() => {
     const { range, from, waits } = press;
     range.value = from;

@@ -6,10 +6,10 @@ import { enable } from "/parts.js";
 
 const VIEWS = ["color", "normal", "depth", "uv", "primitive", "samples", "compare"];
 const radios = () => [...document.querySelectorAll("input[name=view]")];
-const LIMIT = 100; // stops of exposure that the program accepts
+const LIMIT = 100; // maximum exposure in stops, positive or negative
 const STOPS = { kind: "number", range: [-LIMIT, LIMIT] };
-let stops = 0; // the exposure
-let showStops = null; // shows a number in the exposure's box and slider
+let stops = 0; // current exposure
+let showStops = null; // shows an exposure in its box and slider
 let choice = { exposure: null, transform: null, false_color: false };
 
 // Returns the name of a view of the state: "normal", or "compare" of {"compare": "cpu"}.
