@@ -41,19 +41,17 @@ pub enum Engine {
 #[group(id = "farm")] // the default id is that of the flattened options of wgray render
 pub struct Args {
     #[command(flatten)]
-    own: Own,
+    rendering: Rendering,
 
     #[command(flatten)]
-    rendering: Rendering,
+    own: Own,
 }
 
 /// Options specific to `wgray farm`.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Farm")]
 struct Own {
-    /// Write the files to PATH: a template, NAME.yaml, for openjd; a folder for slurm
-    ///
-    /// The default is the name of the scene with .openjd.yaml or .farm. The folder also receives parts and logs.
+    /// Write the template (openjd) or the folder (slurm) PATH [default: SCENE.openjd.yaml, SCENE.farm]
     #[arg(long, value_name = "PATH")]
     to: Option<PathBuf>,
 
@@ -65,9 +63,7 @@ struct Own {
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "10m", conflicts_with = "tiles")]
     task_time: Duration,
 
-    /// Set the time limit of a task, 2m or more
-    ///
-    /// The default is four times the estimated duration, but at least 10m; with --tiles, the engine's default.
+    /// Set the time limit of a task, 2m or more [default: 4 times the trial's, at least 10m]
     #[arg(long, value_name = "TIME", value_parser = parse_limit)]
     limit: Option<Duration>,
 
