@@ -58,7 +58,7 @@ impl Files {
 pub enum Layered {
     /// Layers were requested: an output must support them.
     Requested,
-    /// Layers are available, for the outputs that support them.
+    /// Layers are available and are written by the outputs that support them.
     Available,
 }
 

@@ -178,7 +178,7 @@ fn template(work: &Work, to: &Path) -> Result<String, Usage> {
         next(work, to)
     );
     let head = comments(&work.head(&what));
-    // A job's name is short and can contain references to parameters.
+    // Job names have a maximum length, and braces could form references to parameters.
     let name = work.name.chars().map(|c| if "{}".contains(c) { ' ' } else { c });
     let name: String = name.take(MAX_NAME_LEN).collect();
     let has_frames = work.frames.is_some();

@@ -24,7 +24,7 @@ pub struct Info {
     pub scene: String,
     pub picture: Picture,
     pub camera: CameraInfo,
-    /// Lowest and highest corner of all shapes except planes.
+    /// Minimum and maximum corner of the bounds of all shapes except planes.
     pub bounds: Option<[[f64; 3]; 2]>,
     pub shapes: Shapes,
     pub materials: Kinds,

@@ -84,7 +84,7 @@ pub struct Example {
 }
 
 impl Example {
-    /// Returns whether the example belongs on the page of a command, such as `wgray-render`. The page `wgray` has a selection.
+    /// Returns whether the example belongs on the page of a command, such as `wgray-render`. The page of `wgray` shows a selection.
     pub fn of(&self, command: &str) -> bool {
         match command {
             "wgray" => PROGRAM.contains(&self.line),

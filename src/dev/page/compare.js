@@ -36,7 +36,7 @@ export function setUpCompare(picture, onKey, showNotice) {
     if (layout === "flicker" && pace) timer = setInterval(() => picture.swap(), 1000 / pace);
   }
 
-  // Sends a file of the viewer's machine to the program, which cannot read it itself.
+  // Uploads a file from the viewer's computer, which the program cannot read itself.
   async function upload(file) {
     try {
       const answer = await fetch(`/reference/${encodeURIComponent(file.name)}`, { method: "POST", body: file });

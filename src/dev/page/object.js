@@ -157,7 +157,7 @@ function showObject(object) {
 
 function showNote() {
   const isMoved = shown?.name === "camera" && !shown.gone && lastState()?.camera_moved;
-  const moved = "The view has moved. These values are the file's until you press Save to scene.";
+  const moved = "The view has moved. The file keeps these values until you press Save to scene.";
   const text = shown?.gone || shown?.note || (isMoved ? moved : "");
   if (element("object-note").textContent !== text) element("object-note").textContent = text;
 }

@@ -28,7 +28,7 @@ export class Picture {
     this.swapped = false; // whether a flicker shows the second image
     this.motion = new Motion();
     this.wheeled = 0; // time of the last wheel event
-    // Screen pixels per image pixel, or null to fit; and the image point in the middle of a panel.
+    // Scale in screen pixels per image pixel, or null to fit; and the image point at the center of a panel.
     this.scale = null;
     this.middle = [0, 0];
     this.cursor = null;
