@@ -63,7 +63,7 @@ struct Own {
     #[arg(long, value_name = "TIME", value_parser = parse_duration, default_value = "10m", conflicts_with = "tiles")]
     task_time: Duration,
 
-    /// Set the time limit of a task, 2m or more [default: 4 times the trial's, at least 10m]
+    /// Set the time limit of a task, 2m or more [default: 4 times the estimated duration, at least 10m]
     #[arg(long, value_name = "TIME", value_parser = parse_limit)]
     limit: Option<Duration>,
 

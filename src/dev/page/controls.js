@@ -101,7 +101,7 @@ function colorsOf(field, change) {
     picker.value = hexOf(now);
     change(now, i);
   });
-  // Light has no upper limit: one slider scales it and keeps its tint.
+  // Emission has no upper limit: one slider scales it and keeps its hue.
   const strength = field.slider && pairOf({ ...field, kind: "number" }, `${field.name}, strength`, field.slider, (most) => {
     now = tint.map((x) => digits(x * most, 6));
     picker.value = hexOf(now);
