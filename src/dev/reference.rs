@@ -162,7 +162,7 @@ mod tests {
         let error = Reference::decode("b.png".to_owned(), blank, ViewSettings::default());
         assert_eq!(
             error.unwrap_err(),
-            "b.png: has 8193 x 4096 pixels; they must be at most 33554432"
+            "b.png: has 8193 x 4096 pixels; the limit is 33554432 pixels"
         );
     }
 

@@ -340,19 +340,19 @@ impl Line<'_> {
             (Kind::Bool, None | Some("")) | (Kind::Color, None) => {}
             (Kind::Bool | Kind::Color, _) => return Err(format!("`{name}` has no range: {RULE}")),
             (_, None) => return Err(format!("`{name}` is neither a color nor a switch: {RULE}")),
-            (_, Some(written)) => {
+            (_, Some(limits)) => {
                 let rule = || {
                     let whole = if kind == Kind::F32 { "" } else { " whole" };
                     format!(
-                        "`{name}`: `slider {written}` must be `slider LOW..HIGH` or `slider LOW..HIGH step STEP`, with{whole} \
+                        "`{name}`: `slider {limits}` must be `slider LOW..HIGH` or `slider LOW..HIGH step STEP`, with{whole} \
                          numbers, LOW below HIGH, and STEP above 0"
                     )
                 };
-                let (range, stepped) = written.split_once("step").unwrap_or((written, ""));
+                let (range, stepped) = limits.split_once("step").unwrap_or((limits, ""));
                 let (low, high) = range.split_once("..").ok_or_else(rule)?;
                 let limit = |text: &str| number(text.trim(), kind).ok_or_else(rule);
                 (min, max) = (limit(low)?, limit(high)?);
-                if written.contains("step") {
+                if limits.contains("step") {
                     step = limit(stepped)?;
                 }
                 if !(min < max) || step <= 0.0 {
