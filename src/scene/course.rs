@@ -232,7 +232,8 @@ fn check(course: &Course) -> Result<(), Problem> {
         objects,
         ..
     } = course;
-    camera(cam_config).validate().at("camera")?;
+    // +z, which the file may name, is not the default `up` here.
+    camera(cam_config).validate_frame().at("camera")?;
     light(&self::rectangle(light_config).into()).at(0).at("lights")?;
     for (i, object) in objects.iter().enumerate() {
         point(object.translate).at("translate").at(i).at("shapes")?;

@@ -209,7 +209,7 @@ fn the_check_goes_on_after_a_bad_scene() {
     let place = Place::new();
     let ran = place.run(&["check", "none.toml", "small.toml"]);
     assert_eq!(ran.code, 3);
-    assert!(ran.stderr.contains("none.toml") && ran.stdout.starts_with("small.toml: good"));
+    assert!(ran.stderr.contains("none.toml") && ran.stdout.starts_with("small.toml: ok"));
 }
 
 #[test]

@@ -523,7 +523,7 @@ fn what_is_not_for_farms_is_refused() {
                 "1",
             ],
             2,
-            "error: --exr-type: is for an EXR",
+            "error: --exr-type: only applies to EXR outputs",
         ),
         (
             &["small.toml", "-o", "small.toml", "--tiles", "1"],

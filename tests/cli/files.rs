@@ -11,7 +11,7 @@ fn a_file_that_cannot_be_written_fails_with_8() {
     for (output, message) in [
         (
             "nowhere/out.png",
-            "nowhere/out.png: cannot be written: the folder nowhere is not there",
+            "nowhere/out.png: cannot be written: the folder nowhere does not exist",
         ),
         ("small.toml/out.exr", "small.toml/out.exr: cannot be written: "),
         ("folder.png", "folder.png: cannot be written: it is a folder"),

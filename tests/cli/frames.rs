@@ -459,7 +459,7 @@ fn bad_defines_are_told() {
         ),
         (
             "materials.grey.color=[1,1,1]",
-            "error: --define materials.grey: does not exist; the scene has \"gray\"\n",
+            "error: --define materials.grey: does not exist; did you mean \"gray\"?\n",
         ),
         (
             "film.iso=100",

@@ -467,7 +467,7 @@ fn a_conversion_overwrites_a_file_only_by_force() {
     refused(&place, &convert, 2, "already exists");
     // Force does not replace an input.
     let same = ["convert", "mine.toml", "-o", "./mine.toml", "--force"];
-    refused(&place, &same, 2, "is a file that the scene is made of");
+    refused(&place, &same, 2, "is an input of the scene");
 }
 
 #[test]

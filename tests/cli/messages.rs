@@ -97,7 +97,7 @@ fn told(from: &str, to: &str) -> String {
     let place = Place::new();
     assert!(SCENE.contains(from), "{from}");
     place.write("bad.toml", &SCENE.replacen(from, to, 1));
-    let ran = place.run(&["check", "bad.toml"]);
+    let ran = place.run(&["check", "--strict", "bad.toml"]);
     assert_eq!((ran.code, ran.stdout.as_str()), (3, ""), "{}", ran.stderr);
     assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
     ran.stderr.trim_end().to_owned()

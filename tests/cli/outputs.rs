@@ -218,7 +218,7 @@ fn the_picture_of_the_development_mode_is_no_input() {
         (
             "nowhere/a.png",
             8,
-            "nowhere/a.png: cannot be written: the folder nowhere is not there",
+            "nowhere/a.png: cannot be written: the folder nowhere does not exist",
         ),
     ] {
         let ran = place.run(&["dev", "tiles.toml", "--no-page", "--out", out]);
@@ -466,7 +466,7 @@ mod unix {
             &place,
             &["small.toml", "--format", "exr", "-o", "q", "--stats", "nowhere/s"],
             8,
-            "nowhere/s: cannot be written: the folder nowhere is not there",
+            "nowhere/s: cannot be written: the folder nowhere does not exist",
         );
         place.quietly(&["render", "small.toml", "-o", "open.png", "--device", "cpu"]);
         let mode = fs::metadata(place.path("open.png")).unwrap().permissions().mode();

@@ -204,7 +204,7 @@ fn the_scene_says_how_it_is_shown_and_options_stand_in() {
     );
     for (keys, told) in [
         ("exposure = 101", "image.exposure: 101 must be from -100 to 100 stops"),
-        ("exposure = nan", "image.exposure: NaN must be stops"),
+        ("exposure = nan", "image.exposure: NaN must be from -100 to 100 stops"),
         ("view_transform = 'filmic'", "image.view_transform: "),
         ("view = 'srgb'", "view"),
     ] {

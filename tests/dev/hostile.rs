@@ -66,7 +66,7 @@ fn what_is_no_value_is_refused_and_the_file_stays() {
         (set("shapes[0].center", &json!([0, 0, 1e300])), "shapes[0].center: "),
         (
             set("shapes[0].material", &json!("red\"\nradius = 7 #")),
-            "one of the names",
+            "must be one of the allowed names",
         ),
         (set("materials.red.type", &json!("glass")), nothing),
         // paths that lead elsewhere, or nowhere

@@ -59,7 +59,7 @@ fn a_missing_texture_leaves_the_factor() {
         assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
         let note = &scene.notes[0];
         assert!(
-            note.starts_with(why) && note.ends_with("; its factor alone stands in for it"),
+            note.starts_with(why) && note.ends_with("; the texture is replaced by its factor"),
             "{note}"
         );
         let Reflection::Principled(principled) = &scene.materials[0].reflection else {

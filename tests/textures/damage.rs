@@ -58,7 +58,7 @@ fn the_factor_alone_stands_in_for_an_image_that_cannot_be_read() {
         assert_eq!(scene.notes.len(), 1, "once for each file: {:?}", scene.notes);
         let note = &scene.notes[0];
         assert!(note.starts_with(&format!("{file:?} {why}")), "{note}");
-        assert!(note.ends_with("; its factor alone stands in for it"), "{note}");
+        assert!(note.ends_with("; the texture is replaced by its factor"), "{note}");
         let material = &scene.materials[0];
         let Reflection::Diffuse {
             color: Color::Texture(texture),

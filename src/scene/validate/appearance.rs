@@ -35,7 +35,7 @@ pub(super) fn textures(
         let texture = texture(description, images).at(name.as_str());
         textures.push(match (texture, description) {
             (Err(problem), TextureDescription::Image(image)) if problem.is_damage => {
-                images.tolerate(problem, "its factor alone stands in for it")?;
+                images.tolerate(problem, "the texture is replaced by its factor")?;
                 damaged.insert(textures.len());
                 constant(DVec3::from_slice(&image.factor))
             }
