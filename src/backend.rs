@@ -177,7 +177,7 @@ impl Rules {
         let known = [
             ("sums", pixels, &sampling),
             ("moments", of(adaptive), &sampling),
-            ("first looks", of(adaptive), &sampling),
+            ("pilot samples", of(adaptive), &sampling),
         ];
         let of_layers = std::iter::repeat(("pixels of a layer", of(layers), &asked));
         for (list, (what, wanted, scene)) in film.lists().zip(known.into_iter().chain(of_layers)) {

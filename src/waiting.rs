@@ -13,7 +13,7 @@ pub(crate) fn check(path: &Path) -> io::Result<()> {
         Kind::Device => refused("it is a device, and must be a file"),
         // The link of a pipe without a name leads nowhere.
         Kind::Pipe if path.canonicalize().is_ok() => {
-            refused("it is a pipe with a name, which nobody may ever write to; it must be a file")
+            refused("it is a named pipe, which may never deliver data; it must be a file")
         }
         _ => Ok(()),
     }

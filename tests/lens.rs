@@ -337,7 +337,10 @@ fn a_path_moves_the_focus_and_the_opening() {
             "focus_distance = 0",
             "camera.path.keys[0].focus_distance: 0 must be finite",
         ),
-        ("height = 1", "camera.path.keys[0].height: does not apply to a camera of this type"),
+        (
+            "height = 1",
+            "camera.path.keys[0].height: does not apply to a camera of this type",
+        ),
     ] {
         let text = text.replace("focus_distance = 2 }", &format!("{key} }}"));
         let error = Scene::parse(&text, "s.toml").expect_err(key).to_string();

@@ -159,7 +159,10 @@ fn what_a_panorama_has_not_is_told() {
     for (added, told) in [
         ("fov = 40", "camera.fov: unknown key"),
         ("aperture = 1", "camera.aperture: unknown key"),
-        ("up = [0, 1, 0]", "camera.look_at: [0, 1, 0] makes the view parallel to up"),
+        (
+            "up = [0, 1, 0]",
+            "camera.look_at: [0, 1, 0] makes the view parallel to up",
+        ),
         (
             "path.keys = [{ frame = 1, fov = 40 }]",
             "camera.path.keys[0].fov: does not apply to a camera of this type",

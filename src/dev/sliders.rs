@@ -428,7 +428,12 @@ mod tests {
         assert_eq!(fs::read_to_string(&file).unwrap(), both);
         fs::write(&file, "// nothing").unwrap();
         assert!(sliders.take_back().unwrap_err().contains("has changed since"));
-        assert!(sliders.write(folder.path()).unwrap_err().contains("is not a slider any more"));
+        assert!(
+            sliders
+                .write(folder.path())
+                .unwrap_err()
+                .contains("is not a slider any more")
+        );
         assert_eq!(fs::read_to_string(&file).unwrap(), "// nothing");
     }
 }

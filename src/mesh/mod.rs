@@ -278,8 +278,7 @@ impl Mesh {
             }
             Err(why) => {
                 let name = shown(name.as_bytes());
-                self.notes
-                    .push(format!("the file of materials {name} is not read: {why}"));
+                self.notes.push(format!("the MTL file {name} is not read: {why}"));
                 library.problem = Some(why);
             }
         }

@@ -39,8 +39,8 @@ pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
             if more > 0 {
                 facets.draft.notes.push(counted(
                     more as usize,
-                    "byte behind the last triangle is not looked at",
-                    "bytes behind the last triangle are not looked at",
+                    "byte after the last triangle is ignored",
+                    "bytes after the last triangle are ignored",
                 ));
             }
         }

@@ -108,7 +108,7 @@ impl Assets {
         let image = self
             .images
             .get(name)
-            .ok_or_else(|| format!("{name:?} is no image in memory"))?;
+            .ok_or_else(|| format!("there is no image {name:?} in memory"))?;
         let Image { width, height, texels } = &**image;
         let (count, default) = match texels {
             Texels::Bytes(encoding, texels) => (texels.len(), *encoding),
@@ -389,7 +389,7 @@ fn refused_image(error: &ImageError) -> String {
         ImageError::Limits(limit) if matches!(limit.kind(), LimitErrorKind::DimensionError) => {
             format!("must have at most {LONGEST_SIDE} texels along a side")
         }
-        ImageError::Limits(_) => "takes more memory when it is read than its header tells".to_string(),
+        ImageError::Limits(_) => "requires more memory than its header declares".to_string(),
         ImageError::Unsupported(_) => format!("must be of a kind that can be read: {error}"),
         _ => format!("is damaged or truncated: {error}"),
     }

@@ -227,8 +227,14 @@ fn wrong_command_lines_exit_with_2() {
         (&["a.png", "b.png", "--out", "./b.png"], "is the input b.png"),
         (&["a.png", "b.png", "--out", "c.jpg"], "--out: c.jpg: must end in .png"),
         (&["a.png", "b.png", "--out", "-"], "standard output receives the report"),
-        (&["depth.exr", "depth.exr", "--fail", "flip=0"], "flip: requires color channels"),
-        (&["depth.exr", "depth.exr", "--metrics", "ssim"], "ssim: requires color channels"),
+        (
+            &["depth.exr", "depth.exr", "--fail", "flip=0"],
+            "flip: requires color channels",
+        ),
+        (
+            &["depth.exr", "depth.exr", "--metrics", "ssim"],
+            "ssim: requires color channels",
+        ),
     ];
     for (arguments, message) in cases {
         let ran = place.run(&[&["diff"], arguments].concat());

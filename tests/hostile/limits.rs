@@ -224,7 +224,11 @@ fn images_that_grow_a_thousandfold_are_told() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("deep.png"), &deep).unwrap();
     let ran = run(folder.path(), &["diff", "deep.png", "deep.png"]);
-    assert!(ran.code == 1 && ran.said.contains("; the limit for a file of "), "{}", ran.said);
+    assert!(
+        ran.code == 1 && ran.said.contains("; the limit for a file of "),
+        "{}",
+        ran.said
+    );
 }
 
 /// What an EXR file stores may be more than what it shows.

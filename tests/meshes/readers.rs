@@ -290,12 +290,9 @@ fn materials_come_from_the_folder_of_the_mesh() {
     );
     assert_eq!(
         outside,
-        "the file of materials \"../outside.mtl\" is not read: it must be in the folder of the mesh"
+        "the MTL file \"../outside.mtl\" is not read: it must be in the folder of the mesh"
     );
-    assert!(
-        none.starts_with("the file of materials \"none.mtl\" is not read: "),
-        "{none}"
-    );
+    assert!(none.starts_with("the MTL file \"none.mtl\" is not read: "), "{none}");
 }
 
 #[test]
@@ -337,7 +334,7 @@ fn ply_may_have_all_types_in_any_order() {
     assert_eq!(uvs, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
     assert_eq!(
         mesh.notes,
-        ["texture coordinates of faces (\"texcoord\") are not looked at, only those of vertices"]
+        ["texture coordinates of faces (\"texcoord\") are ignored; only those of vertices are used"]
     );
 }
 
@@ -413,7 +410,7 @@ fn binary_stl_is_told_by_its_size() {
     assert!(error.starts_with("a.stl:1: "), "{error}");
     longer[0] = b'x';
     let mesh = load("a.stl", &longer, None).unwrap();
-    assert_eq!(mesh.notes, ["1 byte behind the last triangle is not looked at"]);
+    assert_eq!(mesh.notes, ["1 byte after the last triangle is ignored"]);
     assert_eq!(
         load("a.stl", &longer[..300], None).unwrap_err(),
         "a.stl: byte 80: 6 triangles must be a file of 384 bytes; it has 300"

@@ -56,8 +56,7 @@ fn images_of_every_kind_are_read() {
     assert_eq!(
         notes,
         [
-            "environment.file: \"square.exr\" has 3 x 3 texels; an equirectangular one is twice as wide as it is high, and this one is \
-          stretched to that"
+            "environment.file: \"square.exr\" has 3 x 3 texels; equirectangular images are twice as wide as high, so it is stretched"
         ]
     );
 }
