@@ -50,7 +50,7 @@ mod tests {
         let pipe = folder.path().join("pipe");
         let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
         assert!(made.success());
-        assert!(check(&pipe).unwrap_err().to_string().contains("with a name"));
+        assert!(check(&pipe).unwrap_err().to_string().contains("a named pipe"));
         assert!(
             check(Path::new("/dev/zero"))
                 .unwrap_err()

@@ -70,6 +70,24 @@ pub fn end(size: usize) -> ! {
     std::process::exit(7)
 }
 
+/// Size of the signal stack that the standard library maps for each thread, in bytes.
+const SIGNAL_STACK: usize = 8192;
+
+/// Ends the program as an allocation failure does if a new thread has no memory for its signal stack: the standard library
+/// maps it without the allocator, and panics.
+pub fn catch_signal_stacks() {
+    let before = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if panic
+            .location()
+            .is_some_and(|place| place.file().ends_with("stack_overflow.rs"))
+        {
+            end(SIGNAL_STACK);
+        }
+        before(panic);
+    }));
+}
+
 /// A line of text in a fixed-size buffer.
 struct Line {
     bytes: [u8; 256],

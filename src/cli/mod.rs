@@ -124,6 +124,7 @@ pub fn main() -> ExitCode {
     };
     log::choose(cli.log_format);
     log::catch_panics();
+    allocator::catch_signal_stacks();
     let threads = match &cli.command {
         Command::Render(args) => args.threads,
         Command::Farm(engine) => engine.threads(),

@@ -18,7 +18,7 @@ pub(super) fn register(path: &Path) {
     let Some(name) = name(path) else { return };
     let Ok(mut names) = NAMES.lock() else { return };
     if names.len() >= PRUNE_FROM {
-        names.retain(|name| exists(name));
+        names.retain(exists);
     }
     // An allocation that ends the program under the lock would keep `remove_temporary_files` from it.
     if crate::memory::fallible(|| names.try_reserve(1)).is_ok() {

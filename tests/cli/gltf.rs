@@ -478,7 +478,11 @@ fn a_conversion_prints_the_asset_root_to_pass() {
     fs::rename(place.path("box.glb"), place.path("a dir/models/box.glb")).unwrap();
     let ran = place.run(&["convert", "a dir/models/box.glb", "-o", "a dir/scenes/new/box.toml"]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert!(ran.stderr.ends_with("pass --asset-root 'a dir'\n"), "{}", ran.stderr);
+    assert!(
+        ran.stderr.ends_with("pass --asset-root 'a dir' to render it\n"),
+        "{}",
+        ran.stderr
+    );
     let check = ["check", "a dir/scenes/new/box.toml"];
     refused(&place, &check, 3, "pass --asset-root with a folder that contains both");
     let ran = place.run(&[&check[..], &["--asset-root", "a dir"]].concat());

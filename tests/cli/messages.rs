@@ -229,7 +229,7 @@ fn messages_of_long_keys_and_values_are_short() {
         .collect();
     let message = told(
         "[[shapes]]\ntype = \"sphere\"\nmaterial = \"gray\"",
-        &format!("{many}[[shapes]]\ntype = \"sphere\"\nmaterial = \"m\""),
+        &format!("{many}[[shapes]]\ntype = \"sphere\"\nmaterial = \"zebra\""),
     );
     assert!(message.len() < 1500 && message.contains(" and 1977 more"), "{message}");
 }

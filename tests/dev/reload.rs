@@ -361,7 +361,7 @@ fn a_pipe_or_a_device_in_the_scenes_place_is_told_and_left() {
     fs::remove_file(&path).unwrap();
     let made = std::process::Command::new("mkfifo").arg(&path).status().unwrap();
     assert!(made.success());
-    assert!(running.wait_problem().message.contains("is a pipe"));
+    assert!(running.wait_problem().message.contains("is a named pipe"));
     fs::remove_file(&path).unwrap();
     files.write("scene.toml", &SCENE.replace("0.8, 0.1, 0.1", "0.1, 0.8, 0.1"));
     running.wait_rendered(&files);

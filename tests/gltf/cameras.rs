@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 use serde_json::{Value, json};
 use wgray::Scene;
-use wgray::scene::Projection;
+use wgray::scene::{Overrides, Projection};
 
 use super::build::{Builder, Packing};
 use super::read::{assert_near, to_file, triangles};
@@ -28,6 +28,34 @@ fn load(builder: &Builder, name: &str) -> Scene {
     let place = Place::with_file("a", "");
     let file = builder.write(place.folder(), name, Packing::Binary);
     Scene::load(&file).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_turntable_of_a_tilted_camera_is_level() {
+    let mut builder = Builder::new();
+    let mesh = builder.quad(None);
+    builder.root_node(json!({ "mesh": mesh }));
+    let camera = builder.add(
+        "cameras",
+        json!({ "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1 } }),
+    );
+    let tilt = DQuat::from_rotation_x(-0.4).to_array();
+    builder.root_node(json!({ "camera": camera, "rotation": tilt, "translation": [0, 2, 5] }));
+    let place = Place::with_file("a", "");
+    let file = builder.write(place.folder(), "tilted", Packing::Binary);
+    let overrides = Overrides {
+        turntable: Some(5),
+        ..Overrides::default()
+    };
+    let scene = Scene::load_with(&file, &overrides).unwrap();
+    for frame in 1..=5 {
+        let camera = scene.camera_at(f64::from(frame)).unwrap();
+        assert_near([camera.position.z, camera.right.z], [2.0, 0.0]);
+        assert!(
+            camera.forward.z < -0.3 && camera.up.z > 0.9,
+            "frame {frame}: {camera:?}"
+        );
+    }
 }
 
 #[test]

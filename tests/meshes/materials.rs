@@ -133,6 +133,39 @@ fn strict_refuses_missing_maps() {
 }
 
 #[test]
+fn strict_refuses_missing_materials() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.obj"), OBJ).unwrap();
+    let path = folder.path().join("a.obj");
+    let load = |strict: bool| {
+        let overrides = Overrides {
+            strict,
+            ..Overrides::default()
+        };
+        Scene::load_with(&path, &overrides)
+    };
+    let notes = load(false).unwrap().notes;
+    assert!(
+        notes.iter().any(|note| note.ends_with("; a grey material stands in")),
+        "{notes:?}"
+    );
+    let message = load(true).unwrap_err().to_string();
+    assert!(message.contains("no material \"m\""), "{message}");
+}
+
+#[test]
+fn only_maps_that_exist_need_texture_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    for (mtl, expected) in [("Kd 1 0 0\n", 0), ("Kd 1 0 0\nmap_Kd color.png\n", 1)] {
+        write(folder.path(), mtl);
+        let obj = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
+        fs::write(folder.path().join("a.obj"), obj).unwrap();
+        let notes = Scene::load(folder.path().join("a.obj")).unwrap().notes;
+        assert_eq!(notes.len(), expected, "{notes:?}");
+    }
+}
+
+#[test]
 fn bad_values_and_missing_maps_are_noted() {
     for (mtl, note) in [
         ("Pr 2\n", "Pr: 2 must be from 0 to 1; 1 stands in"),

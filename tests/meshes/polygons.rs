@@ -157,8 +157,8 @@ fn odd_polygons_are_noted() {
     let pentagram: Vec<DVec3> = (0..5)
         .map(|i| {
             DVec3::new(
-                (f64::from(i) * 0.8 * 3.14159).cos(),
-                (f64::from(i) * 0.8 * 3.14159).sin(),
+                (f64::from(i) * 0.8 * std::f64::consts::PI).cos(),
+                (f64::from(i) * 0.8 * std::f64::consts::PI).sin(),
                 0.0,
             )
         })

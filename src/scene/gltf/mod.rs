@@ -13,10 +13,13 @@ use glam::DVec3;
 use super::error::{Problem, SceneError};
 use super::load::{Overrides, folder_of};
 use super::model::{self, SIDE};
-use super::{Description, Framing, GltfDescription, Scene, Selection, View, framed};
+use super::{CameraDescription, Description, Framing, GltfDescription, Scene, Selection, View, framed};
 use crate::gltf::{Choice, GltfError, Imported, ImportedCamera, ModelContents, STILL, UPRIGHT, load};
 
 pub(super) use self::expand::Expanded;
+
+/// Sine of the smallest angle to +z at which a view is not vertical.
+const VERTICAL: f64 = 1e-6;
 
 /// What is shown of a glTF file, and from where.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -162,7 +165,10 @@ pub(super) fn describe(
         ..presentation.framing(view, aspect).map_err(SceneError::Override)?
     };
     let camera = match camera {
-        Some(camera) => camera.description.clone(),
+        Some(camera) => match overrides.turntable {
+            Some(_) => with_horizontal_orbit(camera.description.clone()),
+            None => camera.description.clone(),
+        },
         None => framed(points.iter().copied(), framing).into(),
     };
     let mut description = model::scene(overrides, (width, height), camera, shape, &points);
@@ -170,6 +176,20 @@ pub(super) fn describe(
         description = description.with_environment(model::studio(overrides));
     }
     Ok((description, imported))
+}
+
+/// Returns a camera whose orbit is horizontal: `up` is +z, unless the view is vertical. glTF cameras have an `up` across their view.
+fn with_horizontal_orbit(mut camera: CameraDescription) -> CameraDescription {
+    let (position, look_at, up) = match &mut camera {
+        CameraDescription::Perspective(camera) => (camera.position, camera.look_at, &mut camera.up),
+        CameraDescription::Orthographic(camera) => (camera.position, camera.look_at, &mut camera.up),
+        CameraDescription::Panorama(_) => return camera,
+    };
+    let forward = (look_at - position).normalize_or_zero();
+    if forward.cross(DVec3::Z).length() > VERTICAL {
+        *up = DVec3::Z;
+    }
+    camera
 }
 
 /// The camera that is asked for, or the first.

@@ -18,7 +18,7 @@ pub(super) fn note(description: &Description) -> Option<String> {
     }
     let key = needs_path(description)?;
     Some(format!(
-        "render.integrator: using \"path\", which {key} needs; set it in the scene to silence this note"
+        "render.integrator is not set; using \"path\", which {key} requires. Set it in the scene to silence this warning"
     ))
 }
 
@@ -119,7 +119,10 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
         };
         let emissive = load("", &define("materials.red.emission=[1, 1, 1]"));
         assert_eq!(emissive.render.integrator, Integrator::Path);
-        assert!(emissive.notes[0].starts_with("render.integrator: using \"path\", which materials.red.emission needs"));
+        assert!(
+            emissive.notes[0]
+                .starts_with("render.integrator is not set; using \"path\", which materials.red.emission requires")
+        );
         // An integrator that is named is kept, without a note.
         let named = load("environment.color = [1, 1, 1]\n", &define("render.integrator=path"));
         assert!(

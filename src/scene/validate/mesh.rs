@@ -223,12 +223,13 @@ fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, known: &mut Kn
         indices.push(index.unwrap_or_else(|| known.looks.default_material(!mesh.colors.is_empty())));
     }
     if !missing.is_empty() {
-        known.looks.unmatched.insert(without_material(mesh, file, &missing));
+        let damage = Problem::damage(without_material(mesh, file, &missing));
+        known.looks.without_material(damage)?;
     }
     Ok(indices)
 }
 
-/// Returns the note about materials that the file names and no file describes.
+/// Reports materials that the file names and no file describes.
 fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String {
     /// Maximum number of names in the message.
     const MOST_NAMES: usize = 8;
@@ -242,15 +243,15 @@ fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String
     }
     let why = match mesh.libraries.as_slice() {
         [] => "the file names no MTL file".to_owned(),
-        libraries => match libraries.iter().find_map(|l| Some((l, l.problem.as_ref()?))) {
-            Some((library, problem)) => {
+        libraries => match libraries.iter().find(|library| library.problem.is_some()) {
+            Some(library) => {
                 let name = library.file.file_name().unwrap_or_default().display();
-                format!("its MTL file \"{name}\" cannot be read: {problem}")
+                format!("its MTL file \"{name}\" cannot be read")
             }
             None => "its MTL files do not have it".to_owned(),
         },
     };
-    format!("{file}: no material {names}: {why}; a grey material stands in")
+    format!("{file}: no material {names}: {why}")
 }
 
 /// The names by which a file's group may be told: its own, and that of the material which the file gives it.

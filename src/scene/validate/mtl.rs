@@ -14,7 +14,7 @@ use super::super::limits::{BRIGHTEST, SHININESS};
 use super::super::{Color, ImageTextureDescription, Integrator, Material, Reflection, Texture};
 use super::appearance::{Images, image_texture};
 use super::default_material::default_materials;
-use super::{Problem, number, show};
+use super::{Checked, Problem, number, show};
 use crate::mesh::{Mesh, MtlMaterial, file_beside};
 
 /// What a material is like of which its file does not say it: `Kd` by Ramey, Rose and Tyerman, "MTL material format", 1995;
@@ -165,6 +165,13 @@ impl<'a> Looks<'a> {
             described.materials[group] = Some(material);
         }
         Some(material)
+    }
+
+    /// Warns of a group without a material, or returns it as an error ([`Assets::tolerate`](super::super::Assets::tolerate)).
+    pub fn without_material(&mut self, damage: Problem) -> Checked<()> {
+        let note = self.images.assets.tolerate(damage, "a grey material stands in")?;
+        self.unmatched.insert(note);
+        Ok(())
     }
 
     /// What is odd about the materials that are used.

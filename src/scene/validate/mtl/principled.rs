@@ -70,8 +70,9 @@ impl Looks<'_> {
             odd.push((Oddity::Other(other), format!("{other} {verb} ignored")));
         }
         let mut map = |name: &'static str, map: &Option<String>, part: Part| {
+            let map = map.as_ref()?;
             let found = match traits.has_uvs {
-                true => self.map(&beside(file, map.as_ref()?), part),
+                true => self.map(&beside(file, map), part),
                 false => Err("the mesh has no texture coordinates".to_owned()),
             };
             let why = match found {

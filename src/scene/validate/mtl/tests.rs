@@ -234,7 +234,7 @@ fn a_default_stands_in_for_missing_materials() {
     let gray = Color::Plain(DVec3::splat(0.8));
     assert_eq!(phong(named(&scene, "default")).1, gray);
     fs::remove_file(place.path("in/a.mtl")).unwrap();
-    let start = "in/a.obj: no material \"blue\", \"red\": its MTL file \"a.mtl\" cannot be read: ";
+    let start = "in/a.obj: no material \"blue\", \"red\": its MTL file \"a.mtl\" cannot be read; ";
     assert!(notes("").iter().any(|note| note.starts_with(start)), "{:?}", notes(""));
     place.write("in/a.obj", &OBJ.replace("mtllib a.mtl\n", ""));
     let expected = note("\"blue\": the file names no MTL file");

@@ -288,8 +288,9 @@ fn what_only_paths_have_is_refused_under_phong() {
         let scene = parse(&text).unwrap();
         assert_eq!(scene.render.integrator, Integrator::Path);
         let key = key.split(':').next().unwrap_or_default();
-        let note =
-            format!("render.integrator: using \"path\", which {key} needs; set it in the scene to silence this note");
+        let note = format!(
+            "render.integrator is not set; using \"path\", which {key} requires. Set it in the scene to silence this warning"
+        );
         assert_eq!(scene.notes.first(), Some(&note));
         // It is the integrator that counts, wherever it is from.
         let overrides = |integrator| Overrides {
