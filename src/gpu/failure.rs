@@ -126,7 +126,7 @@ pub fn error_of_opening(device: &str, error: &dyn Error) -> RenderError {
     if says(NO_MEMORY_AT_OPENING) {
         RenderError::OutOfMemory {
             device: device.to_string(),
-            message: "the driver has too little to open it; use the CPU".to_string(),
+            message: "the driver has no memory to open it; use the CPU".to_string(),
         }
     } else if says(LOST_AT_OPENING) {
         Fault::Lost("the driver does not open it".to_string()).into_error(device)

@@ -115,5 +115,5 @@ fn a_call_that_has_no_memory_is_no_loss() {
     }
     let refused = [("FAULTS_REFUSE_FIRST", "1"), ("FAULTS_REFUSE_WITH", "-2")];
     let ran = place.run_on(driver, &["--device", "gpu"], &refused);
-    told(&ran, &[": out of memory: the driver has too little to open it; "]);
+    told(&ran, &[": out of memory: the driver has no memory to open it; "]);
 }
