@@ -103,7 +103,11 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
         };
         let scene = load("", &overrides);
         assert_eq!((scene.render.integrator, scene.render.max_depth), (Integrator::Path, 0));
-        assert!(scene.notes[0].starts_with("render.integrator: "), "{:?}", scene.notes);
+        assert!(
+            scene.notes[0].starts_with("render.integrator is not set; "),
+            "{:?}",
+            scene.notes
+        );
     }
 
     #[test]
