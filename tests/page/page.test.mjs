@@ -80,7 +80,7 @@ test("a broken shader shows file and line and keeps the image, a fixed one recov
 test("a broken scene shows its line", async () => {
   const page = await open(browser, studio);
   studio.edit("scene.toml", "radius = 0.5", "radius = -0.5");
-  await page.locator("#problems h2", { hasText: /scene\.toml:\d+$/ }).waitFor();
+  await page.locator("#problems h2", { hasText: /scene\.toml:\d+:\d+$/ }).waitFor();
   assert.match(await text(page, "#problems pre"), /radius = -0\.5/);
   studio.write("scene.toml", SCENE);
   await page.locator("#problems h2").waitFor({ state: "detached" });
