@@ -380,7 +380,7 @@ fn the_program_without_the_feature_gpu_renders_on_the_cpu() {
     assert_eq!(read_exr(&folder.path().join("s.exr")).unwrap(), picture.pixels());
     let (code, _, told) = run(&["render", "s.toml", "-o", "gpu.exr", "--device", "gpu"]);
     assert_eq!(code, Some(4), "{told}");
-    assert!(told.contains("built without its feature \"gpu\""), "{told}");
+    assert!(told.contains("built without the feature \"gpu\""), "{told}");
     assert!(!folder.path().join("gpu.exr").exists());
     let (code, listed, told) = run(&["devices"]);
     assert_eq!((code, told.as_str()), (Some(0), ""));

@@ -86,7 +86,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &Shaders) -> anyhow::Result<String> {
     let scene = super::load(path, overrides)?;
     for note in scene.notes.iter().chain(&scene.visibility_warnings()) {
-        log::say(Level::Warning, &format!("{}: {note}", path.display()));
+        log::say(Level::Warning, &super::located(path, note));
     }
     let frames = check_path(&scene)?;
     let packed = pack(&scene);

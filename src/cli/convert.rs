@@ -12,6 +12,7 @@ use wgray::scene::{Define, Description, Overrides, Scene};
 
 use super::farm::text::word;
 use super::log::{self, Level};
+use super::numbers::samples;
 use super::outputs::keep_inputs;
 use super::render::parse_size;
 use super::scene_options::SceneOptions;
@@ -36,7 +37,7 @@ pub struct Args {
     size: Option<(u32, u32)>,
 
     /// Set the number of samples per pixel
-    #[arg(long, visible_alias = "spp", value_name = "N")]
+    #[arg(long = "spp", visible_aliases = ["samples", "pixel-samples"], value_name = "N", value_parser = samples)]
     pixel_samples: Option<u32>,
 
     /// Allow the scene to read textures and meshes below DIR
@@ -69,7 +70,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let loaded = Scene::load_described(&args.scene, &overrides);
     let (scene, description) = loaded.map_err(|error| plain(error.into()))?;
     for note in &scene.notes {
-        log::say(Level::Warning, &format!("{}: {note}", args.scene.display()));
+        log::say(Level::Warning, &super::located(&args.scene, note));
     }
     let inputs = [std::slice::from_ref(&args.scene), &scene.files].concat();
     keep_inputs("--output", &output, &inputs, "choose another name")?;

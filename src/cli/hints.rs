@@ -7,7 +7,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use wgray::visible::visible;
 
 /// Options of other renderers and their equivalents.
-const OPTIONS: [(&str, &str); 9] = [
+const OPTIONS: [(&str, &str); 21] = [
     ("--width", "--size WIDTHxHEIGHT"),
     ("--height", "--size WIDTHxHEIGHT"),
     ("--resolution", "--size WIDTHxHEIGHT"),
@@ -17,6 +17,21 @@ const OPTIONS: [(&str, &str); 9] = [
     ("--cpu", "--device cpu"),
     ("--gpu", "--device gpu"),
     ("--resolution-x", "--size WIDTHxHEIGHT"),
+    ("-s", "--size WIDTHxHEIGHT' or '--spp N"),
+    ("-w", "--size WIDTHxHEIGHT"),
+    ("-n", "--spp N"),
+    ("-r", "--size WIDTHxHEIGHT"),
+    ("--transparent", "--background none"),
+    ("--film-transparent", "--background none"),
+    ("--hdri", "--environment FILE.hdr"),
+    ("--hdr", "--environment FILE.hdr"),
+    ("--envmap", "--environment FILE.hdr"),
+    ("--out", "--output FILE"),
+    (
+        "--denoise",
+        "--spp N; more samples reduce noise, and there is no denoiser",
+    ),
+    ("--noise", "--adaptive ERROR"),
 ];
 
 /// Extensions of scene and model files, which suggest that the subcommand `render` was omitted.
@@ -65,7 +80,10 @@ fn hint(error: &clap::Error) -> Option<String> {
         ErrorKind::UnknownArgument => {
             let word = word(ContextKind::InvalidArg)?;
             let (_, option) = OPTIONS.into_iter().find(|(name, _)| *name == word)?;
-            Some(format!("use '{option}'"))
+            Some(match option.split_once("; ") {
+                Some((option, reason)) => format!("use '{option}'; {reason}"),
+                None => format!("use '{option}'"),
+            })
         }
         ErrorKind::InvalidSubcommand => {
             let word = word(ContextKind::InvalidSubcommand)?;

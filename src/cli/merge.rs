@@ -11,6 +11,7 @@ use wgray::job::Parts;
 
 use super::frames::{self, Frame};
 use super::log::{self, Level};
+use super::numbers::whole;
 use super::outputs::{Files, Layered, Outputs};
 use super::picture_options::PictureOptions;
 use super::{Interrupted, Usage, signal};
@@ -24,7 +25,7 @@ pub struct Args {
     parts: Vec<PathBuf>,
 
     /// Replace # in output names with the number N: out.####.png becomes out.0007.png
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=i64::from(frames::MAX_NUMBER)))]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(0..=frames::MAX_NUMBER))]
     frame: Option<u32>,
 
     #[command(flatten)]

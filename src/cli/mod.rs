@@ -17,6 +17,7 @@ mod log;
 mod man;
 mod merge;
 mod metadata;
+mod numbers;
 mod outputs;
 mod picture_options;
 mod progress;
@@ -229,6 +230,14 @@ fn start_threads(threads: Option<u16>) -> anyhow::Result<()> {
 /// Reads a scene file and applies the overrides.
 fn load(path: &Path, overrides: &Overrides) -> anyhow::Result<Scene> {
     Scene::load_with(path, overrides).map_err(|error| plain(error.into()))
+}
+
+/// Returns a warning about a scene with its file, and with its line where it has one, as errors are located.
+fn located(path: &Path, note: &str) -> String {
+    match note.strip_prefix("line ") {
+        Some(line) => format!("{}:{line}", path.display()),
+        None => format!("{}: {note}", path.display()),
+    }
 }
 
 /// Converts an error of the library, naming options as the command line does.

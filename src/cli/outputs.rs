@@ -177,12 +177,12 @@ impl Outputs {
             .iter()
             .map(|output| ("--checkpoint", output, "choose another name"));
         let stats = self.stats.iter().map(|stats| ("--stats", stats, "choose another name"));
-        let pictures = (self.pictures.iter().flat_map(|picture| &picture.files))
-            .map(|(option, output)| (option.as_str(), output, "choose another name with --output"));
-        let part = self
-            .part
-            .iter()
-            .map(|part| ("--output", part, "choose another name with --output"));
+        let pictures =
+            (self.pictures.iter().flat_map(|picture| &picture.files)).map(|(option, output)| match option.as_str() {
+                "--output" => ("--output", output, "choose another name"),
+                option => (option, output, "choose another name with --output"),
+            });
+        let part = self.part.iter().map(|part| ("--output", part, "choose another name"));
         let mut before: Vec<(&str, &Output)> = Vec::new();
         for (option, output, remedy) in part.chain(pictures).chain(stats).chain(checkpoint) {
             keep_inputs(option, output, inputs, remedy)?;

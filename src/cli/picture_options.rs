@@ -7,6 +7,7 @@ use wgray::image::{BitDepth, ExrCompression, ExrType, Format, Metadata, SaveOpti
 use wgray::scene::{ViewSettings, ViewTransform};
 
 use super::Usage;
+use super::numbers::whole;
 
 /// The options as parsed.
 #[derive(Clone, Debug, clap::Args)]
@@ -41,7 +42,7 @@ pub struct PictureOptions {
     pub exr_compression: Option<ExrCompression>,
 
     /// Set the quality of a JPEG, 1 to 100 [default: 90]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=100), hide_short_help = true)]
+    #[arg(long, value_name = "N", value_parser = whole::<u8>(1..=100), hide_short_help = true)]
     pub quality: Option<u8>,
 
     /// Omit device and driver names, so that equal scenes give equal files

@@ -41,7 +41,7 @@ struct PresentationOptions {
     #[arg(long, hide_short_help = true, value_name = "DEGREES", allow_negative_numbers = true)]
     fov: Option<f64>,
 
-    /// Set the up axis of the model: x, y, z, -x, -y or -z
+    /// Set the up axis of the model: x, y, z, -x, -y or -z (a file with cameras needs --view or --orbit too)
     #[arg(long, hide_short_help = true, value_name = "AXIS", allow_hyphen_values = true)]
     up: Option<UpAxis>,
 

@@ -82,6 +82,9 @@ impl Document {
             folder: here(path.parent().unwrap_or(Path::new(""))),
             root: here(root),
         };
+        if file.is_empty() {
+            return Err(Fault::file("the file is empty"));
+        }
         let mut notes = Vec::new();
         let (mut json, text, file, chunk) = match glb::is_container(&file) {
             true => {

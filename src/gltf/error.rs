@@ -79,6 +79,18 @@ impl GltfError {
         place.file = Some(path.display().to_string());
         place
     }
+
+    /// Returns the error with another path to the same file.
+    pub(crate) fn at(mut self, other: &Path) -> GltfError {
+        match &mut self {
+            GltfError::Read { path, .. }
+            | GltfError::Syntax { path, .. }
+            | GltfError::Byte { path, .. }
+            | GltfError::Key { path, .. }
+            | GltfError::File { path, .. } => *path = other.to_owned(),
+        }
+        self
+    }
 }
 
 /// An error before it knows its file.

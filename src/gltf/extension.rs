@@ -84,7 +84,7 @@ fn remedy(name: &str) -> &'static str {
     match name {
         "KHR_draco_mesh_compression" => "; export without Draco compression, or run gltf-transform copy IN.glb OUT.glb",
         "KHR_texture_basisu" => "; run gltf-transform ktxdecompress IN.glb OUT.glb",
-        _ => "",
+        _ => "; export the file without it",
     }
 }
 

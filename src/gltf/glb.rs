@@ -25,7 +25,10 @@ pub(super) fn is_container(bytes: &[u8]) -> bool {
 /// Finds the chunks. Those of other kinds than JSON and BIN are skipped, and so is what follows the length in the header.
 pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, Fault> {
     if bytes.len() < HEADER {
-        let rule = format!("the file ends after {} bytes; the header has {HEADER}", bytes.len());
+        let rule = format!(
+            "the file is truncated: it has {} bytes, and its header {HEADER}",
+            bytes.len()
+        );
         return Err(Fault::new(Place::Byte(0), rule));
     }
     let version = word(bytes, 4);
@@ -35,7 +38,7 @@ pub(super) fn chunks(bytes: &[u8]) -> Result<Chunks, Fault> {
     }
     let length = word(bytes, 8) as usize;
     if length > bytes.len() {
-        let rule = format!("the length is {length}; the file has {} bytes", bytes.len());
+        let rule = format!("the file is truncated: it has {} of {length} bytes", bytes.len());
         return Err(Fault::new(Place::Byte(8), rule));
     }
     let mut json = None;
@@ -111,13 +114,16 @@ mod tests {
     #[test]
     fn every_length_is_checked() {
         let byte = |offset: u64, rule: &str| (Place::Byte(offset), rule.to_owned());
-        assert_eq!(told(b"glTF"), byte(0, "the file ends after 4 bytes; the header has 12"));
+        assert_eq!(
+            told(b"glTF"),
+            byte(0, "the file is truncated: it has 4 bytes, and its header 12")
+        );
         let mut bytes = made(24, &[(JSON, b"{}  ")]);
         bytes[4] = 1;
         assert_eq!(told(&bytes), byte(4, "the version of the container is 1; it must be 2"));
         assert_eq!(
             told(&made(25, &[(JSON, b"{}  ")])),
-            byte(8, "the length is 25; the file has 24 bytes")
+            byte(8, "the file is truncated: it has 24 of 25 bytes")
         );
         assert_eq!(
             told(&made(23, &[(JSON, b"{}  ")])),

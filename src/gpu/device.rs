@@ -139,7 +139,7 @@ fn fitting(infos: &[Info], choice: &Choice) -> Result<Vec<usize>, String> {
         [] => {
             let there = listed(&everything);
             Err(format!(
-                "no adapter's name, driver or type contains '{name}'; available: {there}"
+                "no adapter's name, driver or type contains '{name}'; available: cpu, gpu, auto, {there}"
             ))
         }
         [first, rest @ ..] if rest.iter().any(|i| infos[*i].name != infos[*first].name) => {
@@ -511,7 +511,9 @@ mod tests {
         );
         let none = found("geforce").unwrap_err();
         assert!(
-            none.starts_with("no adapter's name, driver or type contains 'geforce'; available: 1: Radeon"),
+            none.starts_with(
+                "no adapter's name, driver or type contains 'geforce'; available: cpu, gpu, auto, 1: Radeon"
+            ),
             "{none}"
         );
         assert_eq!(fitting(&infos, &Choice::Auto), Ok(vec![0, 1, 2, 3, 4]));

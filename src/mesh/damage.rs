@@ -6,6 +6,7 @@ pub(super) const VERTEX: &str = "faces with this vertex are left out";
 pub(super) const FACE: &str = "the face is left out";
 pub(super) const UV: &str = "(0, 0) stands in for the texture coordinates";
 pub(super) const NORMAL: &str = "the normal of the triangles stands in";
+pub(super) const COLOR: &str = "white stands in for the color";
 pub(super) const LINE: &str = "the line is ignored";
 pub(super) const REST: &str = "the rest of the line is ignored";
 

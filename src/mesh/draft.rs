@@ -29,6 +29,8 @@ pub(crate) struct Draft {
     pub runs: Vec<(usize, u32)>,
     /// What a user should know.
     pub notes: Vec<String>,
+    /// Why the file may have no triangles.
+    pub(super) without_triangles: Option<&'static str>,
     pub(super) damages: Damages,
 }
 
@@ -83,7 +85,7 @@ pub(super) fn coordinate(x: f64) -> Result<f64, String> {
     if x.abs() <= MAX_COORDINATE {
         Ok(x + 0.0)
     } else {
-        Err(format!("{} must be finite, from -1e9 to 1e9", shown_number(x)))
+        Err(format!("{} must be from -1e9 to 1e9", shown_number(x)))
     }
 }
 

@@ -28,7 +28,10 @@ pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh,
     };
     let count = mesh.triangles.len();
     if count == 0 {
-        return Err(Place::File.fault(NO_TRIANGLES));
+        return Err(Place::File.fault(match draft.without_triangles {
+            Some(reason) => format!("{NO_TRIANGLES}: {reason}"),
+            None => NO_TRIANGLES.to_owned(),
+        }));
     }
     if mesh.groups.len() > 1 {
         let ends = draft.runs.iter().skip(1).map(|(start, _)| *start).chain([count]);

@@ -17,6 +17,7 @@ mod stl;
 mod tangents;
 mod words;
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
@@ -29,7 +30,7 @@ use serde::{Deserialize, Serialize};
 use self::cache::Cache;
 pub(crate) use self::draft::{Draft, unit};
 pub use self::error::MeshError;
-use self::error::{Fault, Place, shown};
+use self::error::{Fault, Place};
 pub(crate) use self::tangents::VertexTangents;
 use crate::pack::PackedMesh;
 use crate::pack::tree::Aabb;
@@ -153,8 +154,10 @@ pub struct MtlMaterial {
     pub metallic_map: Option<String>,
     /// The file of the roughness: `map_Pr`.
     pub roughness_map: Option<String>,
-    /// The keywords of its look that have no field here: other maps, and options of maps.
-    pub others: Vec<&'static str>,
+    /// The statements that have no effect: other maps, and options of maps.
+    pub others: Vec<String>,
+    /// The lines of the keywords, and of the statements that have no effect, counted from 1.
+    pub(crate) lines: BTreeMap<String, usize>,
 }
 
 impl MtlMaterial {
@@ -248,7 +251,7 @@ impl Mesh {
         }
     }
 
-    /// Reads a file of materials. There is a note if that cannot be done.
+    /// Reads an MTL file. [`Library::problem`] has the reason if that fails.
     fn load_library(&mut self, folder: &Path, name: &str) {
         let mut library = Library {
             file: file_beside(folder, name),
@@ -276,11 +279,7 @@ impl Mesh {
                     self.notes.push(format!("{name}:{problem}{others}"));
                 }
             }
-            Err(why) => {
-                let name = shown(name.as_bytes());
-                self.notes.push(format!("the MTL file {name} is not read: {why}"));
-                library.problem = Some(why);
-            }
+            Err(why) => library.problem = Some(why),
         }
         self.libraries.push(library);
     }
@@ -322,6 +321,9 @@ enum Format {
 
 /// Reads a mesh, the names of its MTL files, and the damage that was dealt with, from the bytes of a file.
 fn read(bytes: &[u8], format: Format, normals: Option<Normals>) -> Result<(Mesh, Vec<String>, Vec<Fault>), Fault> {
+    if bytes.is_empty() {
+        return Err(Place::File.fault("the file is empty"));
+    }
     let are_wanted = matches!(normals, None | Some(Normals::File));
     let (mut draft, libraries) = match format {
         Format::Obj => {

@@ -1,20 +1,24 @@
-//! The materials that an OBJ file names: MTL files, as of Wavefront's "Advanced Visualizer Manual", 1995. A line that cannot
-//! be read is told and left out. Keywords may have any case, as those of many exporters have.
+//! The materials that an OBJ file names: MTL files (Wavefront Technologies, "Advanced Visualizer Manual", 1995). A line that
+//! cannot be read is reported and ignored. Keywords may have any case, as many exporters write them.
 
 use super::MtlMaterial;
+use super::error::{Fault, shown};
 use super::words::{Words, number};
 
-/// The most materials of a file: each takes a few hundred bytes, and may have nine in the file.
-pub(super) const MOST_MATERIALS: usize = 1 << 16;
-/// How many lines that cannot be read are told apart.
-const MOST_PROBLEMS: usize = 100;
+/// Maximum number of materials of a file: each takes a few hundred bytes, and may have nine in the file.
+pub(super) const MAX_MATERIALS: usize = 1 << 16;
+/// Maximum number of reported lines that cannot be read.
+const MAX_PROBLEMS: usize = 100;
+/// Maximum number of reported statements of a material that have no effect.
+const MAX_IGNORED: usize = 16;
 
-/// What is in a file.
+/// The contents of a file.
 #[derive(Debug, Default)]
 pub(super) struct Mtl {
     pub materials: Vec<MtlMaterial>,
-    /// The first lines that cannot be read, each with the rule, and how many there are.
+    /// The first lines that cannot be read, each with the rule.
     pub problems: Vec<String>,
+    /// The number of lines that cannot be read.
     pub problem_count: usize,
 }
 
@@ -26,8 +30,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mtl, String> {
     while let Some(keyword) = words.anywhere() {
         let line = words.line();
         if keyword.eq_ignore_ascii_case(b"newmtl") {
-            if materials.len() >= MOST_MATERIALS {
-                return Err(format!("it must have at most {MOST_MATERIALS} materials"));
+            if materials.len() >= MAX_MATERIALS {
+                return Err(format!("it must have at most {MAX_MATERIALS} materials"));
             }
             materials.push(MtlMaterial {
                 name: words.name(),
@@ -35,10 +39,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mtl, String> {
                 ..MtlMaterial::default()
             });
         } else if let Some(material) = materials.last_mut()
-            && let Err(fault) = set(material, &keyword.to_ascii_lowercase(), &mut words)
+            && let Err(fault) = set(material, keyword, &mut words)
         {
             problem_count += 1;
-            if problems.len() < MOST_PROBLEMS {
+            if problems.len() < MAX_PROBLEMS {
                 problems.push(fault);
             }
         }
@@ -51,17 +55,47 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mtl, String> {
     })
 }
 
-/// Sets a field of a material by a line. The error is the line and the rule.
+/// The keywords of a material in lower case, as they are usually written.
+const KEYWORDS: [(&str, &str); 24] = [
+    ("bump", "map_Bump"),
+    ("d", "d"),
+    ("decal", "decal"),
+    ("disp", "disp"),
+    ("illum", "illum"),
+    ("kd", "Kd"),
+    ("ke", "Ke"),
+    ("ks", "Ks"),
+    ("map_bump", "map_Bump"),
+    ("map_d", "map_d"),
+    ("map_kd", "map_Kd"),
+    ("map_ke", "map_Ke"),
+    ("map_ks", "map_Ks"),
+    ("map_ns", "map_Ns"),
+    ("map_pm", "map_Pm"),
+    ("map_pr", "map_Pr"),
+    ("map_tr", "map_Tr"),
+    ("ni", "Ni"),
+    ("norm", "norm"),
+    ("ns", "Ns"),
+    ("pm", "Pm"),
+    ("pr", "Pr"),
+    ("refl", "refl"),
+    ("tr", "Tr"),
+];
+
+/// Sets a field of a material by a line. The error is the line, the keyword and the rule.
 fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<(), String> {
-    let told = |fault: super::error::Fault| match fault.place {
-        super::error::Place::Line(line) => format!("{line}: {}", fault.message),
-        _ => fault.message,
+    let is_keyword = |(lower, _): &&(&str, &str)| lower.as_bytes().eq_ignore_ascii_case(keyword);
+    let Some((_, keyword)) = KEYWORDS.iter().find(is_keyword) else {
+        return Ok(());
     };
+    let line = words.line();
+    let message = |fault: Fault| format!("{line}: {}", fault.message);
     let finite = |words: &mut Words| -> Result<f64, String> {
-        let x = words.number("the value").map_err(told)?;
+        let x = words.number(keyword).map_err(message)?;
         match x.is_finite() {
             true => Ok(x),
-            false => Err(told(words.fault(format!("{x} must be finite")))),
+            false => Err(format!("{line}: {keyword}: {x} must be finite")),
         }
     };
     // One number stands for three.
@@ -71,72 +105,71 @@ fn set(material: &mut MtlMaterial, keyword: &[u8], words: &mut Words) -> Result<
             None => Ok([red; 3]),
             Some(word) => match number(word).filter(|green| green.is_finite()) {
                 Some(green) => Ok([red, green, finite(words)?]),
-                None => Err(told(words.fault("a colour must be three numbers"))),
+                None => Err(format!("{line}: {keyword}: a color must be three numbers")),
             },
         }
     };
-    match keyword {
-        b"kd" => material.diffuse = Some(color(words)?),
-        b"ks" => material.specular = Some(color(words)?),
-        b"ke" => material.emission = Some(color(words)?),
-        b"ns" => material.shininess = Some(finite(words)?),
-        b"ni" => material.index_of_refraction = Some(finite(words)?),
-        b"d" => material.opacity = Some(finite(words)?),
-        b"tr" => {
+    match *keyword {
+        "Kd" => material.diffuse = Some(color(words)?),
+        "Ks" => material.specular = Some(color(words)?),
+        "Ke" => material.emission = Some(color(words)?),
+        "Ns" => material.shininess = Some(finite(words)?),
+        "Ni" => material.index_of_refraction = Some(finite(words)?),
+        "d" => material.opacity = Some(finite(words)?),
+        "Tr" => {
             // MeshLab writes 1 for opaque materials, and an invisible one has no use.
             let opacity = 1.0 - finite(words)?;
-            material.opacity = Some(opacity).filter(|opacity| *opacity != 0.0).or(material.opacity);
-        }
-        b"illum" => material.illumination = Some(finite(words)?.clamp(0.0, 255.0) as u8),
-        b"pm" => material.metallic = Some(finite(words)?),
-        b"pr" => material.roughness = Some(finite(words)?),
-        b"map_kd" => material.diffuse_map = map(material, words, "the options of map_Kd"),
-        b"map_ke" => material.emission_map = map(material, words, "the options of map_Ke"),
-        b"map_d" => material.opacity_map = map(material, words, "the options of map_d"),
-        b"map_bump" | b"bump" => material.bump_map = map(material, words, "the options of map_Bump"),
-        b"norm" => material.normal_map = map(material, words, "the options of norm"),
-        b"map_pm" => material.metallic_map = map(material, words, "the options of map_Pm"),
-        b"map_pr" => material.roughness_map = map(material, words, "the options of map_Pr"),
-        _ => {
-            if let Some((_, told)) = OTHERS.iter().find(|(known, _)| known.as_bytes() == keyword) {
-                left_out(material, told);
+            if opacity != 0.0 {
+                material.opacity = Some(opacity);
+                material.lines.insert("d".to_owned(), line);
             }
         }
+        "illum" => material.illumination = Some(finite(words)?.clamp(0.0, 255.0) as u8),
+        "Pm" => material.metallic = Some(finite(words)?),
+        "Pr" => material.roughness = Some(finite(words)?),
+        "map_Kd" => material.diffuse_map = map(material, words, keyword),
+        "map_Ke" => material.emission_map = map(material, words, keyword),
+        "map_d" => material.opacity_map = map(material, words, keyword),
+        "map_Bump" => material.bump_map = map(material, words, keyword),
+        "norm" => material.normal_map = map(material, words, keyword),
+        "map_Pm" => material.metallic_map = map(material, words, keyword),
+        "map_Pr" => material.roughness_map = map(material, words, keyword),
+        _ => ignore(material, (*keyword).to_owned(), line),
     }
+    material.lines.insert((*keyword).to_owned(), line);
     Ok(())
 }
 
-/// Maps that are not read, in lower case, and what they are called. That of the ambient light is mostly `map_Kd` again.
-const OTHERS: [(&str, &str); 6] = [
-    ("decal", "decal"),
-    ("disp", "disp"),
-    ("map_ks", "map_Ks"),
-    ("map_ns", "map_Ns"),
-    ("map_tr", "map_Tr"),
-    ("refl", "refl"),
-];
-
 /// Returns the file of a map. Its options have no effect.
-fn map(material: &mut MtlMaterial, words: &mut Words, options: &'static str) -> Option<String> {
-    let (file, has_options) = map_file(&words.name());
-    if has_options {
-        left_out(material, options);
+fn map(material: &mut MtlMaterial, words: &mut Words, keyword: &str) -> Option<String> {
+    let line = words.line();
+    let (file, options) = map_file(&words.name());
+    for option in options {
+        ignore(
+            material,
+            format!("option {} of {keyword}", shown(option.as_bytes())),
+            line,
+        );
     }
     Some(file).filter(|file| !file.is_empty())
 }
 
-fn left_out(material: &mut MtlMaterial, what: &'static str) {
-    if !material.others.contains(&what) {
+/// Records a statement that has no effect. A material has few of them, whatever its file has.
+fn ignore(material: &mut MtlMaterial, what: String, line: usize) {
+    if material.others.len() < MAX_IGNORED && !material.others.contains(&what) {
+        material.lines.insert(what.clone(), line);
         material.others.push(what);
     }
 }
 
-/// The file of a map, behind its options, and whether there are options.
-fn map_file(line: &str) -> (String, bool) {
+/// Returns the file of a map, which follows its options, and the options.
+fn map_file(line: &str) -> (String, Vec<String>) {
     let mut words = line.split(' ').peekable();
-    let mut has_options = false;
+    let mut options = Vec::new();
     while let Some(option) = words.next_if(|word| word.starts_with('-')) {
-        has_options = true;
+        if options.len() < MAX_IGNORED {
+            options.push(option.to_owned());
+        }
         let numbers = match option {
             "-o" | "-s" | "-t" => 3,
             "-mm" => 2,
@@ -150,7 +183,7 @@ fn map_file(line: &str) -> (String, bool) {
         }
     }
     let file = words.collect::<Vec<_>>().join(" ");
-    (file.trim_matches('"').to_owned(), has_options)
+    (file.trim_matches('"').to_owned(), options)
 }
 
 #[cfg(test)]
@@ -166,6 +199,7 @@ mod tests {
             materials, problems, ..
         } = read(text.as_bytes()).unwrap();
         assert_eq!(problems, Vec::<String>::new());
+        let lines = |lines: &[(&str, usize)]| lines.iter().map(|(key, line)| (key.to_string(), *line)).collect();
         let red = MtlMaterial {
             name: "dark red".to_string(),
             line: 3,
@@ -178,7 +212,23 @@ mod tests {
             illumination: Some(2),
             diffuse_map: Some("my wood.png".to_string()),
             bump_map: Some("b.png".to_string()),
-            others: vec!["the options of map_Kd"],
+            others: vec![
+                "option \"-s\" of map_Kd".to_string(),
+                "option \"-clamp\" of map_Kd".to_string(),
+            ],
+            lines: lines(&[
+                ("Kd", 4),
+                ("Ks", 5),
+                ("Ns", 6),
+                ("Ke", 7),
+                ("d", 8),
+                ("Ni", 9),
+                ("illum", 10),
+                ("map_Kd", 11),
+                ("option \"-s\" of map_Kd", 11),
+                ("option \"-clamp\" of map_Kd", 11),
+                ("map_Bump", 13),
+            ]),
             ..MtlMaterial::default()
         };
         let glass = MtlMaterial {
@@ -186,22 +236,23 @@ mod tests {
             line: 16,
             diffuse_map: Some("a.png".to_string()),
             opacity: Some(0.25),
+            lines: lines(&[("Tr", 17), ("d", 17), ("map_Kd", 18)]),
             ..MtlMaterial::default()
         };
         assert_eq!(materials, [red, glass]);
     }
 
     #[test]
-    fn what_cannot_be_read_is_told() {
+    fn lines_that_cannot_be_read_are_reported() {
         let Mtl {
             materials, problems, ..
         } = read(b"newmtl a\nKd spectral a.rfl\nNs inf\nKd 1 b\nd 0.5").unwrap();
         assert_eq!(
             problems,
             [
-                "2: the value: \"spectral\" must be a number",
-                "3: inf must be finite",
-                "4: a colour must be three numbers"
+                "2: Kd: \"spectral\" must be a number",
+                "3: Ns: inf must be finite",
+                "4: Kd: a color must be three numbers"
             ]
         );
         assert_eq!((materials[0].diffuse, materials[0].opacity), (None, Some(0.5)));
@@ -215,11 +266,11 @@ mod tests {
             problem_count,
             ..
         } = read(bad.as_bytes()).unwrap();
-        assert_eq!((problems.len(), problem_count), (MOST_PROBLEMS, 100_000));
+        assert_eq!((problems.len(), problem_count), (MAX_PROBLEMS, 100_000));
         let many = |count: usize| read("newmtl a\n".repeat(count).as_bytes());
-        assert_eq!(many(MOST_MATERIALS).unwrap().materials.len(), MOST_MATERIALS);
+        assert_eq!(many(MAX_MATERIALS).unwrap().materials.len(), MAX_MATERIALS);
         assert_eq!(
-            many(MOST_MATERIALS + 1).unwrap_err(),
+            many(MAX_MATERIALS + 1).unwrap_err(),
             "it must have at most 65536 materials"
         );
     }

@@ -149,13 +149,13 @@ impl Reader {
         self.draft.face(&self.face, words.place())
     }
 
-    /// Reads the color behind a position. It is sRGB, as MeshLab and Blender write it.
+    /// Reads the color that follows a position. It is sRGB, as MeshLab and Blender write it.
     fn color(&mut self, words: &mut Words) {
-        let mut values = [0.0; 4];
+        let mut values = [0.0; 3];
         let mut count = 0;
         while let Some(word) = words.on_line() {
-            if let (Some(value), Some(number)) = (values.get_mut(count), words::number(word)) {
-                *value = number;
+            if let Some(value) = values.get_mut(count) {
+                *value = words::number(word).unwrap_or(f64::NAN);
             }
             count += 1;
         }
@@ -166,9 +166,16 @@ impl Reader {
             }
             return;
         }
-        let color = [values[0], values[1], values[2]].map(|x| linear(x.clamp(0.0, 1.0)) as f32);
+        let mut color = Vec4::ONE;
+        match values.iter().all(|x| x.is_finite()) {
+            true => color = Vec3::from(values.map(|x| linear(x.clamp(0.0, 1.0)) as f32)).extend(1.0),
+            false => {
+                let rule = || words.fault("the color of the vertex must be three finite numbers");
+                self.draft.damages.add(damage::COLOR, rule);
+            }
+        }
         self.colors.resize(self.positions.len(), Vec4::ONE);
-        self.colors.push(Vec3::from(color).extend(1.0));
+        self.colors.push(color);
     }
 
     /// Begins the group of what follows.
@@ -224,6 +231,13 @@ impl Reader {
         }
         let corners = &self.vertices.corners;
         let mut draft = self.draft;
+        draft.without_triangles = match ["\"l\"", "\"p\""]
+            .iter()
+            .any(|keyword| self.unknown.contains_key(*keyword))
+        {
+            true => Some("points and lines are not rendered"),
+            false => (!self.positions.is_empty()).then_some("the file has vertices, but no faces"),
+        };
         draft.positions = corners.iter().map(|[v, _, _]| self.positions[*v as usize]).collect();
         if !self.colors.is_empty() {
             let color = |v: u32| self.colors.get(v as usize).copied().unwrap_or(Vec4::ONE);

@@ -40,7 +40,7 @@ fn body(header: &Header, mut values: impl Values, normals_wanted: bool, damages:
     if element("face").is_none_or(|faces| faces.count == 0) {
         return Err(Place::File.fault(match element("tristrips") {
             Some(_) => "has tristrips, which are not read: it must have an element \"face\"",
-            None => "has no triangles: it must have an element \"face\"",
+            None => "has no triangles: points and lines are not rendered",
         }));
     }
     if vertices.count > MOST {
@@ -237,7 +237,13 @@ fn read_vertices(
         }
         if has_colors {
             let value = |k: usize| color_value(row[8 + k], of_colors[k], k == 3);
-            draft.colors.push(Vec4::from_array(std::array::from_fn(value)));
+            let mut color = Vec4::from_array(std::array::from_fn(value));
+            if !color.is_finite() {
+                let rule = "its values must be finite as 32-bit floats".to_owned();
+                draft.damages.add(damage::COLOR, || fault(("the color", rule)));
+                color = Vec4::ONE;
+            }
+            draft.colors.push(color);
         }
     }
     Ok(())

@@ -47,7 +47,7 @@ pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
         _ if is_text => text(bytes, &mut facets)?,
         Some(size) => {
             return Err(Place::Byte(HEADER - 4).fault(format!(
-                "{} triangles must be a file of {size} bytes; it has {}",
+                "{} triangles take {size} bytes, and the file has {}: it is truncated, or not an STL file",
                 count.unwrap_or_default(),
                 bytes.len()
             )));

@@ -85,9 +85,9 @@ pub(super) fn of_option(problem: Problem) -> Result<Problem, Problem> {
 impl FromStr for Background {
     type Err = String;
 
-    /// `none`, or a color.
+    /// `none` or `transparent`, or a color.
     fn from_str(text: &str) -> Result<Background, String> {
-        if text == "none" {
+        if text == "none" || text == "transparent" {
             return Ok(Background::Transparent);
         }
         let shown = display_of(text).map(Background::Display);
@@ -108,7 +108,7 @@ impl FromStr for EnvironmentDescription {
         if let Some(color) = color_of(text) {
             return Ok(EnvironmentDescription::new(color));
         }
-        let rule = || format!("must be an image file (.hdr, .exr, .png, .jpg), studio, sky, a color, {COLOR}");
+        let rule = || format!("must be studio, sky, an image file (.hdr, .exr, .png, .jpg) or a color, {COLOR}");
         let is_path = text.contains(['/', '\\', '.']) || Path::new(text).exists();
         if text.starts_with('#') || !is_path {
             return Err(rule());
@@ -130,20 +130,26 @@ const COLOR_NAMES: [(&str, &str); 4] = [
     ("white", "#ffffff"),
 ];
 
-/// Returns the linear RGB of a name or `#rrggbb`, by the curve of sRGB, or of three linear numbers.
+/// Returns the linear RGB of a name or hexadecimal digits, by the curve of sRGB, or of three linear numbers.
 fn color_of(text: &str) -> Option<DVec3> {
     let linear = |shown: DVec3| DVec3::from_array(shown.to_array().map(srgb_to_linear));
     display_of(text).map(linear).or_else(|| linear_of(text))
 }
 
-/// Returns the display values, 0 to 1, of a name or `#rrggbb`.
+/// Returns the display values, 0 to 1, of a name or of hexadecimal digits: `#rrggbb` or `#rgb`, also without `#`.
 fn display_of(text: &str) -> Option<DVec3> {
     let named = COLOR_NAMES.into_iter().find(|(name, _)| *name == text);
-    let digits = named.map_or(text, |(_, hex)| hex).strip_prefix('#')?;
-    let is_hex = digits.len() == 6 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+    let hex = named.map_or(text, |(_, hex)| hex);
+    let digits = hex.strip_prefix('#').unwrap_or(hex);
+    let (limit, size) = match digits.len() {
+        3 => (15.0, 4),
+        6 => (255.0, 8),
+        _ => return None,
+    };
+    let is_hex = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
     let whole = u32::from_str_radix(digits, 16).ok().filter(|_| is_hex)?;
-    let [_, rgb @ ..] = whole.to_be_bytes();
-    Some(DVec3::from_array(rgb.map(|value| f64::from(value) / 255.0)))
+    let component = |i: u32| f64::from(whole >> (i * size) & ((1 << size) - 1)) / limit;
+    Some(DVec3::new(component(2), component(1), component(0)))
 }
 
 /// Returns three linear numbers.
@@ -181,8 +187,14 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
         let [r, g, b] = shown("#8000Ff");
         assert!((r - 0.21586).abs() < 1e-5 && g == 0.0 && b == 1.0, "{r} {g} {b}");
         assert_eq!("none".parse(), Ok(Background::Transparent));
+        assert_eq!("transparent".parse(), Ok(Background::Transparent));
+        for green in ["#0f0", "0f0", "00ff00", "#00FF00"] {
+            assert_eq!(green.parse(), Ok(Background::Display(DVec3::Y)), "{green}");
+        }
+        assert_eq!(shown("#842")[0], shown("#884422")[0]);
         for bad in [
-            "", "#", "#fff", "#12345g", "#+12345", "#1234567", "1,2", "1,2,3,4", "1,2,x", "blue", "None",
+            "", "#", "#ff", "#ffff", "+12", "##12345", "#12345g", "#+12345", "#1234567", "1,2", "1,2,3,4", "1,2,x",
+            "blue", "None",
         ] {
             let told = bad.parse::<Background>().unwrap_err();
             assert!(
@@ -205,7 +217,7 @@ camera = { position = [0, 1, 0], look_at = [1, 0, 0], fov = 40 }
         }
         for bad in ["", "#ff", "forest", "1,2"] {
             let told = bad.parse::<EnvironmentDescription>().unwrap_err();
-            assert!(told.starts_with("must be an image file (.hdr"), "{told}");
+            assert!(told.starts_with("must be studio, sky, an image file (.hdr"), "{told}");
         }
     }
 

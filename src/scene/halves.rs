@@ -13,7 +13,7 @@ pub(crate) struct Level {
     pub texels: Vec<DVec3>,
 }
 
-/// The linear value of each byte.
+/// Returns the linear value of each byte.
 pub(crate) fn decoded(encoding: Encoding) -> Vec<f64> {
     let decode = |value: u32| match encoding {
         Encoding::Srgb => srgb_to_linear(f64::from(value) / 255.0),
@@ -22,7 +22,7 @@ pub(crate) fn decoded(encoding: Encoding) -> Vec<f64> {
     (0..256).map(decode).collect()
 }
 
-/// The texels of an image in linear light, in its own order.
+/// Returns the texels of an image in linear light, in its own order.
 pub(crate) fn linear(image: &Image) -> impl Fn(usize) -> DVec3 + Sync {
     let texel: Box<dyn Fn(usize) -> DVec3 + Sync> = match &image.texels {
         Texels::Bytes(encoding, bytes) => {
@@ -34,28 +34,65 @@ pub(crate) fn linear(image: &Image) -> impl Fn(usize) -> DVec3 + Sync {
     texel
 }
 
-/// The level after one: each texel the mean over the part of that level that it covers.
-pub(crate) fn half(width: usize, height: usize, texel: impl Fn(usize) -> DVec3 + Sync) -> Level {
-    let (columns, rows) = (covers(width, (width / 2).max(1)), covers(height, (height / 2).max(1)));
-    let mut texels = vec![DVec3::ZERO; columns.len() * rows.len()];
-    let lines = texels.par_chunks_mut(columns.len()).zip(&rows);
-    lines.with_min_len(16).for_each(|(line, row)| {
-        for (sum, column) in line.iter_mut().zip(&columns) {
-            for (y, v) in row {
-                for (x, u) in column {
-                    *sum += texel(y * width + x) * (u * v);
+impl Level {
+    /// Returns the next level.
+    pub fn half(&self) -> Level {
+        half(self.width, self.height, |x, y| self.texels[y * self.width + x])
+    }
+}
+
+/// Returns an image at half its size in linear light, with its rows in the order of `row`, which maps a row of the result's source
+/// to a row of the image.
+pub(crate) fn half_of(image: &Image, row: impl Fn(usize) -> usize + Sync) -> Level {
+    let (width, height) = (image.width as usize, image.height as usize);
+    match &image.texels {
+        Texels::Bytes(encoding, bytes) => {
+            let table = decoded(*encoding);
+            let linear = |byte: u8| table[usize::from(byte)];
+            half(width, height, |x, y| {
+                DVec3::from_array(bytes[row(y) * width + x].map(linear))
+            })
+        }
+        Texels::Floats(floats) => half(width, height, |x, y| {
+            DVec3::from_array(floats[row(y) * width + x].map(f64::from))
+        }),
+    }
+}
+
+/// Returns the level after one: each texel the mean over the part of that level that it covers.
+fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Sync) -> Level {
+    let (new_width, new_height) = ((width / 2).max(1), (height / 2).max(1));
+    let mut texels = vec![DVec3::ZERO; new_width * new_height];
+    let lines = texels.par_chunks_mut(new_width).with_min_len(16);
+    if width % 2 == 0 && height % 2 == 0 {
+        // The general case with its weights, in the order of its sum.
+        lines.enumerate().for_each(|(j, line)| {
+            for (i, sum) in line.iter_mut().enumerate() {
+                let texel = |x: usize, y: usize| texel(2 * i + x, 2 * j + y) * 0.25;
+                *sum = DVec3::ZERO + texel(0, 0) + texel(1, 0) + texel(0, 1) + texel(1, 1);
+            }
+        });
+    } else {
+        let (columns, rows) = (covers(width, new_width), covers(height, new_height));
+        lines.zip(&rows).for_each(|(line, row)| {
+            for (sum, column) in line.iter_mut().zip(&columns) {
+                for (y, v) in row {
+                    for (x, u) in column {
+                        *sum += texel(*x, *y) * (u * v);
+                    }
                 }
             }
-        }
-    });
+        });
+    }
     Level {
-        width: columns.len(),
-        height: rows.len(),
+        width: new_width,
+        height: new_height,
         texels,
     }
 }
 
-/// Which of `from` texels in a line each of `to` covers, and with what weight; `to` is half of `from`, rounded down.
+/// Returns, for each of `to` texels in a line, the texels among `from` that it covers, with their weights; `to` is half of `from`, rounded
+/// down.
 fn covers(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
     let size = from as f64 / to as f64;
     let cover = |i: usize| {
@@ -70,10 +107,9 @@ fn covers(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
     (0..to).map(cover).collect()
 }
 
-/// An image of half its width and height, each rounded down, but at least 1.
+/// Returns an image of half its width and height, each rounded down, but at least 1.
 pub(super) fn halved(image: &Image) -> Image {
-    let texel = linear(image);
-    let Level { width, height, texels } = half(image.width as usize, image.height as usize, texel);
+    let Level { width, height, texels } = half_of(image, |row| row);
     let texels = match &image.texels {
         Texels::Floats(_) => Texels::Floats(texels.into_iter().map(|color| color.as_vec3().to_array()).collect()),
         Texels::Bytes(encoding, _) => {

@@ -277,6 +277,7 @@ fn load_gltf(
     for note in &mut scene.notes {
         *note = own(note);
     }
+    scene.notes.extend(overrides.presentation.hiding_ground(&scene));
     Ok((scene, description))
 }
 
@@ -300,8 +301,11 @@ fn load_mesh(
     for note in &mut scene.notes {
         if let Some(own) = note.strip_prefix(&place) {
             *note = own.to_owned();
+        } else if let Some(line) = note.strip_prefix(place.trim_end()) {
+            *note = format!("line {line}");
         }
     }
+    scene.notes.extend(overrides.presentation.hiding_ground(&scene));
     Ok((scene, description))
 }
 

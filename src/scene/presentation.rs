@@ -89,14 +89,27 @@ impl Presentation {
     }
 }
 
+impl Presentation {
+    /// Returns a warning if the ground is between the model and the camera.
+    pub(super) fn hiding_ground(&self, scene: &Scene) -> Option<String> {
+        let ground = self.ground.then(|| scene.ground()).flatten()?;
+        let (low, _) = scene.shapes[ground].geometry.bounds()?;
+        let warning =
+            "the camera is below the ground, which hides the model; choose a view from above, or leave out the ground";
+        (scene.camera.position.z < low.z).then(|| warning.to_owned())
+    }
+}
+
 impl Scene {
+    /// Returns the index of the ground of a model.
+    fn ground(&self) -> Option<usize> {
+        let is_ground = |material: usize| self.material_names.get(material).is_some_and(|name| name == GROUND);
+        self.shapes.iter().position(|shape| is_ground(shape.material))
+    }
+
     /// Takes the ground of another moment of the same model: it stands still while the model moves.
     pub fn keep_ground(&mut self, before: &Scene) {
-        let find = |scene: &Scene| {
-            let is_ground = |material: usize| scene.material_names.get(material).is_some_and(|name| name == GROUND);
-            scene.shapes.iter().position(|shape| is_ground(shape.material))
-        };
-        if let (Some(now), Some(then)) = (find(self), find(before)) {
+        if let (Some(now), Some(then)) = (self.ground(), before.ground()) {
             self.shapes[now].geometry = before.shapes[then].geometry.clone();
         }
     }

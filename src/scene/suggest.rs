@@ -6,6 +6,9 @@ use super::parse::list;
 /// Maximum length of a name that is compared, in bytes. Comparing takes time proportional to the product of both lengths.
 const MAX_LEN: usize = 64;
 
+/// Minimum length of the start of a name that stands for the name, in bytes.
+const MIN_START_LEN: usize = 3;
+
 /// Returns the name that is most similar to a misspelled one, if any is similar enough.
 fn closest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     if wrong.len() > MAX_LEN {
@@ -17,7 +20,11 @@ fn closest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<
     });
     // One edit for every three letters: "fovv" is like "fov", and "red" is not like "blue".
     let limit = |name: &str| wrong.chars().count().max(name.chars().count()).div_ceil(3);
-    let similar = similar.filter(|(edits, name)| *edits <= limit(name) && *edits < name.chars().count());
+    let similar = similar.filter(|(edits, name)| {
+        // "pos" is short for "position".
+        let is_short = wrong.len() >= MIN_START_LEN && name.to_lowercase().starts_with(&wrong.to_lowercase());
+        is_short || (*edits <= limit(name) && *edits < name.chars().count())
+    });
     similar.min_by_key(|(edits, _)| *edits).map(|(_, name)| name)
 }
 
@@ -50,6 +57,8 @@ mod tests {
             ("lookat", Some("look_at")),
             ("ofv", Some("fov")),
             ("rde", Some("red")),
+            ("yel", Some("yellow")),
+            ("ye", None),
             ("blue", None),
             ("x", None),
             ("", None),

@@ -20,7 +20,19 @@ impl Scene {
         if !self.shapes.is_empty() && !self.has_light() {
             warnings.push("the scene has no light, emission or environment; every surface renders black".to_owned());
         }
+        let is_dark = self.render.integrator == Integrator::Path && self.render.max_depth == 0;
+        if is_dark && !self.shapes.is_empty() && self.has_light() && !self.has_emission() {
+            warnings.push(
+                "render.max_depth is 0, so only emission is shown, and no surface has any; 1 adds direct light"
+                    .to_owned(),
+            );
+        }
         warnings
+    }
+
+    fn has_emission(&self) -> bool {
+        let mut materials = self.shapes.iter().flat_map(materials).map(|i| &self.materials[i]);
+        materials.any(|material| !is_black(&material.emission))
     }
 
     /// Returns whether any light can arrive at a surface or leave one.
@@ -34,20 +46,20 @@ impl Scene {
         if self.lights.iter().any(|light| color(light) != DVec3::ZERO) || self.render.background != DVec3::ZERO {
             return true;
         }
-        let materials = || self.shapes.iter().flat_map(materials).map(|i| &self.materials[i]);
         if self.render.integrator == Integrator::Phong {
             let is_ambient = |reflection: &Reflection| match reflection {
                 Reflection::Phong { ambient, .. } => !is_black(ambient),
                 _ => false,
             };
-            return self.render.ambient != DVec3::ZERO && materials().any(|material| is_ambient(&material.reflection));
+            let mut materials = self.shapes.iter().flat_map(materials).map(|i| &self.materials[i]);
+            return self.render.ambient != DVec3::ZERO && materials.any(|material| is_ambient(&material.reflection));
         }
         let environment = self.environment.as_ref();
         let is_lit = environment.is_some_and(|environment| {
             let image = environment.image.as_ref().is_some_and(|image| image.scale != 0.0);
             image || environment.color != DVec3::ZERO
         });
-        is_lit || materials().any(|material| !is_black(&material.emission))
+        is_lit || self.has_emission()
     }
 
     /// Returns whether the scene is an environment map alone, as a scene without shapes may be meant.

@@ -56,10 +56,7 @@ fn a_model_by_itself_is_a_picture() {
     let ran = place.run(&["check", "box.glb", "box.gltf"]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     for line in ran.stdout.lines() {
-        assert!(
-            line.contains(": ok: 1024 x 1024 pixels, 64 samples per pixel"),
-            "{line}"
-        );
+        assert!(line.contains(": ok: 720 x 720 pixels, 64 samples per pixel"), "{line}");
         assert!(
             line.contains("2 shapes, including 2 instances of 2 meshes (24 triangles"),
             "{line}"
@@ -139,9 +136,9 @@ fn each_option_shows_something_else_and_names_and_numbers_are_alike() {
     }
     // The camera's aspect is the picture's, unless a size is named.
     for (options, size) in [
-        (&["--camera", "0"][..], "1024 x 683"),
-        (&["--camera", "1"], "1024 x 1024"),
-        (&["--view", "iso"], "1024 x 1024"),
+        (&["--camera", "0"][..], "720 x 480"),
+        (&["--camera", "1"], "720 x 720"),
+        (&["--view", "iso"], "720 x 720"),
     ] {
         let ran = place.run(&[&["check", "box.glb"], options].concat());
         assert!(ran.stdout.contains(size), "{options:?}: {}{}", ran.stdout, ran.stderr);

@@ -91,6 +91,46 @@ fn common_mistakes_have_hints() {
             "use '--size WIDTHxHEIGHT'",
         ),
         (
+            &["render", "small.toml", "--transparent"],
+            "unexpected argument '--transparent'",
+            "use '--background none'",
+        ),
+        (
+            &["render", "small.toml", "--hdri", "a.hdr"],
+            "unexpected argument '--hdri'",
+            "use '--environment FILE.hdr'",
+        ),
+        (
+            &["render", "small.toml", "-s", "64"],
+            "unexpected argument '-s'",
+            "use '--size WIDTHxHEIGHT' or '--spp N'",
+        ),
+        (
+            &["render", "small.toml", "--denoise"],
+            "unexpected argument '--denoise'",
+            "use '--spp N'; more samples reduce noise",
+        ),
+        (
+            &["render", "small.toml", "--turntable", "0"],
+            "invalid value '0' for '--turntable <N>'",
+            "must be a whole number from 1 to 100000",
+        ),
+        (
+            &["render", "small.toml", "--seed", "-1"],
+            "invalid value '-1' for '--seed <N>'",
+            "must be a whole number from 0 to 4294967295",
+        ),
+        (
+            &["render", "small.toml", "--quality", "101"],
+            "invalid value '101' for '--quality <N>'",
+            "must be a whole number from 1 to 100",
+        ),
+        (
+            &["render", "small.toml", "--spp", "1e9"],
+            "invalid value '1e9' for '--spp <N>'",
+            "must be a whole number from 1 to 65536",
+        ),
+        (
             &["render", "small.toml", "--cpu"],
             "unexpected argument '--cpu'",
             "use '--device cpu'",
@@ -109,7 +149,7 @@ fn common_mistakes_have_hints() {
         (
             &["render", "small.toml", "--spp", "abc"],
             "invalid value 'abc' for '--spp <N>'",
-            "must be a whole number, such as 64",
+            "must be a whole number from 1 to 65536",
         ),
         (&["render", "small.toml", "--spp", "0"], "--spp: 0 must be from 1", ""),
         (
@@ -126,7 +166,7 @@ fn common_mistakes_have_hints() {
                 "--integrator",
                 "path",
             ],
-            "studio, sky, a color",
+            "studio, sky, an image file",
             "white",
         ),
         (

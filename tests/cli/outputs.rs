@@ -42,7 +42,7 @@ fn with_materials(place: &Place) {
 fn nothing_that_a_mesh_names_is_replaced() {
     let place = Place::new();
     with_materials(&place);
-    let keeps = "is an input of the scene; choose another name with --output";
+    let keeps = "is an input of the scene; choose another name";
     for name in ["wood.png", "spare.png"] {
         refused(
             &place,
@@ -112,7 +112,7 @@ pub fn refused(place: &Place, arguments: &[&str], code: i32, message: &str) {
 fn no_input_is_replaced() {
     let place = Place::new();
     textured(&place);
-    let keeps = "is an input of the scene; choose another name with --output";
+    let keeps = "is an input of the scene; choose another name";
     let foreign = "exists and was not written by wgray; name the output with -o";
     refused(&place, &["tiles.toml"], 2, &format!("tiles.png {foreign}"));
     refused(

@@ -72,7 +72,7 @@ fn the_files_camera_is_where_its_node_is() {
         let builder = seen_by(json!({ "type": "perspective", "perspective": perspective }));
         let scene = load(&builder, name);
         // The picture has the camera's aspect, where it has one.
-        assert_eq!((scene.width, scene.height), (1024, if wide { 512 } else { 1024 }));
+        assert_eq!((scene.width, scene.height), (720, if wide { 360 } else { 720 }));
         let camera = scene.camera;
         assert_near(to_file(camera.position).to_array(), [1.0, 2.0, 5.0]);
         // It looks along -z of its node; its scale is without effect.

@@ -107,6 +107,29 @@ fn the_ground_lies_below_the_model() {
 }
 
 #[test]
+fn a_ground_that_hides_the_model_is_noted() {
+    let place = Place::with_file("a", "");
+    let file = spike(&place, DVec3::Y, false);
+    let notes = |ground, view| {
+        let presentation = Presentation {
+            ground,
+            ..Presentation::default()
+        };
+        load(&file, presentation, Some(view)).unwrap().notes
+    };
+    let [note] = &notes(true, View::Bottom)[..] else {
+        panic!("{:?}", notes(true, View::Bottom))
+    };
+    assert!(
+        note.starts_with("the camera is below the ground, which hides the model"),
+        "{note}"
+    );
+    for (ground, view) in [(false, View::Bottom), (true, View::Top), (true, View::Front)] {
+        assert_eq!(notes(ground, view), Vec::<String>::new(), "{ground} {view:?}");
+    }
+}
+
+#[test]
 fn the_automatic_camera_is_adjusted() {
     let place = Place::with_file("a", "");
     let file = spike(&place, DVec3::Y, true);

@@ -164,7 +164,7 @@ fn a_mesh_names_nothing_outside() {
         is_refused(&render_with(&folder, "a.toml", &["--strict"]), &name);
         let ran = render(&folder, "a.toml");
         assert!(
-            ran.code == 0 && ran.said.contains("is not read"),
+            ran.code == 0 && ran.said.contains("cannot be read"),
             "{name}: {}",
             ran.said
         );

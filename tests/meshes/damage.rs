@@ -10,11 +10,11 @@ fn damaged_lines_of_obj_files_have_stand_ins() {
     for (lines, note) in [
         (
             "v nan 0 0\nf 1 2 3\n",
-            "line 5: x: NaN must be finite, from -1e9 to 1e9; faces with this vertex are left out",
+            "line 5: x: NaN must be from -1e9 to 1e9; faces with this vertex are left out",
         ),
         (
             "v 0 inf 0\nv 0 0 1e10\nf 1 2 3\nf 1 2 5\nf 5 1 3 2 4\n",
-            "line 5: y: inf must be finite, from -1e9 to 1e9; faces with this vertex are left out (and 1 more)",
+            "line 5: y: inf must be from -1e9 to 1e9; faces with this vertex are left out (and 1 more)",
         ),
         (
             "v 3.1+e2 0 0\nf 1 2 3\nf 3 2 5\n",
@@ -53,6 +53,10 @@ fn damaged_lines_of_obj_files_have_stand_ins() {
             "vn 0 1\nf 1//1 2//1 3//1\n",
             "line 5: z is missing; the normal of the triangles stands in",
         ),
+        (
+            "v 0 0 0 0.5 nan 0\nv 0 0 0 red 0 0\nf 1 2 3\n",
+            "line 5: the color of the vertex must be three finite numbers; white stands in for the color (and 1 more)",
+        ),
     ] {
         let mesh = load("a.obj", format!("{SQUARE}{lines}"), None).unwrap();
         assert_eq!(corners(&mesh), [FIRST], "{lines}");
@@ -63,10 +67,7 @@ fn damaged_lines_of_obj_files_have_stand_ins() {
 #[test]
 fn nothing_but_damage_is_an_error() {
     for (text, message) in [
-        (
-            "v 0 0 nan\nf 1 1 1\n",
-            "a.obj:1: z: NaN must be finite, from -1e9 to 1e9",
-        ),
+        ("v 0 0 nan\nf 1 1 1\n", "a.obj:1: z: NaN must be from -1e9 to 1e9"),
         (
             "v 0 0 0\nf 1 1\n",
             "a.obj:2: a face must have 3 corners or more; this one has 2",
@@ -94,7 +95,7 @@ fn damaged_rows_of_ply_files_have_stand_ins() {
         (
             "0 0 0\n1 0 0\n1 1 0\n0 nan 0\n",
             "3 0 1 2\n3 0 1 3\n",
-            "line 13: vertex 3: y: NaN must be finite, from -1e9 to 1e9; faces with this vertex are left out",
+            "line 13: vertex 3: y: NaN must be from -1e9 to 1e9; faces with this vertex are left out",
         ),
         (
             POINTS,
@@ -110,6 +111,20 @@ fn damaged_rows_of_ply_files_have_stand_ins() {
         let mesh = load("a.ply", ply(vertices, faces), None).unwrap();
         assert_eq!((corners(&mesh), &mesh.notes[..]), (vec![FIRST], &[note.to_owned()][..]));
     }
+}
+
+#[test]
+fn vertex_colors_that_are_not_finite_are_white() {
+    let header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                  property float red\nproperty float green\nproperty float blue\nelement face 1\n\
+                  property list uchar int vertex_indices\nend_header\n";
+    let text = format!("{header}0 0 0 0.5 0.25 0\n1 0 0 nan 0 0\n1 1 0 0 1e39 0\n3 0 1 2\n");
+    let mesh = load("a.ply", text, None).unwrap();
+    let note = "line 14: vertex 1: the color: its values must be finite as 32-bit floats; \
+                white stands in for the color (and 1 more)";
+    assert_eq!(mesh.notes, [note]);
+    assert_eq!(mesh.colors[0].to_array(), [0.5, 0.25, 0.0, 1.0]);
+    assert_eq!(mesh.colors[1..], [glam::Vec4::ONE; 2]);
 }
 
 #[test]
@@ -147,7 +162,7 @@ fn facets_of_stl_files_without_a_position_are_left_out() {
     assert_eq!(corners(&mesh), [FIRST]);
     assert_eq!(
         mesh.notes,
-        ["line 11: z: NaN must be finite, from -1e9 to 1e9; the face is left out"]
+        ["line 11: z: NaN must be from -1e9 to 1e9; the face is left out"]
     );
 }
 

@@ -112,7 +112,7 @@ fn maps_of_bumps_are_normals_or_noted() {
     assert_eq!(gray.normal_map, None);
     assert_eq!(
         notes,
-        ["a.mtl:1: \"m\": map_Bump: a map of heights is ignored; bake a normal map, and name it by norm"]
+        ["a.mtl:2: material \"m\": map_Bump: a map of heights is ignored; bake a normal map, and name it by norm"]
     );
     let (opaque, notes) = material("map_d gray.png\n");
     assert!(matches!(principled(&opaque).alpha, Value::Texture(_, Channel::R)) && notes.is_empty());
@@ -128,7 +128,10 @@ fn strict_refuses_missing_maps() {
     };
     let path = folder.path().join("a.obj");
     let message = Scene::load_with(&path, &overrides).unwrap_err().to_string();
-    let start = format!("{}: \"none.png\" cannot be read: ", path.display());
+    let start = format!(
+        "{}: a.mtl:2: material \"m\": map_Kd: \"none.png\" cannot be read: ",
+        path.display()
+    );
     assert!(message.starts_with(&start), "{message}");
 }
 
@@ -169,6 +172,7 @@ fn only_maps_that_exist_need_texture_coordinates() {
 fn bad_values_and_missing_maps_are_noted() {
     for (mtl, note) in [
         ("Pr 2\n", "Pr: 2 must be from 0 to 1; 1 stands in"),
+        ("d 0\n", "d: 0 makes the material invisible; it is opaque at 1"),
         (
             "Kd 1 2 -1\n",
             "Kd: each of [1, 2, -1] must be from 0 to 1; [1, 1, 0] stands in",
@@ -181,6 +185,9 @@ fn bad_values_and_missing_maps_are_noted() {
         let [found] = &notes[..] else {
             panic!("{mtl}: {notes:?}")
         };
-        assert!(found.starts_with(&format!("a.mtl:1: \"m\": {note}")), "{found}");
+        assert!(
+            found.starts_with(&format!("a.mtl:2: material \"m\": {note}")),
+            "{found}"
+        );
     }
 }

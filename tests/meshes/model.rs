@@ -193,7 +193,8 @@ fn strict_refuses_damage() {
             false => {
                 let note = format!("line 5: {rule}; the face is left out");
                 assert_eq!(load(&path).unwrap().notes, std::slice::from_ref(&note));
-                assert_eq!(load(&scene).unwrap().notes, [format!("a.obj: {note}")]);
+                let of_scene = format!("a.obj:5: {rule}; the face is left out");
+                assert_eq!(load(&scene).unwrap().notes, [of_scene]);
             }
         }
     }

@@ -22,6 +22,7 @@ use self::given::{Given, Rendering};
 use self::text::{plain, word};
 use super::frames::Frames;
 use super::log::{self, Level};
+use super::numbers::whole;
 use super::outputs::keep_inputs;
 use super::render::{Job, Trial, parse_duration};
 use super::{Usage, ended, option};
@@ -56,7 +57,7 @@ struct Own {
     to: Option<PathBuf>,
 
     /// Split each image into N parts [default: estimated from --task-time by a short test render]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=u32::MAX))]
     tiles: Option<u32>,
 
     /// Set the target duration of a task on a machine like this one: 90s, 1.5m, 2h

@@ -15,6 +15,7 @@ use wgray::pack::pack;
 use wgray::scene::{Define, Overrides};
 use wgray::visible::visible_lines;
 
+use super::numbers::samples;
 use super::render::parse_size;
 use super::scene_options::SceneOptions;
 use gather::Info;
@@ -38,7 +39,7 @@ pub struct Args {
     size: Option<(u32, u32)>,
 
     /// Set the number of samples per pixel
-    #[arg(long, visible_alias = "spp", value_name = "N")]
+    #[arg(long = "spp", visible_aliases = ["samples", "pixel-samples"], value_name = "N", value_parser = samples)]
     pixel_samples: Option<u32>,
 
     /// Render on auto, gpu, cpu or a device of `wgray devices`

@@ -14,6 +14,7 @@ use wgray::scene::{Define, Integrator, Overrides, Pattern, Scene, is_gltf};
 
 use crate::cli::Usage;
 use crate::cli::frames::{Frame, Frames};
+use crate::cli::numbers::{bounces, samples, whole};
 use crate::cli::outputs::{Layered, Outputs};
 use crate::cli::picture_options::PictureOptions;
 use crate::cli::progress::Mode;
@@ -32,7 +33,7 @@ pub struct Args {
     pub size: Option<(u32, u32)>,
 
     /// Set the samples per pixel
-    #[arg(long = "spp", visible_aliases = ["samples", "pixel-samples"], display_order = 2, value_name = "N", value_parser = parse_count)]
+    #[arg(long = "spp", visible_aliases = ["samples", "pixel-samples"], display_order = 2, value_name = "N", value_parser = samples)]
     pub pixel_samples: Option<u32>,
 
     /// Render on auto, gpu, cpu or a device of `wgray devices`
@@ -71,11 +72,11 @@ pub struct Args {
     pub adaptive: Option<f64>,
 
     /// Limit paths to N bounces
-    #[arg(long, help_heading = "Sampling", value_name = "N", value_parser = parse_count)]
+    #[arg(long, help_heading = "Sampling", value_name = "N", value_parser = bounces)]
     pub max_depth: Option<u32>,
 
     /// Set the samples per area light at each hit (integrator phong)
-    #[arg(long, help_heading = "Sampling", value_name = "N", value_parser = parse_count, hide_short_help = true)]
+    #[arg(long, help_heading = "Sampling", value_name = "N", value_parser = samples, hide_short_help = true)]
     pub light_samples: Option<u32>,
 
     /// Set the sampling pattern within a pixel
@@ -83,7 +84,7 @@ pub struct Args {
     pub pixel_pattern: Option<Pattern>,
 
     /// Set the seed of all random numbers
-    #[arg(long, help_heading = "Sampling", value_name = "N", value_parser = parse_count)]
+    #[arg(long, help_heading = "Sampling", value_name = "N", value_parser = whole::<u32>(0..=u32::MAX))]
     pub seed: Option<u32>,
 
     /// Render frames such as 5, 1-10 or 1-10:2, numbered by # in names
@@ -91,7 +92,7 @@ pub struct Args {
     pub frames: Option<Frames>,
 
     /// Render N frames of a camera that orbits the scene
-    #[arg(long, help_heading = "Animation", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, help_heading = "Animation", value_name = "N", value_parser = whole::<u32>(1..=100_000))]
     pub turntable: Option<u32>,
 
     /// Play glTF animations at F frames per second [default: 24 with --frames]
@@ -130,7 +131,7 @@ pub struct Args {
     pub tile: Option<Tile>,
 
     /// Exit with CODE after a lost device or SIGTERM, so that a farm retries
-    #[arg(long, help_heading = LONG_RENDERS, value_name = "CODE", value_parser = clap::value_parser!(u8).range(9..=125), hide_short_help = true)]
+    #[arg(long, help_heading = LONG_RENDERS, value_name = "CODE", value_parser = whole::<u8>(9..=125), hide_short_help = true)]
     pub requeue_exit: Option<u8>,
 
     /// Write timings and counts as JSON; - is standard output
@@ -142,7 +143,7 @@ pub struct Args {
     pub progress: Mode,
 
     /// Use N threads for the CPU and software Vulkan [default: all]
-    #[arg(long, help_heading = LONG_RENDERS, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), hide_short_help = true)]
+    #[arg(long, help_heading = LONG_RENDERS, value_name = "N", value_parser = whole::<u16>(1..=1024), hide_short_help = true)]
     pub threads: Option<u16>,
 
     /// Round in software for identical bits on more GPUs (slower, Vulkan only)
@@ -284,12 +285,6 @@ fn aov_parser() -> impl clap::builder::TypedValueParser<Value = Aov> {
         let found = Aov::ALL.into_iter().find(|aov| aov.name() == name);
         found.ok_or(format!("unknown layer: {name}"))
     })
-}
-
-/// Parses a whole number; the library checks its range.
-pub fn parse_count(text: &str) -> Result<u32, String> {
-    text.parse()
-        .map_err(|_| "must be a whole number, such as 64".to_owned())
 }
 
 /// Parses the error threshold of adaptive sampling.

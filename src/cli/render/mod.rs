@@ -26,7 +26,7 @@ use super::log::{self, Level};
 use super::outputs::Outputs;
 use super::signal::{Signals, Stop};
 use super::stats::Stats;
-use super::{Interrupted, Usage, facts_of, plain, progress};
+use super::{Interrupted, Usage, facts_of, located, plain, progress};
 
 pub use args::{Args, parse_duration, parse_size};
 pub use trial::Trial;
@@ -143,7 +143,7 @@ fn read(args: &Args, log: &OnceLog) -> anyhow::Result<Scene> {
     let invisible = scene.visibility_warnings();
     let warnings = scene.notes.iter().chain(&invisible).map(String::as_str);
     for note in warnings.chain(still) {
-        log.log_once(Level::Warning, &format!("{}: {note}", path.display()));
+        log.log_once(Level::Warning, &located(path, note));
     }
     Ok(scene)
 }

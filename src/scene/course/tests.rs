@@ -450,12 +450,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "[0, 1, 6.8]",
         "[0, 1, 2e9]",
-        "6: cam_config.position: 2e9 must be finite, from -1e9 to 1e9",
+        "6: cam_config.position: 2e9 must be from -1e9 to 1e9",
     ),
     (
         "[0, 1.98, 0]",
         "[0, 2e9, 0]",
-        "13: light_config.position: 2e9 must be finite, from -1e9 to 1e9",
+        "13: light_config.position: 2e9 must be from -1e9 to 1e9",
     ),
     (
         "[0.5, 0.25]",
@@ -490,7 +490,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "[0.7, 0, -0.5]",
         "[0.7, 0, -2e9]",
-        "28: objects[2].translate: -2e9 must be finite, from -1e9 to 1e9",
+        "28: objects[2].translate: -2e9 must be from -1e9 to 1e9",
     ),
     (
         "\"scale\": 0.5",

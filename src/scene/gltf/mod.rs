@@ -136,7 +136,7 @@ pub(super) fn describe(
         error,
     })?;
     let choice = Choice::of(&shape).map_err(SceneError::Override)?;
-    let imported = load(&whole, &root, &choice, files).map_err(|error| overrides.gltf.told(error))?;
+    let imported = load(&whole, &root, &choice, files).map_err(|error| overrides.gltf.told(error.at(path)))?;
     let presentation = &overrides.presentation;
     let camera = match view.is_some() || presentation.orbit.is_some() {
         true => None,

@@ -127,10 +127,18 @@ pub(super) fn notes(
     });
     let named = meshes.values().map(|named| (&named.file, &named.mesh));
     let of_mesh = |(file, mesh): (&String, &Arc<Mesh>)| -> Vec<String> {
-        mesh.notes.iter().map(|note| format!("{file}: {note}")).collect()
+        mesh.notes.iter().map(|note| located(file, note)).collect()
     };
     let notes: BTreeSet<String> = of_shapes.chain(named).flat_map(of_mesh).collect();
     notes.into_iter().collect()
+}
+
+/// Returns a note of a mesh with its file, as errors are located: `box.obj:8: …`.
+fn located(file: &str, note: &str) -> String {
+    match note.strip_prefix("line ") {
+        Some(line) => format!("{file}:{line}"),
+        None => format!("{file}: {note}"),
+    }
 }
 
 fn load(file: &str, normals: Option<Normals>, known: &mut Known) -> Checked<Arc<Mesh>> {
@@ -243,13 +251,18 @@ fn without_material(mesh: &Mesh, file: &str, missing: &BTreeSet<&str>) -> String
     }
     let why = match mesh.libraries.as_slice() {
         [] => "the file names no MTL file".to_owned(),
-        libraries => match libraries.iter().find(|library| library.problem.is_some()) {
-            Some(library) => {
-                let name = library.file.file_name().unwrap_or_default().display();
-                format!("its MTL file \"{name}\" cannot be read")
+        libraries => {
+            let unread = libraries
+                .iter()
+                .find_map(|library| Some((library, library.problem.as_ref()?)));
+            match unread {
+                Some((library, problem)) => {
+                    let name = library.file.file_name().unwrap_or_default().to_string_lossy();
+                    format!("its MTL file {:?} cannot be read: {problem}", cut(&name))
+                }
+                None => "its MTL files do not have it".to_owned(),
             }
-            None => "its MTL files do not have it".to_owned(),
-        },
+        }
     };
     format!("{file}: no material {names}: {why}")
 }

@@ -195,7 +195,12 @@ pub(super) fn sample_count(pattern: Pattern, count: u32) -> Checked<u32> {
     count_to_most(count)?;
     let valid = !pattern.needs_square() || count.isqrt().pow(2) == count;
     check(valid, || {
-        format!("{count} must be a square number, because its pattern is an n x n grid")
+        let (name, root) = (pattern.name(), count.isqrt());
+        let (below, above) = (root.pow(2), (root + 1).pow(2));
+        format!(
+            "{count} must be a square number, such as {below} or {above}: the pattern {name:?} is an n x n grid; \
+             other patterns take any number"
+        )
     })?;
     Ok(count)
 }

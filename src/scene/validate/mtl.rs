@@ -1,4 +1,4 @@
-//! Materials that meshes bring: what a group's MTL file says of it, as a Phong material, where the scene says nothing.
+//! Materials of the MTL files of meshes, for groups to which the scene assigns none.
 
 mod principled;
 
@@ -17,32 +17,32 @@ use super::default_material::default_materials;
 use super::{Checked, Problem, number, show};
 use crate::mesh::{Mesh, MtlMaterial, file_beside};
 
-/// What a material is like of which its file does not say it: `Kd` by Ramey, Rose and Tyerman, "MTL material format", 1995;
-/// the exponent as of a scene's own materials.
+/// Default values: `Kd` by Ramey, Rose and Tyerman, "MTL material format", 1995; the exponent of a scene's own materials.
 const DIFFUSE: f64 = 0.8;
 const NS: f64 = 16.0;
 
-/// The most characters that are told of why there is no image.
+/// Maximum length, in characters, of the reason why a map is not used.
 const MAX_MAP_MESSAGE: usize = 300;
 
-/// All materials of a scene, those of meshes behind its own.
+/// All materials of a scene: first its own, then those of meshes.
 pub(super) struct Looks<'a> {
     pub names: Vec<String>,
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
-    /// The files that the scene is made of.
+    /// The files that the scene reads.
     pub files: &'a mut BTreeSet<PathBuf>,
     images: Images<'a>,
-    /// The folder that files are named from in messages, without links.
+    /// The folder that paths in messages are relative to, with symbolic links resolved.
     folder: PathBuf,
-    /// What is known of each mesh, by its address.
+    /// The materials of each mesh, by its address.
     meshes: HashMap<usize, Described>,
     integrator: Integrator,
-    /// The materials by their file and line, and by what their mesh has.
+    /// The materials by their file, line and attributes.
     known: HashMap<(PathBuf, usize, Traits), usize>,
     /// The textures of maps.
     maps: BTreeMap<(Place, Part), usize>,
-    oddities: BTreeMap<(PathBuf, Oddity), (String, usize)>,
+    /// The first warning about each keyword of a file, and the number of materials that it applies to.
+    warnings: BTreeMap<(PathBuf, String), (String, usize)>,
     /// The material of groups that have none, for meshes without and with colors; and its index once it is used.
     defaults: [(Material, Option<usize>); 2],
     /// Notes about materials that mesh files name and no file describes.
@@ -51,14 +51,14 @@ pub(super) struct Looks<'a> {
     damage: Option<Problem>,
 }
 
-/// What a mesh has that its materials depend on.
+/// The attributes of a mesh on which its materials depend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct Traits {
     has_uvs: bool,
     has_colors: bool,
 }
 
-/// Where the materials of a mesh's groups are.
+/// The materials of a mesh's groups.
 struct Described {
     /// For each group a file of materials and a material in it, if there is one.
     places: Vec<Option<(usize, usize)>>,
@@ -66,19 +66,8 @@ struct Described {
     materials: Vec<Option<usize>>,
 }
 
-/// What is told once for each file, however many of its materials it is true of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Oddity {
-    Diffuse,
-    Bright,
-    Specular,
-    Shininess,
-    Map,
-    Other(&'static str),
-}
-
 impl<'a> Looks<'a> {
-    /// The scene's own materials and textures, with the images that they have.
+    /// Starts with the scene's own materials and textures, and the images that they use.
     pub fn new(
         (names, materials): (Vec<String>, Vec<Material>),
         textures: Vec<Texture>,
@@ -97,7 +86,7 @@ impl<'a> Looks<'a> {
             meshes: HashMap::new(),
             known: HashMap::new(),
             maps: BTreeMap::new(),
-            oddities: BTreeMap::new(),
+            warnings: BTreeMap::new(),
             defaults: default_materials(integrator).map(|material| (material, None)),
             integrator,
             unmatched: BTreeSet::new(),
@@ -115,7 +104,7 @@ impl<'a> Looks<'a> {
         })
     }
 
-    /// Takes note of a mesh, and of the files that it names, whether or not anything is taken from there.
+    /// Registers a mesh and the files that it names, whether or not they are used.
     pub fn know(&mut self, mesh: &Arc<Mesh>) {
         let address = Arc::as_ptr(mesh).addr();
         if self.meshes.contains_key(&address) {
@@ -133,7 +122,7 @@ impl<'a> Looks<'a> {
         }
     }
 
-    /// The material that a mesh's file gives to a group of it.
+    /// Returns the material that a mesh's file gives to a group.
     pub fn of_group(&mut self, mesh: &Arc<Mesh>, group: usize) -> Option<usize> {
         let address = Arc::as_ptr(mesh).addr();
         let described = self.meshes.get(&address)?;
@@ -174,49 +163,50 @@ impl<'a> Looks<'a> {
         Ok(())
     }
 
-    /// What is odd about the materials that are used.
+    /// Returns the warnings about the materials that are used.
     pub fn notes(self) -> impl Iterator<Item = String> {
-        let oddities = self.oddities.into_values().map(|(first, count)| match count {
+        let warnings = self.warnings.into_values().map(|(first, count)| match count {
             1 => first,
             2 => format!("{first} (and 1 more material)"),
             _ => format!("{first} (and {} more materials)", count - 1),
         });
-        self.images.notes.into_iter().chain(self.unmatched).chain(oddities)
+        self.images.notes.into_iter().chain(self.unmatched).chain(warnings)
     }
 
-    /// `Ka` is not looked at: exporters write what they like there, and one ambient light wants the colour of the surface.
+    /// Returns a Phong material. `Ka` is ignored, as exporters write anything there; ambient light uses `Kd`.
     fn phong(&mut self, own: &MtlMaterial, file: &Path, has_uvs: bool) -> Material {
-        let mut odd = Vec::new();
-        let mut color = |name: &str, color: Option<[f64; 3]>, default: f64, oddity: Oddity| {
+        let mut warnings = Warnings::default();
+        let mut color = |name: &'static str, color: Option<[f64; 3]>, default: f64| {
             let color = color.map_or(DVec3::splat(default), DVec3::from);
             let inside = color.clamp(DVec3::ZERO, DVec3::splat(BRIGHTEST));
             if inside != color {
                 let (color, limit, inside) = (show(color), number(BRIGHTEST), show(inside));
-                let rule = format!("each of {color} must be from 0 to {limit}; {inside} stands for it");
-                odd.push((oddity, format!("{name}: {rule}")));
+                let rule = format!("each of {color} must be from 0 to {limit}; {inside} stands in");
+                warnings.add(name, rule);
+            } else if name == "Kd" && color.max_element() > 1.0 {
+                let rule = format!("{} is used, but colors of MTL files are from 0 to 1", show(color));
+                warnings.add(name, rule);
             }
             inside
         };
-        let diffuse = color("Kd", own.diffuse, DIFFUSE, Oddity::Diffuse);
+        let diffuse = color("Kd", own.diffuse, DIFFUSE);
         // Models 0 and 1 have no highlights.
         let specular = match own.illumination {
             Some(0 | 1) => DVec3::ZERO,
-            _ => color("Ks", own.specular, 0.0, Oddity::Specular),
+            _ => color("Ks", own.specular, 0.0),
         };
-        if diffuse.max_element() > 1.0 {
-            let rule = "is rendered so, but colours of MTL files are from 0 to 1";
-            odd.push((Oddity::Bright, format!("Kd: {} {rule}", show(diffuse))));
-        }
         let exponent = own.shininess.unwrap_or(NS);
         let shininess = exponent.clamp(SHININESS.0, SHININESS.1);
         if shininess != exponent && specular != DVec3::ZERO {
             let [exponent, low, high, inside] = [exponent, SHININESS.0, SHININESS.1, shininess].map(number);
-            let rule = format!("Ns: {exponent} must be from {low} to {high}; {inside} stands for it");
-            odd.push((Oddity::Shininess, rule));
+            warnings.add(
+                "Ns",
+                format!("{exponent} must be from {low} to {high}; {inside} stands in"),
+            );
         }
         let needs_path = [
             (own.emission.is_some_and(|emission| emission != [0.0; 3]), "Ke"),
-            (own.opacity.is_some_and(|opacity| opacity < 1.0), "d or Tr"),
+            (own.opacity.is_some_and(|opacity| opacity < 1.0), "d"),
             (own.emission_map.is_some(), "map_Ke"),
             (own.opacity_map.is_some(), "map_d"),
             (own.bump_map.is_some(), "map_Bump"),
@@ -225,29 +215,16 @@ impl<'a> Looks<'a> {
             (own.roughness_map.is_some(), "map_Pr"),
         ];
         for (_, name) in needs_path.into_iter().filter(|(is_given, _)| *is_given) {
-            odd.push((
-                Oddity::Other(name),
-                format!("{name} is ignored: it needs integrator = \"path\""),
-            ));
+            warnings.add(name, "ignored: it needs integrator = \"path\"");
         }
-        for other in &own.others {
-            let verb = if other.starts_with("the ") { "are" } else { "is" };
-            odd.push((Oddity::Other(other), format!("{other} {verb} ignored")));
-        }
-        let texture = own.diffuse_map.as_ref().map(|map| match has_uvs {
-            true => self.map(&beside(file, map), Part::Colors(None)),
-            false => Err("the mesh has no texture coordinates".to_owned()),
+        warnings.ignored(own);
+        let map = own.diffuse_map.as_ref();
+        let texture = map.and_then(|map| {
+            let found = self.map(&beside(file, map), Part::Colors(None), has_uvs);
+            warnings.of_map("map_Kd", found, "Kd stands in")
         });
-        let diffuse = match texture {
-            None => Color::Plain(diffuse),
-            Some(Ok(texture)) => Color::Texture(texture),
-            Some(Err(why)) => {
-                let why = cut_to(MAX_MAP_MESSAGE, &why);
-                odd.push((Oddity::Map, format!("map_Kd: {why}; Kd stands for it")));
-                Color::Plain(diffuse)
-            }
-        };
-        self.tell(own, file, odd);
+        let diffuse = texture.map_or(Color::Plain(diffuse), Color::Texture);
+        self.warn(own, file, warnings);
         Material {
             reflection: Reflection::Phong {
                 ambient: diffuse,
@@ -261,40 +238,43 @@ impl<'a> Looks<'a> {
         }
     }
 
-    /// Returns the message of an image that cannot be used, and records it if damage is refused.
-    fn refuse(&mut self, problem: Problem) -> String {
-        let message = problem.message.clone();
-        if problem.is_damage && self.images.assets.strict {
-            self.damage.get_or_insert(Problem::damage(&*message));
-        }
-        message
-    }
-
     /// Returns the first damaged image, if damage is refused.
     pub fn damage(&mut self) -> Option<Problem> {
         self.damage.take()
     }
 
-    /// Records warnings about a material.
-    fn tell(&mut self, own: &MtlMaterial, file: &Path, odd: principled::Odd) {
-        let place = format!("{}:{}: {:?}", self.shown(file).display(), own.line, cut(&own.name));
-        for (oddity, message) in odd {
-            let told = self.oddities.entry((file.to_owned(), oddity));
-            told.or_insert_with(|| (format!("{place}: {message}"), 0)).1 += 1;
+    /// Records warnings about a material, and damage if it is refused.
+    fn warn(&mut self, own: &MtlMaterial, file: &Path, warnings: Warnings) {
+        let is_strict = self.images.assets.strict;
+        for Warning {
+            keyword,
+            message,
+            is_damage,
+        } in warnings.0
+        {
+            let line = own.lines.get(&keyword).unwrap_or(&own.line);
+            let place = format!("{}:{line}: material {:?}", self.shown(file).display(), cut(&own.name));
+            let message = format!("{place}: {keyword}: {message}");
+            if is_damage && is_strict {
+                self.damage.get_or_insert_with(|| Problem::damage(&*message));
+            }
+            let known = self.warnings.entry((file.to_owned(), keyword));
+            known.or_insert((message, 0)).1 += 1;
         }
     }
 
-    /// Returns the texture of a part of an image, or why there is none.
-    fn map(&mut self, path: &Path, part: Part) -> Result<usize, String> {
+    /// Returns the texture of a part of an image.
+    fn map(&mut self, path: &Path, part: Part, has_uvs: bool) -> Checked<usize> {
+        if !has_uvs {
+            return Err(Problem::new("the mesh has no texture coordinates"));
+        }
         let file = self.shown(path).to_string_lossy().into_owned();
-        let place = self.images.assets.find(&file);
-        let place = place.map_err(|problem| self.refuse(problem))?;
+        let place = self.images.assets.find(&file)?;
         if let Some(texture) = self.maps.get(&(place.clone(), part)) {
             return Ok(*texture);
         }
         let image = ImageTextureDescription::new(file);
-        let texture = image_texture(&image, part, &mut self.images);
-        let texture = texture.map_err(|problem| self.refuse(problem))?;
+        let texture = image_texture(&image, part, &mut self.images)?;
         self.textures.push(texture);
         self.maps.insert((place, part), self.textures.len() - 1);
         Ok(self.textures.len() - 1)
@@ -302,6 +282,51 @@ impl<'a> Looks<'a> {
 
     fn shown<'p>(&self, path: &'p Path) -> &'p Path {
         shown(&self.folder, path)
+    }
+}
+
+/// A warning about a keyword of a material.
+struct Warning {
+    keyword: String,
+    message: String,
+    /// True for a damaged or missing file, which can be refused.
+    is_damage: bool,
+}
+
+/// Warnings about a material: at most one per keyword.
+#[derive(Default)]
+struct Warnings(Vec<Warning>);
+
+impl Warnings {
+    fn add(&mut self, keyword: impl Into<String>, message: impl Into<String>) {
+        self.push(keyword.into(), message.into(), false);
+    }
+
+    fn push(&mut self, keyword: String, message: String, is_damage: bool) {
+        if !self.0.iter().any(|known| known.keyword == keyword) {
+            self.0.push(Warning {
+                keyword,
+                message,
+                is_damage,
+            });
+        }
+    }
+
+    /// Adds the statements that have no effect.
+    fn ignored(&mut self, own: &MtlMaterial) {
+        for other in &own.others {
+            self.add(other.as_str(), "ignored");
+        }
+    }
+
+    /// Returns the texture of a map. A map that cannot be used is a warning.
+    fn of_map(&mut self, keyword: &str, found: Checked<usize>, stand_in: &str) -> Option<usize> {
+        found
+            .map_err(|problem| {
+                let why = cut_to(MAX_MAP_MESSAGE, &problem.message);
+                self.push(keyword.to_owned(), format!("{why}; {stand_in}"), problem.is_damage);
+            })
+            .ok()
     }
 }
 
@@ -325,12 +350,12 @@ impl Described {
     }
 }
 
-/// A file that an MTL file names.
+/// Returns the path of a file that an MTL file names.
 fn beside(library: &Path, name: &str) -> PathBuf {
     file_beside(library.parent().unwrap_or(Path::new("")), name)
 }
 
-/// A path as it is shown: from the scene's folder if it is in there.
+/// Returns a path for messages: relative to the scene's folder if it is inside.
 fn shown<'p>(folder: &Path, path: &'p Path) -> &'p Path {
     path.strip_prefix(folder).unwrap_or(path)
 }

@@ -126,3 +126,22 @@ fn scenes_without_shapes_are_reported_unless_they_show_an_environment_map() {
     let gray = GRAY.replace("[0.5, 0.5, 0.5]", "[0.5, 0.5, 0.5]\nvisible = false");
     assert_eq!(warnings(&format!("{CAMERA}{PATH}{gray}{LIGHT}{hidden}")), [NOT_IN_VIEW]);
 }
+
+#[test]
+fn paths_without_bounces_show_only_emission() {
+    let scene = |depth: u32, more: &str| {
+        let render = format!("[render]\nintegrator = 'path'\nmax_depth = {depth}\n");
+        warnings(&format!("{CAMERA}{render}{GRAY}{LIGHT}{more}{}", sphere([0.0; 3])))
+    };
+    let [warning] = &scene(0, "")[..] else {
+        panic!("{:?}", scene(0, ""))
+    };
+    assert!(
+        warning.starts_with("render.max_depth is 0, so only emission is shown"),
+        "{warning}"
+    );
+    assert_eq!(scene(1, ""), [""; 0]);
+    let emissive = GRAY.replace("gray", "lit") + "emission = [0, 1, 0]\n";
+    let lit = sphere([3.0, 0.0, 0.0]).replace("gray", "lit");
+    assert_eq!(scene(0, &format!("{emissive}{lit}")), [""; 0]);
+}

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::super::super::error::cut_to;
 use super::super::super::image_file::Part;
 use super::super::super::limits::BRIGHTEST;
 use super::super::super::{
@@ -14,11 +13,8 @@ use super::super::super::{
 };
 use super::super::principled::dielectric;
 use super::super::{number, show};
-use super::{DIFFUSE, Looks, MAX_MAP_MESSAGE, Oddity, Traits, beside};
+use super::{DIFFUSE, Looks, Traits, Warnings, beside};
 use crate::mesh::MtlMaterial;
-
-/// Warnings about a material.
-pub(super) type Odd = Vec<(Oddity, String)>;
 
 /// A factor of `Ks` that makes 0.5, which exporters write for common dielectrics, their reflectance.
 const SPECULAR: f64 = 2.0;
@@ -26,64 +22,52 @@ const SPECULAR: f64 = 2.0;
 impl Looks<'_> {
     /// Returns a material. `Ka` is ignored, as exporters write anything there.
     pub(super) fn principled(&mut self, own: &MtlMaterial, file: &Path, traits: Traits) -> Material {
-        let mut odd = Odd::new();
-        let clamped = |odd: &mut Odd, name: &'static str, color: [f64; 3], limit: f64| {
+        let mut warnings = Warnings::default();
+        let clamped = |warnings: &mut Warnings, name: &'static str, color: [f64; 3], limit: f64| {
             let color = DVec3::from(color);
             let inside = color.clamp(DVec3::ZERO, DVec3::splat(limit));
             if inside != color {
                 let (color, limit, inside) = (show(color), number(limit), show(inside));
-                let rule = format!("{name}: each of {color} must be from 0 to {limit}; {inside} stands in");
-                odd.push((Oddity::Other(name), rule));
+                let rule = format!("each of {color} must be from 0 to {limit}; {inside} stands in");
+                warnings.add(name, rule);
             }
             inside
         };
-        let share = |odd: &mut Odd, name: &'static str, value: f64| {
+        let share = |warnings: &mut Warnings, name: &'static str, value: f64| {
             let inside = value.clamp(0.0, 1.0);
             if inside != value {
-                let rule = format!("{name}: {} must be from 0 to 1; {inside} stands in", number(value));
-                odd.push((Oddity::Other(name), rule));
+                let rule = format!("{} must be from 0 to 1; {inside} stands in", number(value));
+                warnings.add(name, rule);
             }
             inside
         };
-        let diffuse = clamped(&mut odd, "Kd", own.diffuse.unwrap_or([DIFFUSE; 3]), 1.0);
-        let emission = clamped(&mut odd, "Ke", own.emission.unwrap_or_default(), BRIGHTEST);
+        let diffuse = clamped(&mut warnings, "Kd", own.diffuse.unwrap_or([DIFFUSE; 3]), 1.0);
+        let emission = clamped(&mut warnings, "Ke", own.emission.unwrap_or_default(), BRIGHTEST);
         let has_factors = own.metallic.is_some() || own.roughness.is_some();
         let has_maps = own.metallic_map.is_some() || own.roughness_map.is_some();
         let specular = match (own.illumination, own.specular) {
             (Some(0 | 1), _) => 0.0,
             (_, Some(color)) => {
-                let mean = clamped(&mut odd, "Ks", color, BRIGHTEST).element_sum() / 3.0;
+                let mean = clamped(&mut warnings, "Ks", color, BRIGHTEST).element_sum() / 3.0;
                 (SPECULAR * mean).min(1.0)
             }
             (_, None) => f64::from(has_factors || has_maps),
         };
         let roughness = match (own.roughness, own.shininess) {
-            (Some(roughness), _) => share(&mut odd, "Pr", roughness),
+            (Some(roughness), _) => share(&mut warnings, "Pr", roughness),
             // The width of a microfacet highlight by the exponent of a Blinn-Phong one.
             (None, Some(exponent)) => (2.0 / (exponent.max(0.0) + 2.0)).powf(0.25),
             (None, None) => 1.0,
         };
-        let opacity = share(&mut odd, "d", own.opacity.unwrap_or(1.0));
-        let metallic = share(&mut odd, "Pm", own.metallic.unwrap_or(0.0));
-        for other in &own.others {
-            let verb = if other.starts_with("the ") { "are" } else { "is" };
-            odd.push((Oddity::Other(other), format!("{other} {verb} ignored")));
+        let opacity = share(&mut warnings, "d", own.opacity.unwrap_or(1.0));
+        let metallic = share(&mut warnings, "Pm", own.metallic.unwrap_or(0.0));
+        if opacity == 0.0 && own.opacity_map.is_none() {
+            warnings.add("d", "0 makes the material invisible; it is opaque at 1");
         }
+        warnings.ignored(own);
         let mut map = |name: &'static str, map: &Option<String>, part: Part| {
-            let map = map.as_ref()?;
-            let found = match traits.has_uvs {
-                true => self.map(&beside(file, map), part),
-                false => Err("the mesh has no texture coordinates".to_owned()),
-            };
-            let why = match found {
-                Ok(texture) => return Some(texture),
-                Err(why) => why,
-            };
-            odd.push((
-                Oddity::Other(name),
-                format!("{name}: {}; it is ignored", cut_to(MAX_MAP_MESSAGE, &why)),
-            ));
-            None
+            let found = self.map(&beside(file, map.as_ref()?), part, traits.has_uvs);
+            warnings.of_map(name, found, "it is ignored")
         };
         let colors = Part::Colors(None);
         let linear = Part::Colors(Some(Encoding::Linear));
@@ -98,9 +82,9 @@ impl Looks<'_> {
         let roughness_map = map("map_Pr", &own.roughness_map, linear);
         let normal = map("norm", &own.normal_map, linear);
         let bump = normal.or_else(|| map("map_Bump", &own.bump_map, linear));
-        let alpha = self.opacity(own, file, traits, &mut odd);
-        let normal_map = bump.filter(|texture| normal.is_some() || self.has_directions(*texture, &mut odd));
-        self.tell(own, file, odd);
+        let alpha = self.opacity(own, file, traits, &mut warnings);
+        let normal_map = bump.filter(|texture| normal.is_some() || self.has_directions(*texture, &mut warnings));
+        self.warn(own, file, warnings);
         let is_opaque = alpha.is_none() && opacity == 1.0;
         Material {
             reflection: Reflection::Principled(Box::new(Principled {
@@ -122,26 +106,18 @@ impl Looks<'_> {
     }
 
     /// Returns the opacity by `map_d`: the alpha channel of its image, or its red if it has none.
-    fn opacity(&mut self, own: &MtlMaterial, file: &Path, traits: Traits, odd: &mut Odd) -> Option<Value> {
+    fn opacity(&mut self, own: &MtlMaterial, file: &Path, traits: Traits, warnings: &mut Warnings) -> Option<Value> {
         let path = beside(file, own.opacity_map.as_ref()?);
-        let linear = Part::Colors(Some(Encoding::Linear));
-        let found = match traits.has_uvs {
-            true => (self
-                .map(&path, Part::Alpha)
-                .map(|texture| Value::Texture(texture, Channel::A)))
-            .or_else(|_| Ok(Value::Texture(self.map(&path, linear)?, Channel::R))),
-            false => Err("the mesh has no texture coordinates".to_owned()),
-        };
-        found
-            .map_err(|why| {
-                let why = cut_to(MAX_MAP_MESSAGE, &why);
-                odd.push((Oddity::Other("map_d"), format!("map_d: {why}; it is ignored")));
-            })
-            .ok()
+        if let Ok(texture) = self.map(&path, Part::Alpha, traits.has_uvs) {
+            return Some(Value::Texture(texture, Channel::A));
+        }
+        let red = self.map(&path, Part::Colors(Some(Encoding::Linear)), traits.has_uvs);
+        let texture = warnings.of_map("map_d", red, "it is ignored")?;
+        Some(Value::Texture(texture, Channel::R))
     }
 
     /// Returns whether an image has normals: a gray one has heights, which are not supported.
-    fn has_directions(&self, texture: usize, odd: &mut Odd) -> bool {
+    fn has_directions(&self, texture: usize, warnings: &mut Warnings) -> bool {
         let has_colors = match &self.textures[texture].kind {
             TextureKind::Image { image, .. } => match &image.texels {
                 Texels::Bytes(_, texels) => texels.iter().any(|[r, g, b]| r != g || g != b),
@@ -150,8 +126,8 @@ impl Looks<'_> {
             _ => false,
         };
         if !has_colors {
-            let rule = "map_Bump: a map of heights is ignored; bake a normal map, and name it by norm";
-            odd.push((Oddity::Other("map_Bump"), rule.to_owned()));
+            let rule = "a map of heights is ignored; bake a normal map, and name it by norm";
+            warnings.add("map_Bump", rule);
         }
         has_colors
     }

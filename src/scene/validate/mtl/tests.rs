@@ -160,44 +160,45 @@ fn what_cannot_be_rendered_is_told_once() {
     for (mtl, told) in [
         (
             "Kd -1 0 0",
-            "\"red\": Kd: each of [-1, 0, 0] must be from 0 to 1e6; [0, 0, 0] stands for it",
+            "\"red\": Kd: each of [-1, 0, 0] must be from 0 to 1e6; [0, 0, 0] stands in",
         ),
         (
             "Kd 255 0 0.5",
-            "\"red\": Kd: [255, 0, 0.5] is rendered so, but colours of MTL files are from 0 to 1",
+            "\"red\": Kd: [255, 0, 0.5] is used, but colors of MTL files are from 0 to 1",
         ),
         (
             "Ks 0 2e6 0",
-            "\"red\": Ks: each of [0, 2e6, 0] must be from 0 to 1e6; [0, 1e6, 0] stands for it",
+            "\"red\": Ks: each of [0, 2e6, 0] must be from 0 to 1e6; [0, 1e6, 0] stands in",
         ),
-        (
-            "Ks 1\nNs 0",
-            "\"red\": Ns: 0 must be from 1e-6 to 1e6; 1e-6 stands for it",
-        ),
+        ("Ks 1\nNs 0", "\"red\": Ns: 0 must be from 1e-6 to 1e6; 1e-6 stands in"),
         (
             "Ks 1\nNs 1e9",
-            "\"red\": Ns: 1e9 must be from 1e-6 to 1e6; 1e6 stands for it",
+            "\"red\": Ns: 1e9 must be from 1e-6 to 1e6; 1e6 stands in",
         ),
-        ("Ke 0 0 2", "\"red\": Ke is ignored: it needs integrator = \"path\""),
-        ("Tr 0.5", "\"red\": d or Tr is ignored: it needs integrator = \"path\""),
+        ("Ke 0 0 2", "\"red\": Ke: ignored: it needs integrator = \"path\""),
+        ("Tr 0.5", "\"red\": d: ignored: it needs integrator = \"path\""),
         (
             "map_bump b.png",
-            "\"red\": map_Bump is ignored: it needs integrator = \"path\"",
+            "\"red\": map_Bump: ignored: it needs integrator = \"path\"",
         ),
         ("map_Kd none.png", "\"red\": map_Kd: \"in/none.png\" cannot be read: "),
         (
             "map_Kd damaged.png",
-            "\"red\": map_Kd: \"in/damaged.png\" must be a PNG, JPEG, WebP, EXR or HDR file; Kd stands for it",
+            "\"red\": map_Kd: \"in/damaged.png\" must be a PNG, JPEG, WebP, EXR or HDR file; Kd stands in",
         ),
         ("map_Kd ../../outside.png", "\"red\": map_Kd: \"in/../../outside.png\" "),
-        ("map_Kd -s 2 red wood.png", "\"red\": the options of map_Kd are ignored"),
+        ("map_Kd -s 2 red wood.png", "\"red\": option \"-s\" of map_Kd: ignored"),
+        ("disp a.png", "\"red\": disp: ignored"),
     ] {
         let place = Place::new(&format!("newmtl red\n{mtl}\n# all of it\nnewmtl blue\n"));
         let scene = place.scene(MESH).unwrap();
         let [note] = &scene.notes[..] else {
             panic!("{:?}", scene.notes)
         };
-        assert!(note.starts_with(&format!("in/a.mtl:1: {told}")), "{note}\n{told}");
+        // The warning is about the last line of `mtl`.
+        let line = 1 + mtl.lines().count();
+        let start = format!("in/a.mtl:{line}: material {told}");
+        assert!(note.starts_with(&start), "{note}\n{start}");
         // The other material has it too.
         let place = Place::new(&format!("newmtl red\n{mtl}\nnewmtl blue\n{mtl}\n"));
         let notes = place.scene(MESH).unwrap().notes;
@@ -218,7 +219,7 @@ fn a_map_needs_texture_coordinates() {
     let place = Place::new("newmtl red\nKd 1 0 0\nmap_Kd red wood.png\nnewmtl blue\n");
     place.write("in/a.obj", &OBJ.replace("/1", ""));
     let scene = place.scene(MESH).unwrap();
-    let told = "in/a.mtl:1: \"red\": map_Kd: the mesh has no texture coordinates; Kd stands for it";
+    let told = "in/a.mtl:3: material \"red\": map_Kd: the mesh has no texture coordinates; Kd stands in";
     assert_eq!(scene.notes, [told]);
     assert_eq!(phong(named(&scene, "red")).1, Color::Plain(DVec3::X));
 }
@@ -234,8 +235,9 @@ fn a_default_stands_in_for_missing_materials() {
     let gray = Color::Plain(DVec3::splat(0.8));
     assert_eq!(phong(named(&scene, "default")).1, gray);
     fs::remove_file(place.path("in/a.mtl")).unwrap();
-    let start = "in/a.obj: no material \"blue\", \"red\": its MTL file \"a.mtl\" cannot be read; ";
-    assert!(notes("").iter().any(|note| note.starts_with(start)), "{:?}", notes(""));
+    let start = "in/a.obj: no material \"blue\", \"red\": its MTL file \"a.mtl\" cannot be read: ";
+    let found = notes("");
+    assert!(found.len() == 1 && found[0].starts_with(start), "{found:?}");
     place.write("in/a.obj", &OBJ.replace("mtllib a.mtl\n", ""));
     let expected = note("\"blue\": the file names no MTL file");
     assert_eq!(notes("materials = { red = 'own' }"), [expected]);

@@ -33,7 +33,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "pixel_samples = { count = 5 }",
         "pixel_samples = { pattern = 'grid', count = 5 }",
-        "render.pixel_samples.count: 5 must be a square number, because its pattern is an n x n grid",
+        "render.pixel_samples.count: 5 must be a square number, such as 4 or 9: the pattern \"grid\" is an n x n grid; other patterns take any number",
     ),
     (
         "pixel_samples = { count = 5 }",
