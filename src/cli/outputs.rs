@@ -224,6 +224,13 @@ impl Outputs {
         all.filter_map(|(option, output)| Some((option, output.name(), output.path()?)))
     }
 
+    /// Returns the name of the first image whose format has no alpha.
+    pub fn without_alpha(&self) -> Option<&str> {
+        let is_opaque = |picture: &&Picture| picture.format == Format::Jpeg;
+        let (_, output) = self.pictures.iter().find(is_opaque)?.files.first()?;
+        Some(output.name())
+    }
+
     /// Returns the names of the images or the part, for messages.
     pub fn images(&self) -> Vec<String> {
         let pictures = self.pictures.iter().flat_map(|picture| &picture.files);

@@ -90,6 +90,17 @@ fn one_render_writes_several_pictures() {
 }
 
 #[test]
+fn a_format_without_alpha_is_noted() {
+    let place = Place::new();
+    place.write("clear.toml", &path_scene());
+    for (name, is_noted) in [("a.jpg", true), ("a.png", false)] {
+        let ran = place.run(&["render", "clear.toml", "--device", "cpu", "-o", name]);
+        let note = "a.jpg: JPEG has no alpha; the transparent background is black";
+        assert_eq!((ran.code, ran.stderr.contains(note)), (0, is_noted), "{name}: {}", ran.stderr);
+    }
+}
+
+#[test]
 fn a_picture_that_fails_leaves_none_of_the_others() {
     let place = Place::new();
     let ran = place.run(&[

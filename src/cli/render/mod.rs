@@ -93,6 +93,11 @@ impl<'a> Job<'a> {
         let scene = read(args, &log)?;
         let fps = args.fps(&scene)?;
         check(args, &scene, frames.iter().map(|(frame, outputs)| (frame, outputs)))?;
+        let opaque = frames.iter().find_map(|(_, outputs)| outputs.without_alpha());
+        if let (true, Some(name)) = (scene.render.alpha, opaque) {
+            let note = format!("{name}: JPEG has no alpha; the transparent background is black (use .png, .webp or .exr)");
+            log.log_once(Level::Warning, &note);
+        }
         Ok(Job {
             args,
             log,
