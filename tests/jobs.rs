@@ -10,7 +10,7 @@ use wgray::cpu::Cpu;
 use wgray::error::RenderError;
 use wgray::film::{Film, Region};
 use wgray::job::checkpoint::{Checkpoint, CheckpointError, Opening};
-use wgray::job::{Bands, CheckpointStore, Cut, Flow, Identity, Order, Piece, StoredPiece, Tile};
+use wgray::job::{Bands, CheckpointStore, Cut, Flow, Identity, NoCheckpoint, Order, Piece, StoredPiece, Tile};
 use wgray::pack::Packed;
 
 use crate::contract::{bits, subjects};
@@ -193,6 +193,79 @@ fn when_the_time_is_up_every_pixel_has_a_sample() {
             pixels += band.film.region.pixels();
         }
         assert_eq!(pixels, region.pixels());
+    }
+}
+
+/// The film of the first samples of all pixels.
+fn of_samples(packed: &Packed, samples: u32) -> Film {
+    let (mut cpu, region) = (Cpu::new(packed), whole(packed));
+    let pilot = cpu.samples_of_all().min(samples);
+    cpu.begin(region).expect("a film");
+    cpu.render(region, 0..pilot).expect("samples");
+    cpu.render(region, pilot..samples).expect("samples");
+    cpu.film().expect("a film")
+}
+
+fn last_pass(bands: &mut Bands) -> Film {
+    let mut films = Vec::new();
+    let mut output = |band: wgray::job::Finished| {
+        films.push(band.film);
+        Ok(())
+    };
+    bands.last_pass(&mut output).expect("a pass");
+    let mut films = films.into_iter();
+    let mut all = films.next().expect("a band");
+    for film in films {
+        all.region.y1 = film.region.y1;
+        for (list, of_band) in all.lists_mut().zip(film.lists()) {
+            list.extend(of_band);
+        }
+    }
+    all
+}
+
+/// Every pass ends with the film of its samples, and a pass that is interrupted, even several times, leaves the film of the
+/// pass before it.
+#[test]
+fn the_last_pass_is_a_whole_image_of_its_samples() {
+    for packed in subjects() {
+        assert!(
+            bits(&of_samples(&packed, 3)) != bits(&of_samples(&packed, 4)),
+            "the control"
+        );
+        for way in pictures::exact_ways() {
+            for cut in cuts() {
+                let mut backend = pictures::backend(&packed, way);
+                let (region, most) = (whole(&packed), backend.largest_film());
+                let mut no_checkpoint = NoCheckpoint;
+                let order = Order::Pixels;
+                let bands = Bands::new(region, packed.pixel_samples, &cut, order, most, &mut no_checkpoint);
+                let mut bands = bands.in_passes(packed.form()).expect("memory");
+                let (mut calls, mut passes, mut interrupted) = (0, vec![0], 0);
+                let mut watch = |_: &mut dyn Backend, _: Region, _: f64| {
+                    calls += 1;
+                    Ok(Flow::from(calls % 3 != 0))
+                };
+                loop {
+                    match bands.next_pass(&mut *backend, &mut watch, &mut || {}) {
+                        Ok(None) => break,
+                        Ok(Some(samples)) => passes.push(samples),
+                        Err(RenderError::Cancelled) => interrupted += 1,
+                        Err(error) => panic!("{error}"),
+                    }
+                    let samples = bands.passed_samples();
+                    assert_eq!(Some(&samples), passes.last());
+                    if samples > 0 {
+                        let (found, wanted) = (last_pass(&mut bands), of_samples(&packed, samples));
+                        assert!(bits(&found) == bits(&wanted), "{way:?}, {cut:?}, {samples} samples");
+                    }
+                }
+                assert!(interrupted > 0 && passes.is_sorted(), "{interrupted}, {passes:?}");
+                for samples in [1, 2, 4, 8, 16, 32, packed.pixel_samples] {
+                    assert!(passes.contains(&samples), "{passes:?}");
+                }
+            }
+        }
     }
 }
 

@@ -1,12 +1,32 @@
 //! Metadata of images: the program, the scene and the settings that made them.
 
+use std::path::Path;
 use std::time::Duration;
 
 use wgray::device::DeviceInfo;
-use wgray::image::Metadata;
+use wgray::image::{Metadata, read_metadata};
 use wgray::job::{hash_of_scene, hash_of_shaders};
 use wgray::pack::Packed;
 use wgray::scene::Scene;
+
+/// Name of the mark of an image that was written before it was complete: `32 of 64 samples`.
+const PARTIAL: &str = "partial";
+
+/// Returns true if a file is an image that was written before it was complete.
+pub fn is_partial(path: &Path) -> bool {
+    read_metadata(path).is_some_and(|metadata| metadata.get(PARTIAL).is_some())
+}
+
+/// Returns the samples per pixel of an image file, the maximum under adaptive sampling; `None` if wgray did not write it.
+pub fn samples_of(path: &Path) -> Option<u32> {
+    let metadata = read_metadata(path)?;
+    let text = match (metadata.get(PARTIAL), metadata.get("adaptive")) {
+        (Some(partial), _) => partial,
+        (None, Some(adaptive)) => adaptive.split_once("up to ")?.1,
+        (None, None) => metadata.get("pixel_samples")?,
+    };
+    text.split(' ').next()?.parse().ok()
+}
 
 /// Metadata that is known before rendering.
 pub struct RenderMetadata {
@@ -45,6 +65,15 @@ impl RenderMetadata {
     /// Returns the metadata that does not depend on the device.
     pub fn lasting(&self) -> Metadata {
         self.metadata.clone()
+    }
+
+    /// Returns the metadata of an image with fewer samples than requested, see [`RenderMetadata::on`].
+    pub fn partial(&self, device: &DeviceInfo, reproducible: bool, (samples, of): (u32, u32)) -> Metadata {
+        let mut metadata = self.on(device, reproducible);
+        metadata
+            .pairs
+            .push((PARTIAL.to_owned(), format!("{samples} of {of} samples")));
+        metadata
     }
 
     /// Returns the metadata, including the device except under `--reproducible`.

@@ -9,6 +9,7 @@ use wgray::film::Region;
 use wgray::image::{self, Aov, Format, Layers, Output, Pending, Target};
 
 use super::Usage;
+use super::metadata::is_partial;
 use super::picture_options::PictureOptions;
 
 /// The destinations of a render.
@@ -24,6 +25,12 @@ struct Picture {
     format: Format,
     /// The image, then its AOVs that are separate files, each with the option that requests it.
     files: Vec<(String, Output)>,
+}
+
+impl Picture {
+    fn is_rewritable(&self) -> bool {
+        self.files.iter().all(|(_, output)| output.is_file())
+    }
 }
 
 /// Opened destinations.
@@ -124,7 +131,7 @@ impl Outputs {
         let mut files = self.pictures.iter().flat_map(|picture| &picture.files);
         let of_others = |(_, output): &&(String, Output)| {
             let path = output.path().filter(|path| path.exists());
-            path.is_some_and(|path| !image::is_written_by_wgray(path))
+            path.is_some_and(|path| image::read_metadata(path).is_none())
         };
         match files.find(of_others) {
             Some((_, output)) => Err(Usage(format!(
@@ -199,14 +206,33 @@ impl Outputs {
         Ok(())
     }
 
-    /// Returns true if all files exist, which means that they are complete. Image streams never exist; a statistics stream is
-    /// ignored.
+    /// Returns true if all files exist and no image is partial. Image streams never exist; a statistics stream is ignored.
     pub fn exist(&self) -> bool {
         let exists = |output: &Output| output.path().is_some_and(Path::is_file);
-        let pictures = self.pictures.iter().flat_map(|picture| &picture.files);
+        let mut pictures = self.pictures.iter().flat_map(|picture| &picture.files);
         let figures = self.stats.iter().filter(|stats| stats.is_file());
-        let mut all = pictures.map(|(_, output)| output).chain(&self.part).chain(figures);
-        all.all(exists)
+        self.part.iter().chain(figures).all(exists)
+            && pictures.all(|(_, output)| exists(output) && !output.path().is_some_and(is_partial))
+    }
+
+    /// Returns the images that are files, which can be written more than once: the format, the image and its layers.
+    pub fn rewritable(&self) -> io::Result<Vec<(Format, Vec<Output>)>> {
+        let pictures = self.pictures.iter().filter(|picture| picture.is_rewritable());
+        let again = |Picture { format, files }: &Picture| {
+            let files = files.iter().map(|(_, output)| output.again());
+            Ok((*format, files.collect::<io::Result<_>>()?))
+        };
+        pictures.map(again).collect()
+    }
+
+    /// Rejects `--preview` without an image that is a file.
+    pub fn check_preview(&self) -> Result<(), Usage> {
+        match self.pictures.iter().any(Picture::is_rewritable) {
+            true => Ok(()),
+            false => Err(Usage(
+                "--preview: needs an output that is a file, such as -o NAME.png".to_owned(),
+            )),
+        }
     }
 
     /// Returns the path of the part if the destination is a part in a file.

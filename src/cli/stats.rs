@@ -28,6 +28,8 @@ pub struct Stats {
     /// The former name of `min_samples`, until 0.3.
     #[serde(rename = "least_samples")]
     pub former_min_samples: u32,
+    /// True if a signal ended the render under `--preview`, before the image was complete.
+    pub partial: bool,
     /// Light samples at every hit, over all lights.
     pub light_samples: u64,
     /// Seconds until the device is ready, from the start of the process, or of the frame for later frames.

@@ -1,6 +1,7 @@
 //! OpenEXR files: scan lines of 32-bit or 16-bit samples, compressed without loss, written block by block.
 
-use std::io::{self, Seek, Write};
+use std::fs::File;
+use std::io::{self, BufReader, Seek, Write};
 use std::path::Path;
 
 use ::exr::block::writer::{ChunkWriter, ChunksWriter};
@@ -14,7 +15,7 @@ use ::exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel, f16};
 use rayon::prelude::*;
 
 use super::aov::Channel;
-use super::{Band, ExrType, Layout, Pending, Pixels, SaveOptions, Sink};
+use super::{Band, ExrType, Layout, Metadata, Pending, Pixels, SaveOptions, Sink};
 use crate::error::RenderError;
 use crate::film::mean;
 
@@ -211,6 +212,15 @@ fn plain(error: Error) -> io::Error {
         Error::Io(error) => error,
         other => io::Error::other(other),
     }
+}
+
+/// Reads the metadata of an EXR file from its header.
+pub(super) fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
+    let meta = MetaData::read_from_buffered(file, false).ok()?;
+    let attributes = &meta.headers.first()?.own_attributes;
+    let comments = attributes.comments.as_ref().map(Text::to_string);
+    let software = attributes.software_name.as_ref().map(Text::to_string);
+    Some(Metadata::from_lines(software, &comments.unwrap_or_default()))
 }
 
 /// Reads the channels R, G and B of an EXR file's first layer. Others are left out: colours with alpha are those over black.

@@ -1,7 +1,8 @@
 //! JPEG and WebP files, for thumbnails: pictures of 8 bits a channel that are in memory until they are whole, as their encoders
 //! take them.
 
-use std::io::{self, Cursor};
+use std::fs::File;
+use std::io::{self, BufReader, Cursor};
 
 use ::image::codecs::jpeg::JpegEncoder;
 use ::image::codecs::webp::WebPEncoder;
@@ -94,6 +95,17 @@ fn told(encoder: &mut impl ImageEncoder, exif: Option<Vec<u8>>) -> io::Result<()
         Some(exif) => encoder.set_exif_metadata(exif).map_err(io::Error::other),
         None => Ok(()),
     }
+}
+
+/// Reads the metadata of a JPEG or WebP file from its Exif tags.
+pub(super) fn read_metadata(mut file: BufReader<File>) -> Option<Metadata> {
+    let exif = exif::Reader::new().read_from_container(&mut file).ok()?;
+    let text = |tag| match &exif.get_field(tag, In::PRIMARY)?.value {
+        Value::Ascii(lines) => Some(String::from_utf8_lossy(lines.first()?).into_owned()),
+        _ => None,
+    };
+    let lines = text(Tag::ImageDescription).unwrap_or_default();
+    Some(Metadata::from_lines(text(Tag::Software), &lines))
 }
 
 /// What is told, as Exif has it: the program under its own tag, all else as the picture's description, a line each.

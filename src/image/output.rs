@@ -109,6 +109,26 @@ impl Output {
         Ok(())
     }
 
+    /// Returns the same file as it is now, so that it can be written once more.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`Output::find`], and anything that is not a regular file.
+    pub fn again(&self) -> io::Result<Output> {
+        let again = match &self.place {
+            Place::File { path, .. } => place(path),
+            _ => Err(io::ErrorKind::Unsupported.into()),
+        };
+        match again {
+            Ok(place @ Place::File { .. }) => Ok(Output {
+                name: self.name.clone(),
+                place,
+            }),
+            Ok(_) => Err(named(&self.name, &io::Error::other("it is not a regular file"))),
+            Err(error) => Err(named(&self.name, &error)),
+        }
+    }
+
     /// What messages call it.
     pub fn name(&self) -> &str {
         &self.name

@@ -2,7 +2,6 @@
 
 use std::fs::File;
 use std::io::{self, BufReader, Write};
-use std::path::Path;
 
 use ::png::{
     BitDepth as Bits, ColorType, Compression, Decoder, Encoder, EncodingError, ScaledFloat, SrgbRenderingIntent,
@@ -29,15 +28,12 @@ pub fn in_memory(width: u32, height: u32, rgb: &[u8]) -> io::Result<Vec<u8>> {
     Ok(file)
 }
 
-/// Returns true if a file is a PNG that names this program as its writer.
-pub fn is_written_by_wgray(path: &Path) -> bool {
-    let Ok(file) = File::open(path) else { return false };
-    let Ok(reader) = Decoder::new(BufReader::new(file)).read_info() else {
-        return false;
-    };
-    let texts = &reader.info().uncompressed_latin1_text;
-    let mut software = texts.iter().filter(|text| text.keyword == Metadata::SOFTWARE);
-    software.any(|text| text.text.starts_with("wgray "))
+/// Reads the texts before the pixels of a PNG.
+pub(super) fn read_metadata(file: BufReader<File>) -> Option<Metadata> {
+    let reader = Decoder::new(file).read_info().ok()?;
+    let texts = reader.info().uncompressed_latin1_text.iter();
+    let pairs = texts.map(|text| (text.keyword.clone(), text.text.clone()));
+    Some(Metadata { pairs: pairs.collect() })
 }
 
 fn encoder<W: Write>(file: W, (width, height): (u32, u32), color: ColorType, depth: BitDepth) -> Encoder<'static, W> {

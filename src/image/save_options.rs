@@ -141,10 +141,25 @@ impl Metadata {
     /// The name that PNG and others have for the program.
     pub const SOFTWARE: &'static str = "Software";
 
+    /// Returns the text under a name.
+    pub fn get(&self, name: &str) -> Option<&str> {
+        let pair = self.pairs.iter().find(|(known, _)| known == name);
+        pair.map(|(_, text)| text.as_str())
+    }
+
     /// The program's name.
     pub(super) fn software(&self) -> Option<&str> {
-        let software = self.pairs.iter().find(|(name, _)| name == Metadata::SOFTWARE);
-        software.map(|(_, text)| text.as_str())
+        self.get(Metadata::SOFTWARE)
+    }
+
+    /// Inverse of [`Metadata::software`] and [`Metadata::lines`].
+    pub(super) fn from_lines(software: Option<String>, lines: &str) -> Metadata {
+        let software = software.map(|text| (Metadata::SOFTWARE.to_owned(), text));
+        let others = lines.lines().filter_map(|line| line.split_once(": "));
+        let others = others.map(|(name, text)| (name.to_owned(), text.to_owned()));
+        Metadata {
+            pairs: software.into_iter().chain(others).collect(),
+        }
     }
 
     /// All else, a line each: `seed: 0`.

@@ -43,6 +43,8 @@ pub struct Bands<'a> {
     samples: u32,
     /// Whether all bands grow together, and whether they have done so.
     whole: Option<bool>,
+    /// The samples at the end of the current pass over all bands, if whole passes are kept.
+    pass: Option<u32>,
     steps: Steps,
     /// Samples of pixels, in the bands that were handed out and in all.
     done: f64,
@@ -98,6 +100,8 @@ impl Finished {
 struct Band {
     region: Region,
     state: State,
+    /// The piece after the last whole pass over all bands, if the current pass has changed it.
+    passed: Option<Piece>,
 }
 
 enum State {
@@ -116,6 +120,9 @@ enum End {
     TimeIsUp,
 }
 
+/// Duration of a pass over a film on the device. After it the film is copied.
+const PASS: Duration = Duration::from_secs(1);
+
 /// The fewest rows of a band that is made small: under adaptive sampling each has two more for its neighbours.
 const LEAST_ROWS: [u32; 2] = [16, 64];
 
@@ -133,10 +140,7 @@ impl<'a> Bands<'a> {
         let mut y = region.y0;
         let add_new = |all: &mut VecDeque<Band>, y0: u32, y1: u32| {
             let rows = Region { y0, y1, ..region };
-            let new = bands(rows, cut, largest_film).map(|region| Band {
-                region,
-                state: State::New,
-            });
+            let new = bands(rows, cut, largest_film).map(|region| Band::new(region, State::New));
             all.extend(new);
         };
         for piece in store.pieces() {
@@ -145,10 +149,7 @@ impl<'a> Bands<'a> {
             }
             add_new(&mut all, y, piece.region.y0);
             y = piece.region.y1;
-            all.push_back(Band {
-                region: piece.region,
-                state: State::Stored(piece),
-            });
+            all.push_back(Band::new(piece.region, State::Stored(piece)));
         }
         add_new(&mut all, y, region.y1);
         Bands {
@@ -156,6 +157,7 @@ impl<'a> Bands<'a> {
             bands: all,
             samples,
             whole: None,
+            pass: None,
             steps: Steps::new(cut, CALL, order),
             done: 0.0,
             total: region.pixels() as f64 * f64::from(samples),
@@ -171,10 +173,26 @@ impl<'a> Bands<'a> {
     ///
     /// [`RenderError::Memory`] where there is no room for them.
     pub fn as_a_whole(mut self, form: Form) -> Result<Bands<'a>, RenderError> {
-        let pixels: u64 = self.bands.iter().map(|band| band.region.pixels()).sum();
-        there_is_memory(pixels.saturating_mul(form.bytes() as u64))?;
+        there_is_memory(self.pixels().saturating_mul(form.bytes() as u64))?;
         self.whole = Some(false);
         Ok(self)
+    }
+
+    /// Like [`Bands::as_a_whole`], for [`Bands::next_pass`]: the films of the last whole pass are kept while the next pass is
+    /// rendered.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Memory`] if the films do not fit.
+    pub fn in_passes(self, form: Form) -> Result<Bands<'a>, RenderError> {
+        there_is_memory(self.pixels().saturating_mul(2 * form.bytes() as u64))?;
+        let mut bands = self.as_a_whole(form)?;
+        bands.pass = Some(0);
+        Ok(bands)
+    }
+
+    fn pixels(&self) -> u64 {
+        self.bands.iter().map(|band| band.region.pixels()).sum()
     }
 
     /// Renders the next band and hands it out; `None` once all are. After an error it is the same band again, from where it was
@@ -212,6 +230,78 @@ impl<'a> Bands<'a> {
         }
     }
 
+    /// Renders one more pass over all bands, of one or several samples per pixel, and returns how many samples every pixel
+    /// has. Returns `None` once they have all samples or the time is up; then [`Bands::render_next`] hands the bands out.
+    /// After an error the pass can be continued, and [`Bands::last_pass`] has the pass before it.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`Bands::render_next`].
+    pub fn next_pass(
+        &mut self,
+        backend: &mut dyn Backend,
+        watch: &mut Watch,
+        made: &mut dyn FnMut(),
+    ) -> Result<Option<u32>, RenderError> {
+        let have = self.passed_samples();
+        if self.pass.is_none() || self.whole != Some(false) || have >= self.samples {
+            return Ok(None);
+        }
+        let until = match self.pass {
+            Some(until) if until > have => until, // a pass that failed
+            _ => self.end_of_pass(have),
+        };
+        self.pass = Some(until);
+        if self.work_on_all(until, backend, watch, made)? == End::TimeIsUp {
+            self.whole = Some(true);
+            return Ok(None);
+        }
+        for band in &mut self.bands {
+            band.passed = None;
+        }
+        Ok(Some(self.passed_samples()))
+    }
+
+    /// Returns the samples that every pixel had after the last whole pass, 0 if there was none.
+    pub fn passed_samples(&self) -> u32 {
+        let samples = |band: &Band| match &band.passed {
+            Some(piece) => piece.reached.pass.start,
+            None => band.samples(self.samples),
+        };
+        self.bands.iter().map(samples).min().unwrap_or(self.samples)
+    }
+
+    /// Hands out copies of all bands after the last whole pass, from the top.
+    ///
+    /// # Errors
+    ///
+    /// The errors of `output`, and of a store that cannot load a piece.
+    pub fn last_pass(
+        &mut self,
+        output: &mut dyn FnMut(Finished) -> Result<(), RenderError>,
+    ) -> Result<(), RenderError> {
+        for band in &self.bands {
+            let piece = match (&band.passed, &band.state) {
+                (Some(piece), _) | (None, State::Here(piece)) => piece.clone(),
+                (None, State::Stored(kept)) => self.store.load(kept.number)?,
+                (None, State::New) => return Err(RenderError::NoFilm),
+            };
+            output(Finished::of(piece))?;
+        }
+        Ok(())
+    }
+
+    /// Returns the samples at the end of the pass after `have` samples. Passes are long enough that copying films takes little
+    /// of the time, and end at every power of two.
+    fn end_of_pass(&self, have: u32) -> u32 {
+        let count = match self.bands.len() {
+            1 => (self.steps.speed().unwrap_or(0.0) * PASS.as_secs_f64() / self.pixels() as f64) as u32,
+            _ => have / 4,
+        };
+        let power = (have + 1).next_power_of_two();
+        have.saturating_add(count.max(1)).min(power).min(self.samples)
+    }
+
     /// The share of the samples of all bands handed out that were rendered, and not found where they were kept: 0 to 1.
     pub fn fraction_rendered(&self) -> f64 {
         if self.done > 0.0 {
@@ -233,16 +323,7 @@ impl<'a> Bands<'a> {
             _ => 1,
         };
         loop {
-            for i in 0..self.bands.len() {
-                let is_here = matches!(self.bands[i].state, State::Here(_));
-                if is_here && self.bands[i].samples(self.samples) >= until {
-                    continue;
-                }
-                if self.work(i, until, backend, watch, made)? == End::TimeIsUp {
-                    return Ok(());
-                }
-            }
-            if until >= self.samples {
+            if self.work_on_all(until, backend, watch, made)? == End::TimeIsUp || until >= self.samples {
                 return Ok(());
             }
             // The films are copied to and fro for every round: a fourth more, when there are many.
@@ -250,11 +331,32 @@ impl<'a> Bands<'a> {
         }
     }
 
+    /// Renders all bands until their pixels have so many samples, or the time is up.
+    fn work_on_all(
+        &mut self,
+        until: u32,
+        backend: &mut dyn Backend,
+        watch: &mut Watch,
+        made: &mut dyn FnMut(),
+    ) -> Result<End, RenderError> {
+        for i in 0..self.bands.len() {
+            let is_here = matches!(self.bands[i].state, State::Here(_));
+            if is_here && self.bands[i].samples(self.samples) >= until {
+                continue;
+            }
+            if self.work(i, until, backend, watch, made)? == End::TimeIsUp {
+                return Ok(End::TimeIsUp);
+            }
+        }
+        Ok(End::Done)
+    }
+
     /// Cuts the first band so that it takes about as long as a piece should.
     fn make_first_small(&mut self, backend: &dyn Backend) {
         let Some(Band {
             region,
             state: State::New,
+            ..
         }) = self.bands.front_mut()
         else {
             return;
@@ -275,11 +377,7 @@ impl<'a> Bands<'a> {
                 },
             );
             region.y1 = first + rows;
-            let rest = Band {
-                region: rest,
-                state: State::New,
-            };
-            self.bands.insert(1, rest);
+            self.bands.insert(1, Band::new(rest, State::New));
         }
     }
 
@@ -373,7 +471,11 @@ impl<'a> Bands<'a> {
         if is_finished || is_time {
             self.store.keep(&piece);
         }
-        self.bands[i].state = State::Here(piece);
+        let band = &mut self.bands[i];
+        let before = std::mem::replace(&mut band.state, State::Here(piece));
+        if let (State::Here(before), Some(_)) = (before, self.pass) {
+            band.passed.get_or_insert(before);
+        }
         if is_time {
             if self.whole.is_some() {
                 self.keep_others(i);
@@ -398,6 +500,14 @@ impl<'a> Bands<'a> {
 }
 
 impl Band {
+    fn new(region: Region, state: State) -> Band {
+        Band {
+            region,
+            state,
+            passed: None,
+        }
+    }
+
     fn reached(&self) -> Option<&Reached> {
         match &self.state {
             State::New => None,

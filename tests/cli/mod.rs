@@ -20,6 +20,8 @@ mod out_of_memory;
 mod output;
 mod outputs;
 mod pictures;
+#[cfg(unix)]
+mod preview;
 mod scene_options;
 #[cfg(unix)]
 mod summary;

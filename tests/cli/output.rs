@@ -411,6 +411,7 @@ fn stats_have_the_promised_fields() {
         "pixel_samples",
         "min_samples",
         "least_samples",
+        "partial",
         "light_samples",
         "setup_s",
         "render_s",
@@ -439,6 +440,7 @@ fn stats_have_the_promised_fields() {
     );
     assert_eq!(number("camera_rays"), 60.0);
     assert!(fields["shadow_rays"].is_null());
+    assert_eq!(fields["partial"], false);
     let (setup, render, total) = (number("setup_s"), number("render_s"), number("total_s"));
     assert!(setup > 0.0 && render > 0.0 && total >= setup + render, "{stats}");
     let nominal = 5.0 * 4.0 * 3.0 * (1.0 + 9.0) / render / 1e6;

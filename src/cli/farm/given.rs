@@ -10,9 +10,10 @@ use crate::cli::picture_options::PictureOptions;
 use crate::cli::render;
 
 /// Options that the tasks or the engine set.
-const OF_TASKS: [&str; 11] = [
+const OF_TASKS: [&str; 12] = [
     "checkpoint",
     "checkpoint_interval",
+    "preview",
     "progress",
     "quiet",
     "requeue_exit",

@@ -48,8 +48,12 @@ pub struct Args {
     #[arg(long, display_order = 6, value_name = "TIME", value_parser = parse_duration, conflicts_with = "tile")]
     pub time_limit: Option<Duration>,
 
+    /// Also write the image as it grows; Ctrl+C writes the last whole pass
+    #[arg(long, display_order = 7, conflicts_with = "tile")]
+    pub preview: bool,
+
     /// Override a scene value, such as render.seed=3
-    #[arg(short = 'D', long, display_order = 7, value_name = "KEY=VALUE")]
+    #[arg(short = 'D', long, display_order = 8, value_name = "KEY=VALUE")]
     pub define: Vec<Define>,
 
     /// Suppress all output except errors

@@ -3,6 +3,7 @@
 mod args;
 mod once_log;
 mod plan;
+mod preview;
 mod trial;
 mod work;
 
@@ -20,6 +21,7 @@ use wgray::scene::{Problem, Scene, is_model};
 
 use self::once_log::OnceLog;
 use self::plan::Plan;
+use self::preview::Previews;
 use self::work::RenderTotals;
 use super::frames::Frame;
 use super::log::{self, Level};
@@ -160,6 +162,9 @@ fn check<'a>(args: &Args, scene: &Scene, frames: impl Iterator<Item = (&'a Frame
     for (frame, outputs) in frames {
         let checkpoint = args.checkpoint(*frame)?;
         outputs.check(&inputs, checkpoint.as_deref())?;
+        if args.preview {
+            outputs.check_preview()?;
+        }
         let kept = checkpoint.as_deref().map(|path| (path.to_string_lossy(), path));
         let kept = kept.iter().map(|(name, path)| ("--checkpoint", &**name, *path));
         for (option, name, path) in outputs.files().chain(kept) {
@@ -189,6 +194,10 @@ fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant)
     };
     let files: Vec<String> = outputs.files().map(|(_, name, _)| name.to_owned()).collect();
     let images = outputs.images();
+    let previews = match plan.preview {
+        true => Some(Previews::new(outputs.rewritable().map_err(RenderError::Output)?)),
+        false => None,
+    };
     let outputs = outputs.begin().map_err(RenderError::Output)?;
     let stop = signals.defer().context("signal handler")?;
     if let Some(signal) = stop.signal() {
@@ -197,7 +206,7 @@ fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant)
     let mut renderer = plan.renderer(stop).map_err(|error| interrupted(error, stop))?;
     let setup = start.elapsed().as_secs_f64();
     info!(seconds = setup, "ready");
-    let totals = work::write(plan, &mut renderer, outputs.files, store, stop);
+    let totals = work::write(plan, &mut renderer, outputs.files, store, stop, previews);
     let totals = totals.map_err(|error| interrupted(error.into(), stop));
     if totals.as_ref().is_err_and(|error| error.is::<Interrupted>()) {
         let note = match &checkpoint {
@@ -205,7 +214,8 @@ fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant)
                 "progress is saved in {}; --resume continues",
                 checkpoint.name().display()
             ),
-            None => "no image was written; --checkpoint FILE saves the progress of a render".to_owned(),
+            None if plan.preview => "the samples taken so far were not written".to_owned(),
+            None => "no image was written; --preview keeps the image so far, --checkpoint FILE the progress".to_owned(),
         };
         plan.log.log(Level::Note, &note);
     }
@@ -213,21 +223,31 @@ fn picture(plan: &Plan, outputs: Outputs, signals: &mut Signals, start: Instant)
     let total = start.elapsed().as_secs_f64();
     let stats = stats(plan, renderer.info(), &totals, setup, total);
     let (requested, all) = (totals.requested_samples, plan.scene.pixel_samples);
-    if requested < all {
+    let (images, files, done) = match totals.partial.is_empty() {
+        true => (images, files, "render done"),
+        false => (totals.partial.clone(), totals.partial.clone(), "render interrupted"),
+    };
+    if stats.partial {
+        let note = format!("interrupted: the image has {requested} of {all} samples per pixel");
+        plan.log.log(Level::Note, &note);
+    } else if requested < all {
         let note = format!("time limit reached: every pixel has at least {requested} of {all} samples");
         plan.log.log(Level::Note, &note);
     }
     match log::is_json() {
         true => {
             let facts = facts_of([("files", files.into()), ("stats", serde_json::to_value(&stats)?)]);
-            plan.log.log_with(Level::Info, "render done", facts);
+            plan.log.log_with(Level::Info, done, facts);
         }
         false => plan.log.log(Level::Info, &summary(&images, &stats, requested)),
     }
     if let Some(file) = outputs.stats {
         stats.write(file).map_err(RenderError::Output)?;
     }
-    Ok(())
+    match stop.signal().filter(|_| !totals.partial.is_empty()) {
+        Some(signal) => Err(Interrupted(signal).into()),
+        None => Ok(()),
+    }
 }
 
 /// Returns the summary of a written image: `box.png: 1024 x 1024, 64 spp, 12.3 s`.
@@ -266,6 +286,7 @@ fn stats(plan: &Plan, device: &DeviceInfo, totals: &RenderTotals, setup: f64, to
         pixel_samples: scene.pixel_samples,
         min_samples: totals.min_samples,
         former_min_samples: totals.min_samples,
+        partial: !totals.partial.is_empty(),
         light_samples: scene.light_samples(),
         setup_s: setup,
         render_s: render,

@@ -35,6 +35,8 @@ pub struct Plan<'a> {
     pub options: Options,
     /// Time at which rendering stops.
     pub deadline: Option<Instant>,
+    /// Set if the image is written as it grows.
+    pub preview: bool,
     pub checkpoint: Option<PathBuf>,
     checkpoint_interval: Duration,
     resume: bool,
@@ -49,8 +51,9 @@ pub struct Plan<'a> {
 impl<'a> Plan<'a> {
     /// Resolves the settings of one image, begun at `start`.
     pub fn resolve(args: &Args, scene: &Scene, log: &'a OnceLog, frame: Frame, start: Instant) -> anyhow::Result<Self> {
-        if args.time_limit.is_some() {
-            can_end_early(scene)?;
+        let early = [("--time-limit", args.time_limit.is_some()), ("--preview", args.preview)];
+        for (option, _) in early.into_iter().filter(|(_, given)| *given) {
+            can_end_early(option, scene)?;
         }
         let options = args.rendering();
         let picture = options.region(scene).map_err(|problem| option(&problem))?;
@@ -67,6 +70,7 @@ impl<'a> Plan<'a> {
             tile,
             options,
             deadline: args.time_limit.and_then(|limit| start.checked_add(limit)),
+            preview: args.preview,
             checkpoint: args.checkpoint(frame)?,
             checkpoint_interval: args.checkpoint_interval,
             resume: args.resume,
@@ -173,12 +177,12 @@ fn rows(tile: Tile, picture: Region) -> Result<Region, Usage> {
 }
 
 /// Checks that a prefix of each pixel's samples covers the pixel.
-fn can_end_early(scene: &Scene) -> Result<(), Usage> {
+fn can_end_early(option: &str, scene: &Scene) -> Result<(), Usage> {
     let pattern = scene.render.pixel_samples.pattern;
     match pattern.needs_square() {
         false => Ok(()),
         true => Err(Usage(format!(
-            "--time-limit: cannot stop early with --pixel-pattern {}; use sobol",
+            "{option}: cannot stop early with --pixel-pattern {}; use sobol",
             pattern.name()
         ))),
     }

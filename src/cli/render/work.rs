@@ -7,10 +7,11 @@ use wgray::device::Renderer;
 use wgray::error::RenderError;
 use wgray::film::Region;
 use wgray::image::{self, Band, Layout, Pending, Sink};
-use wgray::job::{self, Bands, CheckpointStore, Cut, Flow, Order, PartHeader};
+use wgray::job::{self, Bands, CheckpointStore, Cut, Finished, Flow, Order, PartHeader};
 use wgray::render::{middle_depth, needs_first_hits};
 
 use super::plan::Plan;
+use super::preview::Previews;
 use crate::cli::log::Level;
 use crate::cli::outputs::Files;
 use crate::cli::progress::Progress;
@@ -28,8 +29,20 @@ pub struct RenderTotals {
     invalid_pixels: usize,
     /// Minimum samples per pixel.
     pub min_samples: u32,
-    /// Requested samples per pixel; fewer than the scene's if the time limit was reached.
+    /// Requested samples per pixel; fewer than the scene's if the time limit was reached or the image is partial.
     pub requested_samples: u32,
+    /// The files with the last whole pass of a render that a signal ended; empty if the image is complete.
+    pub partial: Vec<String>,
+}
+
+impl RenderTotals {
+    fn new(samples: u32) -> RenderTotals {
+        RenderTotals {
+            min_samples: samples,
+            requested_samples: samples,
+            ..RenderTotals::default()
+        }
+    }
 }
 
 /// Renders into files, band by band.
@@ -39,19 +52,24 @@ pub fn write(
     files: Files,
     store: &mut dyn CheckpointStore,
     stop: &Stop,
+    mut previews: Option<Previews>,
 ) -> Result<RenderTotals, RenderError> {
     let middle_depth = renderer.work(|backend, _| middle_depth(&plan.scene, &plan.options.aovs, backend))?;
     let layout = plan.layout(middle_depth);
-    let mut totals = RenderTotals::default();
+    let mut totals = RenderTotals::new(plan.scene.pixel_samples);
     let name = files.name().unwrap_or_default().to_owned();
     let metadata = plan.metadata.on(renderer.info(), plan.pictures.reproducible);
-    let mut fill = |sink: &mut Sink| render(plan, renderer, store, stop, &mut totals, sink);
+    let mut fill = |sink: &mut Sink| {
+        let previews = previews.as_mut().map(|previews| (previews, &layout));
+        render(plan, renderer, store, stop, &mut totals, previews, sink)
+    };
     match files {
         Files::Pictures(targets) => {
             let options = plan.pictures.save_options(metadata);
-            let saved = image::save(targets, &layout, &options, &mut fill)?;
-            plan.pictures
-                .warn(&saved, &mut |line| plan.log.log(Level::Warning, line));
+            match image::save(targets, &layout, &options, &mut fill) {
+                Err(RenderError::Cancelled) if !totals.partial.is_empty() => {} // these files have been written
+                saved => (plan.pictures).warn(&saved?, &mut |line| plan.log.log(Level::Warning, line)),
+            }
         }
         Files::Part(file) => write_part(plan, &layout, file, &mut fill)?,
     }
@@ -85,17 +103,20 @@ fn render(
     store: &mut dyn CheckpointStore,
     stop: &Stop,
     totals: &mut RenderTotals,
+    previews: Option<(&mut Previews, &Layout)>,
     sink: &mut Sink,
 ) -> Result<(), RenderError> {
     let mut progress = Progress::new(plan.progress, plan.frame.label(), plan.frame.number);
     let (scene, samples) = (&plan.scene, plan.scene.pixel_samples);
     let (cut, most) = (Cut::of(scene.form()), renderer.largest_film());
-    let order = match plan.deadline {
-        Some(_) => Order::Pixels,
-        None => Order::Rows,
+    let order = match plan.deadline.is_some() || previews.is_some() {
+        true => Order::Pixels,
+        false => Order::Rows,
     };
     let mut bands = Bands::new(plan.region(), samples, &cut, order, most, store);
-    if plan.deadline.is_some() {
+    if previews.is_some() {
+        bands = bands.in_passes(scene.form())?;
+    } else if plan.deadline.is_some() {
         bands = bands.as_a_whole(scene.form())?;
     }
     let begin = Instant::now();
@@ -112,7 +133,30 @@ fn render(
             _ => Flow::GoOn,
         })
     };
-    (totals.min_samples, totals.requested_samples) = (samples, samples);
+    if let Some((previews, layout)) = previews {
+        loop {
+            let start = Instant::now();
+            let made = renderer.progress();
+            let pass = renderer.work(|backend, _| bands.next_pass(backend, &mut watch, &mut || made.made()));
+            totals.time += start.elapsed();
+            match pass {
+                Ok(Some(count)) if count < samples => {
+                    if previews.is_due(count) {
+                        save_pass(plan, renderer, &mut bands, previews, layout)?;
+                    }
+                }
+                Ok(_) => break,
+                Err(RenderError::Cancelled) if plan.checkpoint.is_none() && bands.passed_samples() > 0 => {
+                    if let Some(partial) = save_pass(plan, renderer, &mut bands, previews, layout)? {
+                        let time = totals.time;
+                        *totals = RenderTotals { time, ..partial };
+                    }
+                    return Err(RenderError::Cancelled);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
     loop {
         let start = Instant::now();
         let made = renderer.progress();
@@ -122,21 +166,71 @@ fn render(
             totals.fraction_rendered = bands.fraction_rendered();
             return Ok(());
         };
-        let film = band.film;
-        totals.min_samples = totals.min_samples.min(band.min_samples);
-        totals.requested_samples = totals.requested_samples.min(band.requested_samples);
-        totals.camera_rays += band.camera_rays;
-        let colors = film.means();
-        totals.invalid_pixels += colors
-            .filter(|color| !color.iter().all(|value| value.is_finite()))
-            .count();
-        let hits = match needs_first_hits(scene, &plan.options.aovs) {
-            true => renderer.work(|backend, _| job::first_hits(backend, film.region))?,
-            false => Vec::new(),
-        };
-        sink(Band {
-            film: &film,
-            hits: &hits,
-        })?;
+        put(plan, renderer, band, totals, sink)?;
+    }
+}
+
+/// Hands a band to a sink and adds it to the totals.
+fn put(
+    plan: &Plan,
+    renderer: &mut Renderer,
+    band: Finished,
+    totals: &mut RenderTotals,
+    sink: &mut Sink,
+) -> Result<(), RenderError> {
+    let film = band.film;
+    totals.min_samples = totals.min_samples.min(band.min_samples);
+    totals.requested_samples = totals.requested_samples.min(band.requested_samples);
+    totals.camera_rays += band.camera_rays;
+    let colors = film.means();
+    totals.invalid_pixels += colors
+        .filter(|color| !color.iter().all(|value| value.is_finite()))
+        .count();
+    let hits = match needs_first_hits(&plan.scene, &plan.options.aovs) {
+        true => renderer.work(|backend, _| job::first_hits(backend, film.region))?,
+        false => Vec::new(),
+    };
+    sink(Band {
+        film: &film,
+        hits: &hits,
+    })
+}
+
+/// Writes the last whole pass into the files of the images, except those with more samples. Returns `None` if no file is
+/// written; an output that cannot be written is a warning, because the complete image may succeed.
+fn save_pass(
+    plan: &Plan,
+    renderer: &mut Renderer,
+    bands: &mut Bands,
+    previews: &mut Previews,
+    layout: &Layout,
+) -> Result<Option<RenderTotals>, RenderError> {
+    let (samples, all) = (bands.passed_samples(), plan.scene.pixel_samples);
+    let metadata = (plan.metadata).partial(renderer.info(), plan.pictures.reproducible, (samples, all));
+    let options = plan.pictures.save_options(metadata);
+    let mut totals = RenderTotals {
+        fraction_rendered: 1.0,
+        ..RenderTotals::new(all)
+    };
+    let targets = previews.start(samples, plan.log).map_err(RenderError::Output);
+    let saved = targets.and_then(|targets| {
+        let files = targets.iter().flat_map(|target| &target.files);
+        totals.partial = files.map(|file| file.name().to_owned()).collect();
+        if !targets.is_empty() {
+            image::save(targets, layout, &options, &mut |sink| {
+                bands.last_pass(&mut |band| put(plan, renderer, band, &mut totals, sink))
+            })?;
+        }
+        Ok(())
+    });
+    previews.written();
+    match saved {
+        Ok(()) => Ok(Some(totals).filter(|totals| !totals.partial.is_empty())),
+        Err(error @ (RenderError::Output(_) | RenderError::Memory(_))) => {
+            plan.log
+                .log_once(Level::Warning, &format!("{error}; the preview is not written"));
+            Ok(None)
+        }
+        Err(error) => Err(error),
     }
 }

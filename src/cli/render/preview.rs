@@ -1,0 +1,63 @@
+//! `--preview`: the image as it grows, written to the files of the complete image.
+
+use std::io;
+use std::time::{Duration, Instant};
+
+use wgray::image::{Format, Output, Pending, Target};
+
+use super::once_log::OnceLog;
+use crate::cli::log::Level;
+use crate::cli::metadata::samples_of;
+
+/// Minimum time between two writes.
+const INTERVAL: Duration = Duration::from_secs(2);
+
+/// The files of the images that are written before they are complete.
+pub struct Previews {
+    images: Vec<(Format, Vec<Output>)>,
+    last: Option<Instant>,
+}
+
+impl Previews {
+    pub fn new(images: Vec<(Format, Vec<Output>)>) -> Previews {
+        Previews { images, last: None }
+    }
+
+    /// Returns true if the image should be written after so many samples.
+    pub fn is_due(&self, samples: u32) -> bool {
+        samples.is_power_of_two() && self.last.is_none_or(|last| last.elapsed() >= INTERVAL)
+    }
+
+    /// Starts the files of the images, except those that have more samples.
+    pub fn start(&self, samples: u32, log: &OnceLog) -> io::Result<Vec<Target>> {
+        let mut targets = Vec::new();
+        for (format, files) in &self.images {
+            if let Some(reason) = files.iter().find_map(|file| reason_to_keep(file, samples)) {
+                log.log_once(Level::Note, &reason);
+                continue;
+            }
+            let files = files.iter().map(|file| Pending::start(file.again()?));
+            targets.push(Target {
+                format: *format,
+                files: files.collect::<io::Result<_>>()?,
+            });
+        }
+        Ok(targets)
+    }
+
+    /// Starts the interval until the next write.
+    pub fn written(&mut self) {
+        self.last = Some(Instant::now());
+    }
+}
+
+/// Returns a message if a file exists and may have more samples than an incomplete image.
+fn reason_to_keep(file: &Output, samples: u32) -> Option<String> {
+    let path = file.path().filter(|path| path.exists())?;
+    let reason = match samples_of(path) {
+        Some(existing) if existing <= samples => return None,
+        Some(existing) => format!("has {existing} samples per pixel; a preview with fewer does not replace it"),
+        None => "was not written by wgray; a preview does not replace it, but the complete image will".to_owned(),
+    };
+    Some(format!("{}: {reason}", file.name()))
+}

@@ -1,0 +1,434 @@
+//! `--preview`: the image as it grows, and renders that a signal ends.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use wgray::image::read_metadata;
+
+use super::{Place, Ran, heed_interrupts, program, project_scene};
+
+/// A render of minutes, whose passes take some hundredths of a second.
+const LONG: [&str; 8] = [
+    "render",
+    "small.toml",
+    "--size",
+    "150x100",
+    "--spp",
+    "65536",
+    "--threads",
+    "1",
+];
+
+fn start(place: &Place, arguments: &[&str]) -> Child {
+    start_in_shell(place, "", arguments)
+}
+
+/// Starts the long render after a line of a shell.
+fn start_in_shell(place: &Place, line: &str, arguments: &[&str]) -> Child {
+    heed_interrupts();
+    Command::new("sh")
+        .current_dir(place.path("."))
+        .args(["-c", &format!("{line} exec \"$0\" \"$@\"")])
+        .arg(program())
+        .args(LONG)
+        .arg("--preview")
+        .args(arguments)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program")
+}
+
+fn wait_until(what: &str, condition: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !condition() {
+        assert!(start.elapsed() < Duration::from_secs(60), "{what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+fn wait_for(place: &Place, file: &str) {
+    wait_until(file, || place.path(file).exists());
+}
+
+fn send(signal: &str, child: &Child) {
+    let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
+    assert!(sent.expect("kill").success());
+}
+
+fn ended(child: Child) -> Ran {
+    let output = child.wait_with_output().expect("an end");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    Ran::new(output.status.code(), String::new(), &stderr, &[])
+}
+
+/// The samples and the requested samples of a file that is marked as partial.
+fn partial(path: &Path) -> Option<(u32, u32)> {
+    let metadata = read_metadata(path).expect("metadata");
+    let text = metadata.get("partial")?.strip_suffix(" samples").expect("samples");
+    let (samples, of) = text.split_once(" of ").expect("two numbers");
+    Some((samples.parse().expect("a number"), of.parse().expect("a number")))
+}
+
+/// The contents of all files, and removes them.
+fn take_files(place: &Place) -> Vec<(String, Vec<u8>)> {
+    let files = place.files().into_iter();
+    let files: Vec<_> = files.map(|name| (name.clone(), place.read(&name))).collect();
+    for (name, _) in &files {
+        assert_eq!(partial(&place.path(name)), None, "{name}");
+        fs::remove_file(place.path(name)).expect("a file");
+    }
+    files
+}
+
+#[test]
+fn the_complete_files_are_the_same_with_and_without_previews() {
+    let place = Place::new();
+    let path_scene = project_scene("cornell-path.toml");
+    let both = ["-o", "a.png", "-o", "a.exr"];
+    let cases: [&[&str]; 8] = [
+        &["small.toml", "--size", "33x21", "--spp", "9"],
+        &["small.toml", "--size", "1x1", "--spp", "1"],
+        &["small.toml", "--size", "1x1", "--spp", "65536"],
+        &["small.toml", "--crop", "1,2,9,5", "--aov", "normal,depth"],
+        &[
+            "small.toml",
+            "--adaptive",
+            "0.02",
+            "--pixel-pattern",
+            "sobol",
+            "--spp",
+            "4",
+            "--aov",
+            "variance",
+        ],
+        &[
+            &path_scene,
+            "--size",
+            "24x20",
+            "--spp",
+            "5",
+            "--aov",
+            "albedo,direct,normal",
+        ],
+        &["small.toml", "--turntable", "2", "-o", "#.png"],
+        &["small.toml", "--frames", "1-2", "--size", "9x7", "-o", "#.png"],
+    ];
+    for device in ["cpu", "gpu"] {
+        for options in cases {
+            let outputs = if options.contains(&"-o") { &[][..] } else { &both };
+            let render = |more: &[&str]| {
+                let ran = place.run(&[&["render", "--device", device, "--quiet"], options, outputs, more].concat());
+                assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{options:?}");
+                take_files(&place)
+            };
+            let (without, with) = (render(&[]), render(&["--preview"]));
+            assert!(without.len() >= 2);
+            assert!(without == with, "{device}: {options:?}");
+        }
+    }
+}
+
+/// Compares an image with a render of so many samples, with these further options.
+fn has_pixels_of(place: &Place, file: &str, samples: u32, more: &[&str]) -> bool {
+    let spp = samples.to_string();
+    let size = ["render", "small.toml", "--size", "150x100", "--device", "cpu"];
+    place.quietly(&[&size[..], &["--spp", &spp, "-o", "expected.exr"], more].concat());
+    let ran = place.run(&["diff", file, "expected.exr"]);
+    assert!([0, 5].contains(&ran.code), "{}", ran.stderr);
+    ran.code == 0
+}
+
+#[test]
+fn a_signal_leaves_the_last_whole_pass() {
+    for (signal, name, code, device) in [
+        ("-INT", "Ctrl+C (SIGINT)", 130, "cpu"),
+        ("-TERM", "SIGTERM", 143, "gpu"),
+        ("-HUP", "SIGHUP", 129, "cpu"),
+    ] {
+        let place = Place::new();
+        let files = ["out.png", "out.normal.png", "out.exr", "out.jpg", "out.webp"];
+        let outputs = ["-o", "out.png", "-o", "out.exr", "-o", "out.jpg", "-o", "out.webp"];
+        let more = ["--aov", "normal", "--stats", "stats.json", "--device", device];
+        let child = start(&place, &[&outputs[..], &more].concat());
+        files.iter().for_each(|file| wait_for(&place, file));
+        fs::copy(place.path("out.exr"), place.path("first.exr")).expect("a copy");
+        let (first, of) = partial(&place.path("first.exr")).expect("a mark");
+        assert!(first.is_power_of_two() && of == 65536, "{first} of {of}");
+        std::thread::sleep(Duration::from_millis(500));
+        let sent = Instant::now();
+        send(signal, &child);
+        let ran = ended(child);
+        assert!(sent.elapsed() < Duration::from_secs(10), "{:?}", sent.elapsed()); // 2 s on an idle machine
+        let (samples, _) = partial(&place.path("out.exr")).expect("a mark");
+        let message = format!(
+            "note: interrupted: the image has {samples} of 65536 samples per pixel\nerror: interrupted by {name}\n"
+        );
+        assert_eq!((ran.code, ran.stderr), (code, message), "{signal}");
+        let [summary] = &ran.summary[..] else {
+            panic!("{:?}", ran.summary)
+        };
+        let written = "out.png, out.normal.png, out.exr, out.jpg, out.webp: 150 x 100";
+        assert!(summary.starts_with(&format!("{written}, {samples} spp")), "{summary}");
+        for file in files {
+            assert_eq!(partial(&place.path(file)), Some((samples, 65536)), "{file}");
+        }
+        let stats: serde_json::Value = serde_json::from_slice(&place.read("stats.json")).expect("JSON");
+        assert_eq!(
+            (&stats["partial"], &stats["min_samples"]),
+            (&true.into(), &samples.into())
+        );
+        let mut expected = files.to_vec();
+        expected.extend(["first.exr", "stats.json"]);
+        expected.sort_unstable();
+        assert_eq!(place.files(), expected);
+        assert!(samples > first, "{samples}");
+        // Their pixels are those of renders of as many samples, and not of more.
+        assert!(has_pixels_of(&place, "first.exr", first, &more[..2]));
+        assert!(has_pixels_of(&place, "out.exr", samples, &more[..2]));
+        assert!(!has_pixels_of(&place, "out.exr", samples + 1, &more[..2]));
+    }
+}
+
+#[test]
+fn a_second_signal_ends_at_once() {
+    let place = Place::new();
+    let child = start(&place, &["-o", "out.exr", "--device", "cpu"]);
+    wait_for(&place, "out.exr");
+    std::thread::sleep(Duration::from_millis(500));
+    // All signals arrive before the program can do anything between them.
+    send("-STOP", &child);
+    std::thread::sleep(Duration::from_millis(100));
+    let before = place.read("out.exr");
+    ["-INT", "-TERM", "-HUP", "-CONT"].map(|signal| send(signal, &child));
+    let ran = ended(child);
+    assert!([130, 143, 129].contains(&ran.code), "{}", ran.code);
+    assert_eq!(ran.stderr, "");
+    assert!(place.read("out.exr") == before, "the last pass was written");
+}
+
+#[test]
+fn files_with_more_samples_stay() {
+    let place = Place::new();
+    let outputs = [
+        "-o",
+        "a.png",
+        "-o",
+        "a.exr",
+        "-o",
+        "a.jpg",
+        "-o",
+        "a.webp",
+        "-o",
+        "other.png",
+    ];
+    let files = ["a.png", "a.exr", "a.jpg", "a.webp", "other.png"];
+    let render = |more: &[&str]| place.run(&[&["render", "small.toml", "--device", "cpu"], more].concat());
+    assert_eq!(
+        render(&[&outputs[..], &["--size", "2x2", "--spp", "60000"]].concat()).code,
+        0
+    );
+    place.write("other.png", "mine");
+    let before = files.map(|file| place.read(file));
+    let child = start(&place, &[&outputs[..], &["-o", "new.exr", "--device", "cpu"]].concat());
+    wait_for(&place, "new.exr");
+    send("-INT", &child);
+    let ran = ended(child);
+    let (samples, _) = partial(&place.path("new.exr")).expect("a mark");
+    assert!(has_pixels_of(&place, "new.exr", samples, &[]));
+    let more = "has 60000 samples per pixel; a preview with fewer does not replace it";
+    let unknown = "was not written by wgray; a preview does not replace it, but the complete image will";
+    let notes = files.map(|file| match file {
+        "other.png" => format!("note: {file}: {unknown}\n"),
+        _ => format!("note: {file}: {more}\n"),
+    });
+    let interrupted = format!("note: interrupted: the image has {samples} of 65536 samples per pixel\n");
+    let error = "error: interrupted by Ctrl+C (SIGINT)\n";
+    assert_eq!(
+        (ran.code, ran.stderr),
+        (130, [&notes.concat(), &*interrupted, error].concat())
+    );
+    assert_eq!(files.map(|file| place.read(file)), before);
+    // Nothing is written where all files have more samples.
+    let child = start(
+        &place,
+        &[&outputs[..8], &["--stats", "stats.json", "--device", "cpu"]].concat(),
+    );
+    std::thread::sleep(Duration::from_secs(1));
+    wait_until("a temporary file", || {
+        place.files().iter().any(|name| name.starts_with(".wgray-"))
+    });
+    send("-INT", &child);
+    let ran = ended(child);
+    assert_eq!(ran.code, 130, "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("note: the samples taken so far were not written\n"),
+        "{}",
+        ran.stderr
+    );
+    assert!(ran.summary.is_empty() && !place.path("stats.json").exists());
+    assert_eq!(files.map(|file| place.read(file)), before);
+    // A complete image replaces all of them, and a preview a file with as many samples.
+    let ran = render(&[&outputs[..], &["--preview", "--spp", "2"]].concat());
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(files.iter().all(|file| partial(&place.path(file)).is_none()));
+    let ran = render(&["--preview", "--spp", "1000", "-o", "a.png"]);
+    assert_eq!(
+        (ran.code, ran.stderr.as_str()),
+        (
+            0,
+            "note: a.png: has 2 samples per pixel; a preview with fewer does not replace it\n"
+        )
+    );
+}
+
+#[test]
+fn partial_files_do_not_count_as_existing() {
+    let place = Place::new();
+    let child = start(
+        &place,
+        &["--frames", "1-3", "-o", "#.png", "-o", "#.exr", "--device", "cpu"],
+    );
+    wait_for(&place, "1.exr");
+    send("-INT", &child);
+    assert_eq!(ended(child).code, 130);
+    assert_eq!(place.files(), ["1.exr", "1.png"], "no further frame starts");
+    let run = || {
+        let arguments = [
+            "render",
+            "small.toml",
+            "--frames",
+            "1",
+            "-o",
+            "#.png",
+            "-o",
+            "#.exr",
+            "--skip-existing",
+        ];
+        place.run(&[&arguments[..], &["--device", "cpu"]].concat())
+    };
+    assert!(partial(&place.path("1.png")).is_some() && partial(&place.path("1.exr")).is_some());
+    let ran = run();
+    assert!(ran.code == 0 && ran.summary.len() == 1, "{}", ran.stderr);
+    assert!(partial(&place.path("1.png")).is_none() && partial(&place.path("1.exr")).is_none());
+    let ran = run();
+    assert_eq!(
+        (ran.code, ran.stderr.as_str()),
+        (0, "note: skipped 1 of 1: the output files exist\n")
+    );
+}
+
+#[test]
+fn a_checkpoint_takes_the_samples_at_a_signal() {
+    let place = Place::new();
+    let options = ["--spp", "2000", "--device", "cpu"];
+    let render = |more: &[&str]| {
+        let ran = place.run(&[&["render", "small.toml", "--size", "150x100"], &options[..], more].concat());
+        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    };
+    render(&["-o", "whole.exr"]);
+    let checkpoint = ["--checkpoint", "c", "--resume", "-o", "out.exr"];
+    let mut arguments = vec![
+        "render",
+        "small.toml",
+        "--size",
+        "150x100",
+        "--preview",
+        "--threads",
+        "1",
+    ];
+    arguments.extend(options.iter().chain(&checkpoint));
+    heed_interrupts();
+    let child = Command::new(program())
+        .current_dir(place.path("."))
+        .args(&arguments)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program");
+    wait_for(&place, "out.exr");
+    send("-INT", &child);
+    let ran = ended(child);
+    let message = "note: progress is saved in c; --resume continues\nerror: interrupted by Ctrl+C (SIGINT)\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (130, message));
+    let (samples, of) = partial(&place.path("out.exr")).expect("a mark");
+    assert!(samples.is_power_of_two() && of == 2000, "{samples} of {of}");
+    render(&[&checkpoint[..], &["--preview"]].concat());
+    assert!(place.read("out.exr") == place.read("whole.exr"));
+}
+
+#[test]
+fn previews_need_passes_and_a_file() {
+    let place = Place::new();
+    for (options, rule) in [
+        (&["--tile", "1/2", "-o", "x.part"][..], "cannot be used with '--tile"),
+        (
+            &["--pixel-pattern", "grid", "--spp", "4"],
+            "--preview: cannot stop early with --pixel-pattern grid; use sobol",
+        ),
+        (
+            &["--pixel-pattern", "jittered", "--spp", "4"],
+            "--preview: cannot stop early with --pixel-pattern jittered",
+        ),
+        (
+            &["-o", "-"],
+            "--preview: needs an output that is a file, such as -o NAME.png",
+        ),
+        (&["-o", "/dev/null"], "--preview: needs an output that is a file"),
+    ] {
+        let ran = place.run(&[&["render", "small.toml", "--preview", "--device", "cpu"], options].concat());
+        assert_eq!(ran.code, 2, "{}", ran.stderr);
+        assert!(ran.stderr.contains(rule), "{}", ran.stderr);
+        assert!(place.files().is_empty(), "{:?}", place.files());
+    }
+    // A stream gets the complete image only.
+    let line = "\"$0\" render small.toml --preview --device cpu -q -o - -o a.png > b.png";
+    let ran = place.shell("sh", line);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+    assert!(place.read("a.png") == place.read("b.png"));
+}
+
+#[test]
+fn a_time_limit_ends_previews() {
+    let place = Place::new();
+    let child = start(&place, &["--time-limit", "1", "-o", "out.exr", "--device", "cpu"]);
+    let ran = ended(child);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stderr.starts_with("note: time limit reached: "), "{}", ran.stderr);
+    let metadata = read_metadata(&place.path("out.exr")).expect("metadata");
+    assert_eq!(
+        (metadata.get("time_limit"), metadata.get("partial")),
+        (Some("1 s"), None)
+    );
+}
+
+/// A disk that fills up: here, a limit on the size of files.
+#[test]
+fn a_full_disk_loses_previews_and_keeps_the_older_file() {
+    for output in ["out.png", "out.exr"] {
+        let place = Place::new();
+        let base = ["render", "small.toml", "--spp", "1", "-o", output, "--device", "cpu"];
+        place.quietly(&[&base[..], &["--size", "2x2"]].concat());
+        let before = place.read(output);
+        let limit = "trap '' XFSZ; ulimit -f 8;";
+        let line =
+            format!("{limit} exec \"$0\" render small.toml --spp 3 --size 300x300 --preview -o {output} --device cpu");
+        let ran = place.shell("sh", &line);
+        let warning =
+            format!("warning: {output}: cannot be written: File too large (os error 27); the preview is not written\n");
+        assert_eq!(ran.code, 8, "{}", ran.stderr);
+        assert!(ran.stderr.starts_with(&warning), "{}", ran.stderr);
+        assert!(ran.stderr.contains("error: "), "{}", ran.stderr);
+        // The same at a signal.
+        let child = start_in_shell(&place, limit, &["-o", output, "--device", "cpu"]);
+        wait_until("a temporary file", || {
+            place.files().iter().any(|name| name.starts_with(".wgray-"))
+        });
+        std::thread::sleep(Duration::from_secs(1));
+        send("-INT", &child);
+        let ran = ended(child);
+        let rest = "note: the samples taken so far were not written\nerror: interrupted by Ctrl+C (SIGINT)\n";
+        assert_eq!((ran.code, ran.stderr), (130, warning + rest), "{output}");
+        assert!(place.read(output) == before && place.files() == [output]);
+    }
+}
