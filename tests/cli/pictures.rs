@@ -96,7 +96,12 @@ fn a_format_without_alpha_is_noted() {
     for (name, is_noted) in [("a.jpg", true), ("a.png", false)] {
         let ran = place.run(&["render", "clear.toml", "--device", "cpu", "-o", name]);
         let note = "a.jpg: JPEG has no alpha; the transparent background is black";
-        assert_eq!((ran.code, ran.stderr.contains(note)), (0, is_noted), "{name}: {}", ran.stderr);
+        assert_eq!(
+            (ran.code, ran.stderr.contains(note)),
+            (0, is_noted),
+            "{name}: {}",
+            ran.stderr
+        );
     }
 }
 

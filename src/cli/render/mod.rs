@@ -97,7 +97,8 @@ impl<'a> Job<'a> {
         check(args, &scene, frames.iter().map(|(frame, outputs)| (frame, outputs)))?;
         let opaque = frames.iter().find_map(|(_, outputs)| outputs.without_alpha());
         if let (true, Some(name)) = (scene.render.alpha, opaque) {
-            let note = format!("{name}: JPEG has no alpha; the transparent background is black (use .png, .webp or .exr)");
+            let note =
+                format!("{name}: JPEG has no alpha; the transparent background is black (use .png, .webp or .exr)");
             log.log_once(Level::Warning, &note);
         }
         Ok(Job {
