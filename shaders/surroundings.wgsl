@@ -36,18 +36,18 @@ fn cap_above(row: u32, height: u32) -> f32 {
     return 2.0 * s * s;
 }
 
-// Which bin a normal is in, of a grid over the octahedral map: Cigolle et al., "A Survey of Efficient Representations for Independent Unit
-// Vectors", JCGT 3(2), 2014. The last one for 0.
+// The bin of a normal: the nearest point of a grid on the octahedral map, which has the axes among its points. Cigolle et al., "A Survey of Efficient Representations for Independent Unit
+// Vectors", JCGT 3(2), 2014. The last bin is that of 0.
 fn normal_bin(normal: vec3f) -> u32 {
     let sum = abs(normal.x) + abs(normal.y) + abs(normal.z);
     let x = normal.x / sum;
     let y = normal.y / sum;
     let folded_x = select(abs(y) - 1.0, 1.0 - abs(y), x >= 0.0);
     let folded_y = select(abs(x) - 1.0, 1.0 - abs(x), y >= 0.0);
-    let side = f32(NORMAL_BINS);
-    let column = (select(folded_x, x, normal.z >= 0.0) * 0.5 + 0.5) * side;
-    let row = (select(folded_y, y, normal.z >= 0.0) * 0.5 + 0.5) * side;
-    let bin = u32(min(max(row, 0.0), side - 1.0)) * NORMAL_BINS + u32(min(max(column, 0.0), side - 1.0));
+    let last = f32(NORMAL_BINS - 1u);
+    let column = (select(folded_x, x, normal.z >= 0.0) * 0.5 + 0.5) * last + 0.5;
+    let row = (select(folded_y, y, normal.z >= 0.0) * 0.5 + 0.5) * last + 0.5;
+    let bin = u32(min(max(row, 0.0), last)) * NORMAL_BINS + u32(min(max(column, 0.0), last));
     return select(NORMAL_BINS * NORMAL_BINS, bin, sum > 0.0);
 }
 

@@ -53,10 +53,10 @@ pub fn normal_bin(normal: Vec3) -> u32 {
     let y = normal.y / sum;
     let folded_x = if x >= 0.0 { 1.0 - y.abs() } else { y.abs() - 1.0 };
     let folded_y = if y >= 0.0 { 1.0 - x.abs() } else { x.abs() - 1.0 };
-    let side = NORMAL_BINS as f32;
-    let column = (if normal.z >= 0.0 { x } else { folded_x } * 0.5 + 0.5) * side;
-    let row = (if normal.z >= 0.0 { y } else { folded_y } * 0.5 + 0.5) * side;
-    let bin = min(max(row, 0.0), side - 1.0) as u32 * NORMAL_BINS + min(max(column, 0.0), side - 1.0) as u32;
+    let last = (NORMAL_BINS - 1) as f32;
+    let column = (if normal.z >= 0.0 { x } else { folded_x } * 0.5 + 0.5) * last + 0.5;
+    let row = (if normal.z >= 0.0 { y } else { folded_y } * 0.5 + 0.5) * last + 0.5;
+    let bin = min(max(row, 0.0), last) as u32 * NORMAL_BINS + min(max(column, 0.0), last) as u32;
     if sum > 0.0 { bin } else { NORMAL_BINS * NORMAL_BINS }
 }
 

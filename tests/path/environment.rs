@@ -495,6 +495,44 @@ fn directions_are_as_frequent_as_their_density_says() {
 }
 
 #[test]
+fn an_unoccluded_wall_has_little_noise() {
+    // Every pixel has the same expected value, so the deviations are all noise.
+    let noise = |normal: [f64; 3], (samples, pattern): (u32, &str)| {
+        let [x, y, z] = normal;
+        let text = format!(
+            "image = {{ width = 32, height = 32 }}\n\
+             camera = {{ position = [{x}, {y}, {z}], look_at = [0, 0, 0], up = [0.3, 0.5, 0.7], fov = 10 }}\n\
+             materials.m = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n\
+             render = {{ integrator = 'path', max_depth = 1, pixel_samples = {{ count = {samples}, pattern = '{pattern}' }} }}\n\
+             environment = {{ name = 'studio' }}\n\
+             [[shapes]]\ntype = 'rectangle'\nmaterial = 'm'\ncenter = [0, 0, 0]\nsize = [9, 9]\nnormal = [{x}, {y}, {z}]\n\
+             tangent = [0.3, 0.5, 0.7]\n"
+        );
+        let film = render(&crate::scenes::parse(&text), Way::Cpu);
+        let values: Vec<f64> = film.means().map(|[_, green, _]| f64::from(green)).collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        (squares / values.len() as f64).sqrt() / mean
+    };
+    let normals = [
+        [0.0, -1.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+        [0.36, -0.48, 0.8],
+        [-0.6, 0.64, -0.48],
+    ];
+    for normal in normals {
+        let found = noise(normal, (64, "sobol"));
+        assert!(found < 0.035, "{normal:?}: {found}");
+    }
+    // The control: samples that are not stratified, and few ones.
+    assert!(noise([0.0, -1.0, 0.0], (64, "random")) > 0.035);
+    assert!(noise([0.0, -1.0, 0.0], (4, "sobol")) > 0.035);
+}
+
+#[test]
 fn a_direction_and_its_cell_are_each_others() {
     use wgray::cpu::surroundings::{cell_towards, direction_in_cell};
     for (width, height) in [(1, 1), (2, 1), (3, 2), (16, 8), (8192, 4096)] {
