@@ -22,8 +22,9 @@ fn chosen_emitter(bits: vec2u) -> Emitter {
     return load_emitter(select(emitter.other, first, unit_float(bits.y) < emitter.threshold));
 }
 
-// A sample of the light that arrives at p from what was chosen, for a uniform u.
-fn sample_emitter(chosen: Chosen, p: vec3f, u: vec2f) -> LightSample {
+// A sample of the light that arrives at p from what was chosen, for a uniform u. `normal` is that of a surface which light from its side
+// alone can reach, or 0.
+fn sample_emitter(chosen: Chosen, p: vec3f, normal: vec3f, u: vec2f) -> LightSample {
     let emitter = chosen.emitter;
     if (EMITTER_KINDS & (1u << INSTANCE)) != 0u {
         if emitter.instance != 0u {
@@ -33,7 +34,7 @@ fn sample_emitter(chosen: Chosen, p: vec3f, u: vec2f) -> LightSample {
     var light = load_light(emitter.index);
     if (EMITTER_KINDS & (1u << ENVIRONMENT)) != 0u {
         if (EMITTER_KINDS == (1u << ENVIRONMENT)) | (light.kind == ENVIRONMENT) {
-            return sample_environment(light, u);
+            return sample_environment(light, normal, u);
         }
     }
     if LIGHT_TREE != 0u {

@@ -1,9 +1,20 @@
-// The image that surrounds the scene: what arrives from a direction, and samples of it.
+// The environment map: the light that arrives from a direction, and samples of it by the map and the clamped cosine.
+//
+// The map's cells lie in blocks, at most 32 x 32. A block is chosen by the light that it sends to a surface of a given normal, which
+// cumulative distributions list for 256 bins of normals; the cell in it by its radiance alone. So the pdf is known exactly, and a pixel's
+// stratified samples stay stratified over the blocks.
 
-// What arrives from a direction.
+// The light that arrives from a direction.
 struct Arriving {
     radiance: vec3f,
-    pdf: f32,              // of samples of light there, per solid angle, with the choice of the image among all that shines
+    pdf: f32,              // of samples of light there, per solid angle, with the choice of the map among all emitters
+}
+
+// One interval of a cumulative distribution.
+struct Interval {
+    index: u32,
+    width: f32,            // its probability
+    position: f32,         // of the number that chose it, from 0 to 1
 }
 
 fn environment_texel(row: u32, column: u32) -> vec3f {
@@ -11,8 +22,36 @@ fn environment_texel(row: u32, column: u32) -> vec3f {
     return vec3f(bitcast<f32>(texel_word(at)), bitcast<f32>(texel_word(at + 1u)), bitcast<f32>(texel_word(at + 2u)));
 }
 
-// Bilinear between the centres of texels. A cell is as likely as the mean of its corners says, and inside of it all directions are alike.
-fn arriving_from(direction: vec3f) -> Arriving {
+fn environment_float(at: u32) -> f32 {
+    return bitcast<f32>(texel_word(at));
+}
+
+// The rows' distribution for surfaces of this normal. Those of the rows' blocks follow it.
+fn block_distributions(normal: vec3f) -> u32 {
+    let rows = (environment.height >> (environment.shifts >> 8u)) + 1u;
+    return environment.blocks + rows * ENVIRONMENT_BLOCKS + normal_bin(normal) * (rows + 1u) * (ENVIRONMENT_BLOCKS + 1u);
+}
+
+// The interval that holds u, by binary search. Every distribution has 32, empty ones at the end. u has 24 binary digits, `digits` the next.
+fn interval_at(distribution: u32, u: f32, digits: f32) -> Interval {
+    var at = distribution;
+    at += select(0u, 16u, u >= environment_float(at + 16u));
+    at += select(0u, 8u, u >= environment_float(at + 8u));
+    at += select(0u, 4u, u >= environment_float(at + 4u));
+    at += select(0u, 2u, u >= environment_float(at + 2u));
+    at += select(0u, 1u, u >= environment_float(at + 1u));
+    let low = environment_float(at);
+    let width = environment_float(at + 1u) - low;
+    let position = ((u - low) + digits * 5.9604644775390625e-8) / width;
+    return Interval(at - distribution, width, min(position, 0.99999994));
+}
+
+fn interval_width(distribution: u32, index: u32) -> f32 {
+    return environment_float(distribution + index + 1u) - environment_float(distribution + index);
+}
+
+// Bilinear between the centres of texels. The pdf is that of samples at a surface of this normal: the block's probability, by the cell's mean.
+fn arriving_from(direction: vec3f, normal: vec3f) -> Arriving {
     let d = vec3f(dot(environment.x, direction), dot(environment.y, direction), dot(environment.z, direction));
     let cell = cell_towards(d, environment.width, environment.height);
     let next = column_after(cell.column, environment.width);
@@ -23,30 +62,47 @@ fn arriving_from(direction: vec3f) -> Arriving {
     let upper = a + (b - a) * cell.x;
     let lower = c + (e - c) * cell.x;
     let sum = a + b + c + e;
-    return Arriving(upper + (lower - upper) * cell.y, (sum.x + sum.y + sum.z) * environment.density);
+    let row = cell.row >> (environment.shifts >> 8u);
+    let column = cell.column >> (environment.shifts & 255u);
+    let rows = block_distributions(normal);
+    let columns = rows + (row + 1u) * (ENVIRONMENT_BLOCKS + 1u);
+    let probability = interval_width(rows, row) * interval_width(columns, column) * environment.density;
+    let inverse = environment_float(environment.blocks + row * ENVIRONMENT_BLOCKS + column);
+    return Arriving(upper + (lower - upper) * cell.y, (sum.x + sum.y + sum.z) * inverse * probability);
 }
 
-// What a ray that leaves the scene finds, weighed against the samples of light that find the same; `pdf` is that of the ray's direction.
-fn light_from_afar(direction: vec3f, pdf: f32) -> vec3f {
-    let arriving = arriving_from(direction);
+// The light that a ray which leaves the scene finds, weighed against the samples of light that find the same. `pdf` is that of the ray's
+// direction, `normal` that of the surface which it left.
+fn light_from_afar(direction: vec3f, pdf: f32, normal: vec3f) -> vec3f {
+    let arriving = arriving_from(direction, normal);
     return arriving.radiance * select(1.0, power_heuristic(pdf, arriving.pdf), pdf > 0.0);
 }
 
-// A direction by the table of cells: Walker's method, as for `chosen_emitter`. What the sample brings is looked up as for any other ray, so
-// that both have one density for it. The digits that u has no room for are hashed of it.
-fn sample_environment(light: Light, u: vec2f) -> LightSample {
-    let bits = vec2u(u32(u.x * 16777216.0), u32(u.y * 16777216.0));
-    let more = hash4(vec4u(bits.x, bits.y, 0u, 0u));
+// A sample of the map for a surface of this normal; 0 where light may arrive from both sides. Rows and columns of blocks are chosen by
+// inversion, and a cell of the block by Walker's method, for which the place in the block says which cell is looked at. The radiance is looked
+// up as for any other ray, so that both have one pdf for it.
+fn sample_environment(light: Light, normal: vec3f, u: vec2f) -> LightSample {
+    let more = hash4(vec4u(bitcast<u32>(u.x), bitcast<u32>(u.y), 0u, 0u));
+    let rows = block_distributions(normal);
+    let row = interval_at(rows, u.y, unit_float(more.y));
+    let column = interval_at(rows + (row.index + 1u) * (ENVIRONMENT_BLOCKS + 1u), u.x, unit_float(more.x));
     let width = environment.width;
     let height = environment.height;
-    let first = whole_below((bits.x << 8u) | (more.x & 255u), width * (height + 1u));
+    let down = environment.shifts >> 8u;
+    let along = environment.shifts & 255u;
+    let left = vec2u(width - (column.index << along), height + 1u - (row.index << down));
+    let full = vec2u(1u << along, 1u << down);
+    let size = select(left, full, full < left);
+    let x = column.position * f32(size.x);
+    let y = row.position * f32(size.y);
+    let cell = vec2u(u32(x), u32(y));
+    let first = (row.index << down) * width + size.y * (column.index << along) + cell.y * size.x + cell.x;
     let at = environment.cells + 2u * first;
-    let threshold = texel_word(at);
-    let chosen = select(texel_word(at + 1u), first, ((bits.y << 8u) | ((more.x >> 8u) & 255u)) < threshold);
-    let inside = vec2f(unit_float(more.y), unit_float(more.z));
-    let row = chosen / width;
-    let d = direction_in_cell(chosen - row * width, row, inside, width, height);
+    let own = ((row.index << down) + cell.y) * 65536u + (column.index << along) + cell.x;
+    let chosen = select(texel_word(at + 1u), own, more.z < texel_word(at));
+    let inside = vec2f(x - f32(cell.x), y - f32(cell.y));
+    let d = direction_in_cell(chosen & 65535u, chosen >> 16u, inside, width, height);
     let to = normalize(environment.x * d.x + environment.y * d.y + environment.z * d.z);
-    let arriving = arriving_from(to);
+    let arriving = arriving_from(to, normal);
     return LightSample(to, arriving.radiance, arriving.pdf, false, light.reach, NOTHING);
 }

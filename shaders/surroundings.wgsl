@@ -36,6 +36,21 @@ fn cap_above(row: u32, height: u32) -> f32 {
     return 2.0 * s * s;
 }
 
+// The bin of a normal: the nearest point of a grid on the octahedral map, which has the axes among its points. Cigolle et al., "A Survey of Efficient Representations for Independent Unit
+// Vectors", JCGT 3(2), 2014. The last bin is that of 0.
+fn normal_bin(normal: vec3f) -> u32 {
+    let sum = abs(normal.x) + abs(normal.y) + abs(normal.z);
+    let x = normal.x / sum;
+    let y = normal.y / sum;
+    let folded_x = select(abs(y) - 1.0, 1.0 - abs(y), x >= 0.0);
+    let folded_y = select(abs(x) - 1.0, 1.0 - abs(x), y >= 0.0);
+    let last = f32(NORMAL_BINS - 1u);
+    let column = (select(folded_x, x, normal.z >= 0.0) * 0.5 + 0.5) * last + 0.5;
+    let row = (select(folded_y, y, normal.z >= 0.0) * 0.5 + 0.5) * last + 0.5;
+    let bin = u32(min(max(row, 0.0), last)) * NORMAL_BINS + u32(min(max(column, 0.0), last));
+    return select(NORMAL_BINS * NORMAL_BINS, bin, sum > 0.0);
+}
+
 // The direction of a point of a cell, uniform by solid angle where u is uniform. Its length is 1 within 1 / 10^6.
 fn direction_in_cell(column: u32, row: u32, u: vec2f, width: u32, height: u32) -> vec3f {
     let turn = 1.0 - 2.0 * ((f32(column) + 0.5 + u.x) / f32(width));

@@ -92,7 +92,7 @@ use wgray::cpu::shadow::{Block, Cone, block_sample, cone_to_light, cuts, may_blo
 use wgray::cpu::slab::{Fan, Slabs, box_passage, fan, fan_passage, inverse_of, is_passed, slabs};
 use wgray::cpu::specular::{fresnel, reflected_direction, refracted_cosine, refracted_direction};
 use wgray::cpu::surface::{Surface, first_hit, largest, surface_at, with_coordinates, with_positive_zeros};
-use wgray::cpu::surroundings::{MapCell, cap_above, cell_towards, column_after, direction_in_cell};
+use wgray::cpu::surroundings::{MapCell, cap_above, cell_towards, column_after, direction_in_cell, normal_bin};
 use wgray::cpu::texel::{gaussian_weight, level_size, near_coordinate, srgb_to_linear, unpacked_color, wrapped_index};
 use wgray::cpu::thin::{thin_eval, thin_pdf, thin_reflectance, thin_sample, turned_up};
 use wgray::cpu::triangle::{intersect_triangle, triangle_blocks};
@@ -352,6 +352,7 @@ probes! {
     cell_towards(d: Vec3, width: u32, height: u32) -> MapCell;
     column_after(column: u32, width: u32) -> u32;
     cap_above(row: u32, height: u32) -> f32;
+    normal_bin(normal: Vec3) -> u32;
     direction_in_cell(column: u32, row: u32, u: Vec2, width: u32, height: u32) -> Vec3;
     surface_footprint(q: &Primitive, surface: Surface, dx: Vec3, dy: Vec3) -> Footprint;
     uv_derivative(q: &Primitive, local: Vec3, d: Vec3) -> Vec2;

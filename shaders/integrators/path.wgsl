@@ -15,7 +15,7 @@ struct PathState {
     layers: Layers,        // of the sample, where layers are wanted
     described: bool,       // whether they have the albedo
     start: vec3f,          // where the path was last scattered, if a tree chooses lights
-    start_normal: vec3f,   // the normal there, or 0 where light may come from both sides
+    start_normal: vec3f,   // the normal there, or 0 where light may come from both sides; also for an environment map
     way: f32,              // from the last bounce to the ray's start, past surfaces that are not there, or that the camera does not see
     passed: u32,           // how many of these there were
 }
@@ -44,7 +44,7 @@ fn advance(before: PathState, pixel: vec2u) -> PathState {
     var arriving = environment.radiance;
     if (SURROUNDINGS & IMAGE_AROUND) != 0u {
         if !met {
-            arriving = light_from_afar(path.ray.direction, state.pdf);
+            arriving = light_from_afar(path.ray.direction, state.pdf, state.start_normal);
         }
     }
     if (SURROUNDINGS & BACKGROUND) != 0u {
@@ -280,7 +280,7 @@ fn scattered_specularly(before: PathState, surface: Surface, at: Arrival, materi
 // With the light of one sample of what was chosen, if that is `wanted`.
 fn with_light(state: PathState, spot: Spot, surface: Surface, material: Material, mixture: Mixture, chosen: Chosen, u: vec2f,
               wanted: bool, pixel: vec2u) -> PathState {
-    let light = sample_emitter(chosen, surface.start, u);
+    let light = sample_emitter(chosen, surface.start, lit_normal(surface, material), u);
     let reflected = reflection(spot, surface, material, mixture, normalize(light.to));
     var found = state.path.throughput * reflected.value * light.radiance * (1.0 / light.pdf);
     var from_side = surface;
@@ -338,6 +338,8 @@ fn scattered(before: PathState, spot: Spot, surface: Surface, material: Material
     }
     if LIGHT_TREE != 0u {
         state.start = surface.start;
+    }
+    if (LIGHT_TREE != 0u) | ((SURROUNDINGS & IMAGE_AROUND) != 0u) {
         state.start_normal = lit_normal(surface, material);
     }
     return state;

@@ -45,14 +45,14 @@ pub fn chosen_emitter(scene: &Packed, bits: UVec2) -> Emitter {
     }
 }
 
-pub fn sample_emitter(scene: &Packed, chosen: Chosen, p: Vec3, u: Vec2) -> LightSample {
+pub fn sample_emitter(scene: &Packed, chosen: Chosen, p: Vec3, normal: Vec3, u: Vec2) -> LightSample {
     let emitter = chosen.emitter;
     if emitter.instance != 0 {
         return sample_face(scene, chosen, p, u);
     }
     let light = &scene.lights[emitter.index as usize];
     if light.kind == ENVIRONMENT {
-        return sample_environment(scene, light, u);
+        return sample_environment(scene, light, normal, u);
     }
     if chosen.density > 0.0 {
         let density = chosen.density;

@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::math::{atan2, floor, max, min, sine};
+use crate::pack::NORMAL_BINS;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapCell {
@@ -44,6 +45,19 @@ pub fn cap_above(row: u32, height: u32) -> f32 {
     let from_pole = max(row as f32 - 0.5, 0.0) / height as f32;
     let s = sine(0.5 * min(from_pole, 1.0));
     2.0 * s * s
+}
+
+pub fn normal_bin(normal: Vec3) -> u32 {
+    let sum = normal.x.abs() + normal.y.abs() + normal.z.abs();
+    let x = normal.x / sum;
+    let y = normal.y / sum;
+    let folded_x = if x >= 0.0 { 1.0 - y.abs() } else { y.abs() - 1.0 };
+    let folded_y = if y >= 0.0 { 1.0 - x.abs() } else { x.abs() - 1.0 };
+    let last = (NORMAL_BINS - 1) as f32;
+    let column = (if normal.z >= 0.0 { x } else { folded_x } * 0.5 + 0.5) * last + 0.5;
+    let row = (if normal.z >= 0.0 { y } else { folded_y } * 0.5 + 0.5) * last + 0.5;
+    let bin = min(max(row, 0.0), last) as u32 * NORMAL_BINS + min(max(column, 0.0), last) as u32;
+    if sum > 0.0 { bin } else { NORMAL_BINS * NORMAL_BINS }
 }
 
 pub fn direction_in_cell(column: u32, row: u32, u: Vec2, width: u32, height: u32) -> Vec3 {

@@ -112,6 +112,11 @@ constants! {
     pub const UNSEEN_AROUND: u32 = 2;
     /// In [`Specialization::surroundings`](super::Specialization::surroundings): the camera sees one colour in place of them.
     pub const BACKGROUND: u32 = 4;
+    /// Blocks of an environment map's cells along a row or a column, at most; a power of two.
+    pub const ENVIRONMENT_BLOCKS: u32 = 32;
+    /// Bins of normals along a side of the octahedral map, for each of which blocks have probabilities of their own; an odd number, so that
+    /// the axes are in the middle of theirs.
+    pub const NORMAL_BINS: u32 = 17;
     /// [`Light::kind`](super::Light::kind): a cone of light from one point.
     pub const SPOT: u32 = 9;
     /// [`Material::hidden`]: the camera's rays go through its back.

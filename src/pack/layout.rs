@@ -61,13 +61,16 @@ records! {
         pub z: Vec3,
         /// Rows, without those of the poles.
         pub height: u32,
-        /// Where the table by which cells are chosen starts among the texels: two words each, of how many 2^32nd a cell is chosen itself,
-        /// and which is else.
+        /// Where the tables start among the texels by which cells are chosen, those of a block together, block by block: two words for a cell,
+        /// in how many of 2^32 cases it is chosen itself, and else the row, from bit 16 on, and the column of the cell that is.
         pub cells: u32,
-        /// How densely samples of light lie in a cell, per solid angle, for each unit of the sum of its corners' colours.
+        /// A twelfth of the probability that a sample of light is one of the map.
         pub density: f32,
-        /// 0.
-        pub unused: UVec2,
+        /// Where the blocks' 1 / (radiance times solid angle) start among the texels, [`ENVIRONMENT_BLOCKS`] for a row of blocks. Behind them
+        /// lie, for each bin of normals, the cumulative distributions of the rows and of the blocks of each row.
+        pub blocks: u32,
+        /// The binary logarithms of a block's columns, and from bit 8 on of its rows.
+        pub shifts: u32,
     }
 
     /// Any primitive: local = (x, y, z) (p - anchor) - middle, by the rows of the inverse linear map.

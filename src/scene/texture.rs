@@ -186,8 +186,10 @@ pub(crate) fn words(width: u32, height: u32, levels: u32, is_float: bool) -> u64
     u64::from(levels) + texel * sizes.sum::<u64>()
 }
 
-/// 32-bit words that an image around the scene takes: three a texel, in two rows more than it has, and two for each cell between texels.
+/// 32-bit words that an environment map takes: three a texel, in two rows more than it has, two for each cell between texels, and the tables of
+/// its blocks, at most.
 pub(crate) fn words_around(width: u32, height: u32) -> u64 {
+    const BLOCKS: u64 = 32 * 32 + 290 * 33 * 33;
     let (width, height) = (u64::from(width), u64::from(height));
-    3 * width * (height + 2) + 2 * width * (height + 1)
+    3 * width * (height + 2) + 2 * width * (height + 1) + BLOCKS
 }

@@ -409,8 +409,8 @@ fn every_way_gives_the_same_bits() {
     }
 }
 
-/// Samples of a scene's image.
-fn samples(packed: &Packed, count: u32) -> impl Iterator<Item = Vec3> {
+/// Samples of a scene's image at a surface of this normal.
+fn samples(packed: &Packed, normal: Vec3, count: u32) -> impl Iterator<Item = Vec3> {
     let light = packed
         .lights
         .iter()
@@ -418,8 +418,8 @@ fn samples(packed: &Packed, count: u32) -> impl Iterator<Item = Vec3> {
         .expect("an image around the scene");
     (0..count).map(move |i| {
         let u = sobol_sample(i, UVec2::new(5, 6));
-        let sample = sample_environment(packed, light, u);
-        let again = arriving_from(packed, sample.to);
+        let sample = sample_environment(packed, light, normal, u);
+        let again = arriving_from(packed, sample.to, normal);
         assert_eq!((sample.radiance, sample.pdf), (again.radiance, again.pdf));
         sample.to
     })
@@ -436,17 +436,21 @@ fn directions_are_as_frequent_as_their_density_says() {
         let v = d.z.clamp(-1.0, 1.0).acos() / PI;
         ((v * ROWS as f64) as usize).min(ROWS - 1) * COLUMNS + ((u * COLUMNS as f64) as usize).min(COLUMNS - 1)
     };
-    for image in [
+    let images = [
         image(1, 1, |_, _| [1.0; 3]),
         image(2, 1, |x, _| [x as f32; 3]),
         image(3, 5, |x, y| [(x + 2 * y) as f32; 3]),
         noise(33, 17),
+        noise(130, 70),
         one_bright(16, 8, (3, 0)),
         sunny(),
-    ] {
-        let packed = around(&image, "", (1, 1), GROUND);
+    ];
+    // Light from all sides counts for the normal 0.
+    let normals = [Vec3::ZERO, Vec3::Z, Vec3::new(0.6, -0.48, -0.64)];
+    for (image, normal) in (images.iter()).flat_map(|image| normals.map(|normal| (image, normal))) {
+        let packed = around(image, "", (1, 1), GROUND);
         let mut counts = vec![0.0; COLUMNS * ROWS];
-        samples(&packed, COUNT).for_each(|direction| counts[bin(direction)] += 1.0);
+        samples(&packed, normal, COUNT).for_each(|direction| counts[bin(direction)] += 1.0);
         // Of the density by fine sums; far finer than the cells, whose borders are not the bins'.
         let mut expected = [0.0, 0.08].map(|_| vec![0.0; COLUMNS * ROWS]);
         let fine = image.width.max(image.height).max(24) * 24;
@@ -456,14 +460,14 @@ fn directions_are_as_frequent_as_their_density_says() {
             for column in 0..2 * fine {
                 let azimuth = PI - TAU * (f64::from(column) + 0.5) / f64::from(2 * fine);
                 let direction = DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), cosine).as_vec3();
-                let pdf = f64::from(arriving_from(&packed, direction).pdf);
+                let pdf = f64::from(arriving_from(&packed, direction, normal).pdf);
                 let share = pdf * sine * PI / f64::from(fine) * TAU / f64::from(2 * fine) * f64::from(COUNT);
                 let at = bin(direction);
                 expected[0][at] += share;
                 expected[1][at] += share * if direction.x > 0.0 { 1.08 } else { 0.92 };
             }
         }
-        let size = (image.width, image.height);
+        let size = (image.width, image.height, normal);
         let all: f64 = expected[0].iter().sum::<f64>() / f64::from(COUNT);
         assert!((all - 1.0).abs() < 2e-3, "{size:?}: the density's sum is {all}");
         let statistic = |expected: &[f64]| {
@@ -488,6 +492,44 @@ fn directions_are_as_frequent_as_their_density_says() {
             "{size:?}: a wrong density is not seen: {wrong} of {freedom}"
         );
     }
+}
+
+#[test]
+fn an_unoccluded_wall_has_little_noise() {
+    // Every pixel has the same expected value, so the deviations are all noise.
+    let noise = |normal: [f64; 3], (samples, pattern): (u32, &str)| {
+        let [x, y, z] = normal;
+        let text = format!(
+            "image = {{ width = 32, height = 32 }}\n\
+             camera = {{ position = [{x}, {y}, {z}], look_at = [0, 0, 0], up = [0.3, 0.5, 0.7], fov = 10 }}\n\
+             materials.m = {{ type = 'diffuse', color = [0.5, 0.5, 0.5] }}\n\
+             render = {{ integrator = 'path', max_depth = 1, pixel_samples = {{ count = {samples}, pattern = '{pattern}' }} }}\n\
+             environment = {{ name = 'studio' }}\n\
+             [[shapes]]\ntype = 'rectangle'\nmaterial = 'm'\ncenter = [0, 0, 0]\nsize = [9, 9]\nnormal = [{x}, {y}, {z}]\n\
+             tangent = [0.3, 0.5, 0.7]\n"
+        );
+        let film = render(&crate::scenes::parse(&text), Way::Cpu);
+        let values: Vec<f64> = film.means().map(|[_, green, _]| f64::from(green)).collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        (squares / values.len() as f64).sqrt() / mean
+    };
+    let normals = [
+        [0.0, -1.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+        [0.36, -0.48, 0.8],
+        [-0.6, 0.64, -0.48],
+    ];
+    for normal in normals {
+        let found = noise(normal, (64, "sobol"));
+        assert!(found < 0.035, "{normal:?}: {found}");
+    }
+    // The control: samples that are not stratified, and few ones.
+    assert!(noise([0.0, -1.0, 0.0], (64, "random")) > 0.035);
+    assert!(noise([0.0, -1.0, 0.0], (4, "sobol")) > 0.035);
 }
 
 #[test]

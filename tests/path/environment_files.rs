@@ -105,7 +105,7 @@ fn what_is_wrong_is_told_with_its_place() {
         ),
         (
             "file = 'huge.hdr'",
-            "5: environment.file: \"huge.hdr\" (16384 x 8192 texels) needs 2560.5 MiB and the textures before it 0.0 MiB; the \
+            "5: environment.file: \"huge.hdr\" (16384 x 8192 texels) needs 2561.7 MiB and the textures before it 0.0 MiB; the \
              limit is 1024.0 MiB"
                 .to_owned(),
         ),

@@ -100,7 +100,7 @@ pub fn advance(scene: &Packed, state: &mut PathState, pixel: UVec2) {
         state.ended = true;
         let shown = ((s.alpha == 0) & (s.surroundings & UNSEEN_AROUND == 0)) | (path.depth > 0);
         let arriving = if s.surroundings & IMAGE_AROUND != 0 {
-            light_from_afar(scene, path.ray.direction, state.pdf)
+            light_from_afar(scene, path.ray.direction, state.pdf, state.start_normal)
         } else {
             scene.environment.radiance
         };
@@ -390,7 +390,7 @@ pub fn with_light(
     wanted: bool,
     pixel: UVec2,
 ) {
-    let light = sample_emitter(scene, chosen, surface.start, u);
+    let light = sample_emitter(scene, chosen, surface.start, lit_normal(surface, material), u);
     let reflected = reflection(scene, spot, surface, material, mixture, normalize(light.to));
     let mut found = state.path.throughput * reflected.value * light.radiance * (1.0 / light.pdf);
     let turned;
@@ -480,6 +480,8 @@ pub fn scattered(
     }
     if scene.specialization.light_tree != 0 {
         state.start = surface.start;
+    }
+    if (scene.specialization.light_tree != 0) | (scene.specialization.surroundings & IMAGE_AROUND != 0) {
         state.start_normal = lit_normal(surface, material);
     }
 }
