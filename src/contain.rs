@@ -37,6 +37,8 @@ pub fn contained<T>(calls: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(calls)).map_err(|panic| message(panic.as_ref()))
 }
 
+pub(crate) use contained as catch_panic;
+
 fn message(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or_else(|| panic.downcast_ref::<&str>().copied());

@@ -1,4 +1,4 @@
-//! The bytes of an image that a texture names: PNG, JPEG, WebP, EXR, HDR.
+//! The bytes of an image that a texture names: PNG, JPEG, WebP, KTX2, EXR, HDR.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -17,6 +17,8 @@ use super::{extension, glb, json};
 
 /// The largest file of an image, in bytes.
 const LARGEST_IMAGE: u64 = 512 << 20;
+/// Extensions of textures with images of further formats, in the order of three.js if a texture has several.
+const SOURCES: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
 /// The most bytes of all images together, each as often as it is asked for.
 const MOST_OF_IMAGES: u64 = 4 << 30;
 
@@ -131,7 +133,7 @@ impl Document {
         self.buffers.view(&self.json, view)
     }
 
-    /// The image of a texture: that of `EXT_texture_webp`, or else the core's.
+    /// Returns the image of a texture: that of the first of [`SOURCES`] that it has, or else that of the core specification.
     pub fn image_of(&self, texture: usize) -> Result<usize, GltfError> {
         self.source_of(texture).map_err(|fault| fault.of(&self.path))
     }
@@ -141,14 +143,15 @@ impl Document {
         let texture = (textures.get(index)).ok_or_else(|| missing("textures", index, textures.len()))?;
         let key = format!("textures[{index}]");
         let others = texture.extensions.as_ref().map(|all| &all.others);
-        if let Some(webp) = others.and_then(|others| others.get("EXT_texture_webp"))
-            && let Some(source) = webp.get("source")
-        {
+        let extended = SOURCES
+            .iter()
+            .find_map(|name| Some((name, others?.get(*name)?.get("source")?)));
+        if let Some((name, source)) = extended {
             let count = self.json.images.len();
             let source = source.as_u64().and_then(|source| usize::try_from(source).ok());
             return source.filter(|source| *source < count).ok_or_else(|| {
                 let rule = format!("must be the index of an image; the file has {count}");
-                Fault::key(format!("{key}.extensions.EXT_texture_webp.source"), rule)
+                Fault::key(format!("{key}.extensions.{name}.source"), rule)
             });
         }
         // What stands for none in the crate is an index that no list reaches.

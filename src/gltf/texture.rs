@@ -1,4 +1,5 @@
-//! Textures: images, how they are looked up, and where. Section 3.8; KHR_texture_transform, EXT_texture_webp.
+//! Textures: images, how they are looked up, and where. Section 3.8; KHR_texture_basisu, KHR_texture_transform,
+//! EXT_texture_webp.
 
 use std::io::Cursor;
 
@@ -10,6 +11,7 @@ use serde_json::{Map, Value};
 
 use super::document::Document;
 use super::error::{GltfError, plain};
+use crate::scene::ktx2;
 use crate::scene::{Encoding, ImageTextureDescription, TextureFilter, Wrap};
 
 /// The smallest factor of a texture coordinate, and the largest factor and addend.
@@ -169,6 +171,9 @@ impl Document {
 
 /// Whether an image file has an alpha channel; no, if it cannot be read, which is told when it is decoded.
 pub(super) fn has_alpha(bytes: &[u8]) -> bool {
+    if let Some(has_alpha) = ktx2::has_alpha(bytes) {
+        return has_alpha;
+    }
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let decoder = reader.ok().and_then(|reader| reader.into_decoder().ok());
     decoder.is_some_and(|decoder| decoder.color_type().has_alpha())

@@ -2,11 +2,13 @@
 
 use std::cell::Cell;
 use std::io::Cursor;
+use std::path::Path;
 
 use image::error::{DecodingError, LimitError, LimitErrorKind};
 use image::{DynamicImage, ImageBuffer, ImageDecoder as _, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::gray_exr::gray_exr;
+use super::ktx2::{self, Ktx2};
 use super::texture::{Image, Texels};
 
 /// Most texels along a side.
@@ -20,6 +22,52 @@ const LARGEST: (u64, u64) = (256 << 20, 32);
 
 /// What texels that an EXR file shows and does not store may take, in bytes, beside as many for a byte of the file.
 const BLANK: u64 = 64 << 20;
+
+/// A format of image files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Format {
+    /// A format of the crate `image`.
+    Image(ImageFormat),
+    /// KTX 2 with Basis Universal texels.
+    Ktx2,
+}
+
+/// The supported formats, and their names in messages.
+const FORMATS: [(Format, &str); 6] = [
+    (Format::Image(ImageFormat::Png), "PNG"),
+    (Format::Image(ImageFormat::Jpeg), "JPEG"),
+    (Format::Image(ImageFormat::WebP), "WebP"),
+    (Format::Ktx2, "KTX2"),
+    (Format::Image(ImageFormat::OpenExr), "EXR"),
+    (Format::Image(ImageFormat::Hdr), "HDR"),
+];
+
+impl Format {
+    /// Returns the format of a file, by its first bytes, or `None` if it is not supported.
+    pub fn of(bytes: &[u8]) -> Option<Format> {
+        let format = match bytes.starts_with(ktx2::IDENTIFIER) {
+            true => Format::Ktx2,
+            false => Format::Image(image::guess_format(bytes).ok()?),
+        };
+        let is_supported = FORMATS.iter().any(|(known, _)| *known == format);
+        is_supported.then_some(format)
+    }
+
+    /// Returns the format that the ending of a file's name stands for, supported or not.
+    pub fn of_name(file: &str) -> Option<Format> {
+        let ending = Path::new(file).extension()?;
+        match ending.eq_ignore_ascii_case("ktx2") {
+            true => Some(Format::Ktx2),
+            false => ImageFormat::from_path(file).ok().map(Format::Image),
+        }
+    }
+
+    /// Returns the name of the format.
+    pub fn name(self) -> &'static str {
+        let found = FORMATS.iter().find(|(known, _)| *known == self);
+        found.map_or("unknown", |(_, name)| name)
+    }
+}
 
 /// What a header says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,6 +97,8 @@ pub(super) enum Refused {
     Rule(String),
     /// By a rule that is told behind its name.
     Large(String),
+    /// By a rule of its format, to be printed after its name.
+    Damaged(String),
     /// It has other channels than those that are read.
     Channels(Channels),
 }
@@ -89,9 +139,13 @@ impl IntoError for LimitErrorKind {
 /// Decodes an image, once `fits` has nothing against its header. The result has the file's own type of values.
 pub(super) fn decode(
     bytes: &[u8],
-    format: ImageFormat,
+    format: Format,
     fits: impl Fn(Header) -> Result<(), String>,
 ) -> Result<DynamicImage, Refused> {
+    let format = match format {
+        Format::Image(format) => format,
+        Format::Ktx2 => return decode_ktx2(bytes, fits),
+    };
     if format == ImageFormat::Png {
         return decode_png(bytes, fits);
     }
@@ -165,6 +219,15 @@ fn sides((width, height): (u32, u32)) -> Result<(), Refused> {
 fn check(header: Header, fits: impl Fn(Header) -> Result<(), String>) -> Result<(), Refused> {
     sides((header.width, header.height))?;
     fits(header).map_err(Refused::Rule)
+}
+
+fn decode_ktx2(bytes: &[u8], fits: impl Fn(Header) -> Result<(), String>) -> Result<DynamicImage, Refused> {
+    let file = Ktx2::parse(bytes).map_err(Refused::Damaged)?;
+    let (width, height) = (file.width, file.height);
+    let is_deep = false;
+    check(Header { width, height, is_deep }, fits)?;
+    weigh(bytes, (width, height), 4)?;
+    file.decode().map_err(Refused::Damaged)
 }
 
 /// By the PNG library itself: it can pass over colour profiles and texts, whose decompressed size no header tells.

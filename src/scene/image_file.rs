@@ -11,7 +11,7 @@ use image::error::LimitErrorKind;
 use image::{DynamicImage, ImageError, ImageFormat};
 
 use super::Problem;
-use super::decode::{Channels, Header, LONGEST_SIDE, Refused, decode};
+use super::decode::{Channels, Format, Header, LONGEST_SIDE, Refused, decode};
 use super::halves::halved;
 use super::parse::list;
 use super::texture::{Encoding, Image, Texels};
@@ -19,8 +19,6 @@ use crate::mesh::Mesh;
 
 /// The largest file, in bytes.
 const LARGEST_FILE: u64 = 512 << 20;
-/// The first bytes of a file for GPUs, which glTF files may have (Khronos Group, "KTX File Format", version 2.0).
-const KTX2: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
 /// The largest texel, as of any colour.
 const BRIGHTEST: f32 = 1e6;
 
@@ -158,27 +156,21 @@ impl Assets {
             Place::File(path) => Cow::Owned(read(file, path)?),
             Place::Encoded(name) => Cow::Borrowed(self.encoded.get(name).map_or(&[][..], |bytes| bytes)),
         };
-        let format = image::guess_format(&bytes)
-            .ok()
-            .filter(|format| NAMES.iter().any(|(known, _)| known == format));
         let is_named = matches!(place, Place::File(_));
-        let format = format.ok_or_else(|| {
+        let format = Format::of(&bytes).ok_or_else(|| {
             Problem::damage(match is_named {
-                _ if bytes.starts_with(KTX2) => {
-                    format!("{file:?} is a KTX2 file, which is not supported; convert it to PNG or JPEG")
-                }
-                true => format!("{file:?} must be a PNG, JPEG, WebP, EXR or HDR file"),
-                false => format!("{file:?} must be a PNG, JPEG or WebP file"),
+                true => format!("{file:?} must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
+                false => format!("{file:?} must be a PNG, JPEG, WebP or KTX2 file"),
             })
         })?;
         if is_named {
             check_name(file, format)?;
         }
-        let is_float = matches!(format, ImageFormat::OpenExr | ImageFormat::Hdr);
+        let is_float = matches!(format, Format::Image(ImageFormat::OpenExr | ImageFormat::Hdr));
         if is_float && encoding == Some(Encoding::Srgb) {
             return Err(Problem::new(format!(
                 "{file:?} must not be \"srgb\": files of type {} are linear",
-                name(format)
+                format.name()
             )));
         }
         let longest = self.longest_side.filter(|_| matches!(place, Place::Encoded(_)));
@@ -197,6 +189,7 @@ impl Assets {
         let decoded = decode(&bytes, format, fits).map_err(|refused| match refused {
             Refused::Rule(rule) => Problem::new(rule),
             Refused::Large(rule) => Problem::new(format!("{file:?} {rule}")),
+            Refused::Damaged(rule) => Problem::damage(format!("{file:?} {rule}")),
             Refused::Channels(channels) => Problem::new(format!("{file:?} {}", refused_channels(&channels))),
             Refused::Image(error) => Problem {
                 is_damage: !matches!(error, ImageError::Limits(_)),
@@ -315,7 +308,7 @@ fn clamp(image: &mut Image) -> Option<String> {
 pub(super) struct File {
     pub image: Arc<Image>,
     /// None if its name says none, as in memory.
-    format: Option<ImageFormat>,
+    format: Option<Format>,
     default: Encoding,
     encoding: Encoding,
     is_alpha: bool,
@@ -353,11 +346,11 @@ impl File {
     }
 }
 
-fn check_name(file: &str, format: ImageFormat) -> Result<(), String> {
-    match ImageFormat::from_path(file) {
-        Ok(named) if named != format => Err(format!(
+fn check_name(file: &str, format: Format) -> Result<(), String> {
+    match Format::of_name(file) {
+        Some(named) if named != format => Err(format!(
             "{file:?} must be what its name says; it is a file of type {}",
-            name(format)
+            format.name()
         )),
         _ => Ok(()),
     }
@@ -404,21 +397,6 @@ fn refused_channels(channels: &Channels) -> String {
             list(&channels.names)
         ),
     }
-}
-
-const NAMES: [(ImageFormat, &str); 5] = [
-    (ImageFormat::Png, "PNG"),
-    (ImageFormat::Jpeg, "JPEG"),
-    (ImageFormat::WebP, "WebP"),
-    (ImageFormat::OpenExr, "EXR"),
-    (ImageFormat::Hdr, "HDR"),
-];
-
-fn name(format: ImageFormat) -> &'static str {
-    NAMES
-        .iter()
-        .find(|(known, _)| *known == format)
-        .map_or("unknown", |(_, name)| name)
 }
 
 fn texels(image: DynamicImage, is_float: bool, encoding: Encoding) -> Texels {

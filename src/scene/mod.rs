@@ -16,6 +16,7 @@ mod gltf;
 mod gray_exr;
 pub(crate) mod halves;
 pub(crate) mod image_file;
+pub(crate) mod ktx2;
 pub(crate) mod limits;
 mod load;
 mod mesh_file;

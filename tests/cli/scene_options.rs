@@ -124,7 +124,7 @@ fn surroundings_that_cannot_be_are_told_as_options() {
         ),
         (
             ["ball.toml", "--environment", "text.hdr"],
-            "text.hdr\" must be a PNG, JPEG, WebP, EXR or HDR file",
+            "text.hdr\" must be a PNG, JPEG, WebP, KTX2, EXR or HDR file",
         ),
         (
             ["ball.toml", "--environment", "#12"],

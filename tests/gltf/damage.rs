@@ -35,7 +35,7 @@ fn a_missing_texture_leaves_the_factor() {
         ("broken.png", "\"images[0]\" is damaged or truncated: "),
         (
             "data:image/png;base64,",
-            "\"images[0]\" must be a PNG, JPEG or WebP file",
+            "\"images[0]\" must be a PNG, JPEG, WebP or KTX2 file",
         ),
     ] {
         let mut builder = Builder::new();

@@ -342,7 +342,7 @@ fn a_scene_may_put_a_material_in_place_of_one_of_the_file() {
 
 #[test]
 fn what_is_required_but_unknown_is_refused_and_what_is_used_is_said() {
-    for extension in ["KHR_draco_mesh_compression", "KHR_texture_basisu", "EXT_of_nobody"] {
+    for extension in ["KHR_draco_mesh_compression", "EXT_texture_avif", "EXT_of_nobody"] {
         let mut builder = quad_of(json!({}));
         builder.requires(extension);
         let message = refusal(&builder, "");

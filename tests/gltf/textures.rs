@@ -102,6 +102,56 @@ fn jpeg_and_webp_are_read() {
     );
 }
 
+/// Reads an output of `tests/textures/ktx2.mjs`.
+fn ktx2_file(name: &str) -> Vec<u8> {
+    std::fs::read(crate::sources::path(&format!("tests/textures/ktx2/{name}"))).expect("a file")
+}
+
+/// An unlit quad with an image, which `KHR_texture_basisu` references if it is a KTX2 file.
+fn with_image(bytes: &[u8], kind: &str, more: &Value) -> Builder {
+    let mut builder = Builder::new();
+    let image = builder.image(bytes, kind);
+    let sampler = builder.add("samplers", json!({ "magFilter": 9728 }));
+    let texture = match kind {
+        "image/ktx2" => {
+            builder.requires("KHR_texture_basisu");
+            json!({ "sampler": sampler, "extensions": { "KHR_texture_basisu": { "source": image } } })
+        }
+        _ => json!({ "sampler": sampler, "source": image }),
+    };
+    let texture = builder.add("textures", texture);
+    let material = builder.unlit(json!({ "baseColorTexture": { "index": texture } }));
+    for (key, value) in more.as_object().expect("a table") {
+        builder.get("materials")[material][key] = value.clone();
+    }
+    let mesh = builder.quad(Some(material));
+    builder.root_node(json!({ "mesh": mesh }));
+    builder
+}
+
+#[test]
+fn ktx2_files_are_read() {
+    for name in ["etc1s-quarters", "zstandard-quarters"] {
+        let builder = with_image(&ktx2_file(&format!("{name}.ktx2")), "image/ktx2", &json!({}));
+        assert_quarters(&scene(&builder, name), [RED, GREEN, BLUE, WHITE]);
+    }
+    // Colors and alpha are those of a PNG file of the same texels.
+    let blend = json!({ "alphaMode": "BLEND" });
+    let mut pictures = Vec::new();
+    for name in ["etc1s-48x20-alpha", "uastc-48x20-alpha", "etc1s-48x20"] {
+        let [ktx2, png] = [("ktx2", "image/ktx2"), ("png", "image/png")].map(|(ending, kind)| {
+            let builder = with_image(&ktx2_file(&format!("{name}.{ending}")), kind, &blend);
+            pixels(&scene(&builder, &format!("{name}-{ending}")))
+        });
+        assert_eq!(ktx2, png, "{name}");
+        pictures.push(ktx2);
+    }
+    assert!(
+        pictures[0] != pictures[1] && pictures[0] != pictures[2],
+        "all are the same"
+    );
+}
+
 #[test]
 fn base_color_is_srgb_and_multiplied_by_its_factor() {
     let mut builder = Builder::new();

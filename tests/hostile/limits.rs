@@ -5,8 +5,8 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::seeds::{START, container, triangle};
-use super::{Ran, render, run};
+use super::seeds::{START, TEXTURE, container, ktx2, triangle};
+use super::{Ran, render, render_with, run};
 
 /// What is told of a glTF file; soon, and in a gigabyte.
 fn model(json: &Value, binary: &[u8]) -> Ran {
@@ -229,6 +229,46 @@ fn images_that_grow_a_thousandfold_are_told() {
         "{}",
         ran.said
     );
+}
+
+/// A Zstandard block of 24,000 bytes that is 1.5 GB long when it is decompressed, and a header that declares more texels than
+/// its file has.
+#[test]
+fn ktx2_files_are_refused_by_their_headers() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |bytes: &[u8], rule: &str| {
+        fs::write(folder.path().join("a.ktx2"), bytes).unwrap();
+        fs::write(
+            folder.path().join("a.toml"),
+            START.to_owned() + &TEXTURE.replace("FILE", "a.ktx2"),
+        )
+        .unwrap();
+        let ran = render_with(folder.path(), "a.toml", &["--strict"]);
+        assert!(ran.code == 3 && ran.said.contains(rule), "{}: {}", ran.code, ran.said);
+        assert!(ran.seconds < 5.0, "{}", ran.seconds);
+    };
+    // RFC 8878, section 3.1.1: a window of 1 KiB, a block of 8 bytes, and a block without literals and with 12,000 sequences,
+    // all of which copy 131,074 bytes (codes 0, 0 and 52).
+    let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0, 0];
+    frame.extend([8 << 3, 0, 0]);
+    frame.extend(b"ABCDEFGH");
+    let count = 12_000_u32;
+    let mut block = vec![0, 128 + (count >> 8) as u8, count as u8, 0b0101_0100, 0, 0, 52];
+    block.extend(vec![255; 2 * count as usize]);
+    block.push(1);
+    frame.extend(&((block.len() as u32) << 3 | 2 << 1 | 1).to_le_bytes()[..3]);
+    frame.extend(block);
+    let mut bytes = ktx2("zstandard-48x20");
+    let level = u64::from_le_bytes(bytes[80..88].try_into().unwrap());
+    bytes.truncate(level as usize);
+    bytes.extend(&frame);
+    bytes[88..96].copy_from_slice(&(frame.len() as u64).to_le_bytes());
+    refused(&bytes, "its Zstandard data cannot be decompressed");
+    let mut bytes = ktx2("etc1s-48x20");
+    bytes[20..28].copy_from_slice(&[0, 64, 0, 0, 0, 64, 0, 0]);
+    refused(&bytes, "; the limit for a file of ");
+    bytes[20..28].copy_from_slice(&[1, 64, 0, 0, 1, 0, 0, 0]);
+    refused(&bytes, "must have at most 16384 texels along a side");
 }
 
 /// What an EXR file stores may be more than what it shows.

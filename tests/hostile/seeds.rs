@@ -46,7 +46,7 @@ camera = { position = [0, -4, 1], look_at = [0, 0, 0], fov = 50 }
 render = { integrator = 'path', pixel_samples = { pattern = 'random', count = 1 } }
 lights = [{ type = 'point', position = [1, -4, 3], color = [9, 9, 9] }]
 ";
-const TEXTURE: &str = "
+pub const TEXTURE: &str = "
 [textures.t]
 type = 'image'
 file = 'FILE'
@@ -267,6 +267,8 @@ pub fn all(folder: &Path) -> Vec<Kind> {
         picture("png", ImageFormat::Png, TEXTURE),
         picture("jpg", ImageFormat::Jpeg, TEXTURE),
         picture("webp", ImageFormat::WebP, TEXTURE),
+        kind("ktx2", ktx2("etc1s-5x7-alpha-levels"), How::Named(TEXTURE)),
+        kind("ktx2", ktx2("zstandard-48x20"), How::Named(TEXTURE)),
         picture("exr", ImageFormat::OpenExr, SURROUNDINGS),
         picture("hdr", ImageFormat::Hdr, SURROUNDINGS),
         Kind {
@@ -279,6 +281,11 @@ pub fn all(folder: &Path) -> Vec<Kind> {
         },
     ];
     scenes.into_iter().chain(others).collect()
+}
+
+/// Reads a KTX2 file of `tests/textures/ktx2.mjs`.
+pub fn ktx2(name: &str) -> Vec<u8> {
+    fs::read(project(&format!("tests/textures/ktx2/{name}.ktx2"))).unwrap()
 }
 
 /// A mesh of one triangle, for files that are made to ask for much.

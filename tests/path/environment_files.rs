@@ -101,7 +101,7 @@ fn what_is_wrong_is_told_with_its_place() {
         ),
         (
             "file = 'text.exr'",
-            "5: environment.file: \"text.exr\" must be a PNG, JPEG, WebP, EXR or HDR file".to_owned(),
+            "5: environment.file: \"text.exr\" must be a PNG, JPEG, WebP, KTX2, EXR or HDR file".to_owned(),
         ),
         (
             "file = 'huge.hdr'",

@@ -96,9 +96,9 @@ fn bad_images_are_told() {
         ("huge.png", "must have at most 16384 texels along a side"),
         ("zero.png", "is damaged or truncated: "),
         ("zero.hdr", "must "),
-        ("empty.png", "must be a PNG, JPEG, WebP, EXR or HDR file"),
-        ("text.png", "must be a PNG, JPEG, WebP, EXR or HDR file"),
-        ("s.toml", "must be a PNG, JPEG, WebP, EXR or HDR file"),
+        ("empty.png", "must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
+        ("text.png", "must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
+        ("s.toml", "must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
         ("named.jpg", "must be what its name says; it is a file of type PNG"),
         (
             "nan.exr",

@@ -51,7 +51,7 @@ fn the_factor_alone_stands_in_for_an_image_that_cannot_be_read() {
     for (file, why) in [
         ("none.png", "cannot be read: "),
         ("cut.png", "is damaged or truncated: "),
-        ("empty.png", "must be a PNG, JPEG, WebP, EXR or HDR file"),
+        ("empty.png", "must be a PNG, JPEG, WebP, KTX2, EXR or HDR file"),
     ] {
         let text = MATERIAL.replace("FILE", file);
         let scene = load(folder.path(), &text, false).unwrap();

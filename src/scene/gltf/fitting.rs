@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::decode::{Header, LONGEST_SIDE, decode};
+use super::super::decode::{Format, Header, LONGEST_SIDE, decode};
 use super::super::texture::{levels, words};
 use super::super::validate::TEXEL_MEMORY;
 use super::super::{Assets, Channel, Description, Encoding, MaterialDescription, TextureDescription, ValueDescription};
@@ -94,7 +94,7 @@ fn kept(description: &Description, assets: &Assets) -> Vec<Kept> {
 
 /// What an image's header says. Nothing, if it cannot be read, which is told when it is decoded.
 fn header(bytes: &[u8]) -> Option<Header> {
-    let format = image::guess_format(bytes).ok()?;
+    let format = Format::of(bytes)?;
     let seen = Cell::new(None);
     // Nothing is decoded of what does not fit.
     let _ = decode(bytes, format, |header| {

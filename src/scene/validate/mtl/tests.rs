@@ -184,7 +184,7 @@ fn what_cannot_be_rendered_is_told_once() {
         ("map_Kd none.png", "\"red\": map_Kd: \"in/none.png\" cannot be read: "),
         (
             "map_Kd damaged.png",
-            "\"red\": map_Kd: \"in/damaged.png\" must be a PNG, JPEG, WebP, EXR or HDR file; Kd stands in",
+            "\"red\": map_Kd: \"in/damaged.png\" must be a PNG, JPEG, WebP, KTX2, EXR or HDR file; Kd stands in",
         ),
         ("map_Kd ../../outside.png", "\"red\": map_Kd: \"in/../../outside.png\" "),
         ("map_Kd -s 2 red wood.png", "\"red\": option \"-s\" of map_Kd: ignored"),
