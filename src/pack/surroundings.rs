@@ -450,7 +450,10 @@ mod tests {
             assert!((normal - again).length() < 1e-6, "{bin}: {normal}, {again}");
         }
         assert_eq!(normal_bin(Vec3::ZERO), NORMAL_BINS * NORMAL_BINS);
-        for axis in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|axis| [axis, -axis]) {
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z]
+            .into_iter()
+            .flat_map(|axis| [axis, -axis])
+        {
             let middle = bin_normal(normal_bin(axis.as_vec3()));
             assert!((middle - axis).length() < 1e-6, "{axis}: {middle}");
         }

@@ -131,14 +131,13 @@ fn with_image(bytes: &[u8], kind: &str, more: &Value) -> Builder {
 
 #[test]
 fn ktx2_files_are_read() {
-    for name in ["etc1s-quarters", "zstandard-quarters"] {
-        let builder = with_image(&ktx2_file(&format!("{name}.ktx2")), "image/ktx2", &json!({}));
-        assert_quarters(&scene(&builder, name), [RED, GREEN, BLUE, WHITE]);
-    }
+    // UASTC represents a block of one color exactly.
+    let builder = with_image(&ktx2_file("zstandard-quarters.ktx2"), "image/ktx2", &json!({}));
+    assert_quarters(&scene(&builder, "zstandard-quarters"), [RED, GREEN, BLUE, WHITE]);
     // Colors and alpha are those of a PNG file of the same texels.
     let blend = json!({ "alphaMode": "BLEND" });
     let mut pictures = Vec::new();
-    for name in ["etc1s-48x20-alpha", "uastc-48x20-alpha", "etc1s-48x20"] {
+    for name in ["etc1s-48x20-alpha", "uastc-48x20-alpha", "etc1s-quarters"] {
         let [ktx2, png] = [("ktx2", "image/ktx2"), ("png", "image/png")].map(|(ending, kind)| {
             let builder = with_image(&ktx2_file(&format!("{name}.{ending}")), kind, &blend);
             pixels(&scene(&builder, &format!("{name}-{ending}")))
