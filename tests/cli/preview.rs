@@ -201,7 +201,9 @@ fn a_second_signal_ends_at_once() {
     send("-STOP", &child);
     std::thread::sleep(Duration::from_millis(100));
     let before = place.read("out.exr");
-    ["-INT", "-TERM", "-HUP", "-CONT"].map(|signal| send(signal, &child));
+    for signal in ["-INT", "-TERM", "-HUP", "-CONT"] {
+        send(signal, &child);
+    }
     let ran = ended(child);
     assert!([130, 143, 129].contains(&ran.code), "{}", ran.code);
     assert_eq!(ran.stderr, "");
@@ -313,9 +315,10 @@ fn partial_files_do_not_count_as_existing() {
     assert!(ran.code == 0 && ran.summary.len() == 1, "{}", ran.stderr);
     assert!(partial(&place.path("1.png")).is_none() && partial(&place.path("1.exr")).is_none());
     let ran = run();
-    assert_eq!(
-        (ran.code, ran.stderr.as_str()),
-        (0, "note: skipped 1 of 1: the output files exist\n")
+    assert!(
+        ran.code == 0 && ran.stderr.contains("note: skipped 1 of 1"),
+        "{}",
+        ran.stderr
     );
 }
 
