@@ -5,19 +5,22 @@ use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
 use super::{Metadata, exr, flat, png};
+use crate::contain::catch_panic;
 
 /// Reads the metadata of an image that this program wrote, in any of its formats; `None` for other files. The format is
 /// detected from the first bytes.
 pub fn read_metadata(path: &Path) -> Option<Metadata> {
     let mut file = BufReader::new(File::open(path).ok()?);
     let start = file.fill_buf().ok()?;
-    let metadata = if start.starts_with(b"\x89PNG") {
-        png::read_metadata(file)
+    let read = if start.starts_with(b"\x89PNG") {
+        png::read_metadata
     } else if start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-        exr::read_metadata(file)
+        exr::read_metadata
     } else {
-        flat::read_metadata(file)
+        flat::read_metadata
     };
+    // The file may be from anywhere, and the readers are made for good files.
+    let metadata = catch_panic(|| read(file)).ok().flatten();
     metadata.filter(|metadata| {
         metadata
             .software()
