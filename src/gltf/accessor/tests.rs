@@ -261,7 +261,7 @@ fn an_accessor_without_bytes_is_zero() {
     let hidden = json!({ "componentType": 5126, "count": 2, "type": "VEC2", "extensions": { "X_bytes": {} } });
     assert_eq!(
         told(accessor(&[0], hidden).vectors::<2>(0)),
-        "accessors[0]: \"X_bytes\" holds its only data and is not supported"
+        "accessors[0]: \"X_bytes\" holds its only data and is not supported; export the file without it"
     );
 }
 

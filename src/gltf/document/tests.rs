@@ -128,7 +128,7 @@ fn other_files_are_read_and_listed() {
     assert_eq!(told(3), "images[3]: has neither a uri nor a bufferView");
     assert_eq!(
         told(4),
-        "images[4]: \"X_image\" holds its only data and is not supported"
+        "images[4]: \"X_image\" holds its only data and is not supported; export the file without it"
     );
     assert_eq!(told(5), "images: 5 is out of range; the file has 5");
     let names: Vec<_> = files.iter().filter_map(|path| path.file_name()?.to_str()).collect();
@@ -199,7 +199,7 @@ fn what_is_no_gltf_is_told() {
         Err(fault) => fault.of(Path::new("a")).to_string(),
     };
     assert_eq!(json("\u{feff}{\"asset\":{\"version\":\"2.0\"}}  \n\0\0"), "fine");
-    assert_eq!(json(""), "a:1:1: EOF while parsing a value");
+    assert_eq!(json(""), "a: the file is empty");
     assert_eq!(json("{\n  x"), "a:2:3: key must be a string");
     assert_eq!(json("[]"), "a:1:1: the JSON must be an object");
     assert_eq!(json("{}"), "a: asset: is required: an object with the version");
