@@ -606,7 +606,7 @@ light_samples = { pattern = 'random', count = 5 }
                     pixel_samples: Some(8),
                     ..none()
                 },
-                "pixel_samples: 8 must be a square number, because its pattern is an n x n grid",
+                "pixel_samples: 8 must be a square number, such as 4 or 9: the pattern \"grid\" is an n x n grid; other patterns take any number",
             ),
             (
                 Overrides {

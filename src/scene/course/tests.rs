@@ -246,7 +246,7 @@ fn overrides_stand_in_for_the_files_values() {
     };
     assert_eq!(
         told(&overrides),
-        "pixel_samples: 5 must be a square number, because its pattern is an n x n grid"
+        "pixel_samples: 5 must be a square number, such as 4 or 9: the pattern \"grid\" is an n x n grid; other patterns take any number"
     );
     let overrides = |integrator, max_depth| Overrides {
         integrator,
@@ -450,12 +450,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "[0, 1, 6.8]",
         "[0, 1, 2e9]",
-        "6: cam_config.position: 2e9 must be from -1e9 to 1e9",
+        "6: cam_config.position: 2e9 must be finite, from -1e9 to 1e9",
     ),
     (
         "[0, 1.98, 0]",
         "[0, 2e9, 0]",
-        "13: light_config.position: 2e9 must be from -1e9 to 1e9",
+        "13: light_config.position: 2e9 must be finite, from -1e9 to 1e9",
     ),
     (
         "[0.5, 0.25]",
@@ -490,7 +490,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "[0.7, 0, -0.5]",
         "[0.7, 0, -2e9]",
-        "28: objects[2].translate: -2e9 must be from -1e9 to 1e9",
+        "28: objects[2].translate: -2e9 must be finite, from -1e9 to 1e9",
     ),
     (
         "\"scale\": 0.5",

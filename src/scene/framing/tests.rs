@@ -231,7 +231,7 @@ fn an_orbit_is_a_direction_in_degrees() {
         (View::Right, 90.0, 0.0),
         (View::Left, -90.0, 0.0),
         (View::Back, 180.0, 0.0),
-        (View::Corner, 30.0, 15.0),
+        (View::Corner, 30.0, 20.0),
         (View::Top, 0.0, 90.0),
         (View::Bottom, 0.0, -90.0),
         (View::Iso, 45.0, 35.264_389_682_754_654),

@@ -184,7 +184,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "position = [0, -4, 1]",
         "position = [0, nan, 1]",
-        "camera.position: nan must be from -1e9 to 1e9",
+        "camera.position: nan must be finite, from -1e9 to 1e9",
     ),
     (
         "look_at = [0, 0, 1]",
@@ -194,7 +194,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "look_at = [0, 0, 1]",
         "look_at = [0, 0, -inf]",
-        "camera.look_at: -inf must be from -1e9 to 1e9",
+        "camera.look_at: -inf must be finite, from -1e9 to 1e9",
     ),
     (
         "look_at = [0, 0, 1]",
@@ -262,7 +262,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "center = [0, 0, 9]",
         "center = [2e9, 0, 0]",
-        "lights[0].center: 2e9 must be from -1e9 to 1e9",
+        "lights[0].center: 2e9 must be finite, from -1e9 to 1e9",
     ),
     (
         "size = [2, 4]",
@@ -282,7 +282,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "position = [0, 0, 8]",
         "position = [0, 0, inf]",
-        "lights[1].position: inf must be from -1e9 to 1e9",
+        "lights[1].position: inf must be finite, from -1e9 to 1e9",
     ),
     (
         "direction = [0, 3, -4]",
@@ -352,7 +352,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]",
         "vertices = [[0, 0, 0], [1, nan, 0], [0, 1, 0]]",
-        "shapes[3].vertices[1]: nan must be from -1e9 to 1e9",
+        "shapes[3].vertices[1]: nan must be finite, from -1e9 to 1e9",
     ),
     (
         "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]",

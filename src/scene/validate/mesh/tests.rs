@@ -191,12 +191,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         LINE_OF_MATRIX,
         "translate = [0, 0, -2e9]",
-        "shapes[1].translate: -2e9 must be from -1e9 to 1e9",
+        "shapes[1].translate: -2e9 must be finite, from -1e9 to 1e9",
     ),
     (
         LINE_OF_MATRIX,
         "translate = [1e9, 0, 0]",
-        "shapes[1].file: \"one.obj\" reaches to 1.000000001e9 there; coordinates must be from -1e9 to 1e9",
+        "shapes[1].file: \"one.obj\" reaches to 1.000000001e9 there; coordinates must be finite, from -1e9 to 1e9",
     ),
     (
         "translate = [1, 2, 3]",
@@ -221,12 +221,12 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         LINE_OF_MATRIX,
         "matrix = [[1, 0, 0, 5], [0, 1, 0, 2e9], [0, 0, 1, 7]]",
-        "shapes[1].matrix[1]: 2e9 must be from -1e9 to 1e9",
+        "shapes[1].matrix[1]: 2e9 must be finite, from -1e9 to 1e9",
     ),
     (
         LINE_OF_MATRIX,
         "matrix = [[1, 0, 0, 5], [0, nan, 0, 6], [0, 0, 1, 7]]",
-        "shapes[1].matrix[1]: nan must be from -1e9 to 1e9",
+        "shapes[1].matrix[1]: nan must be finite, from -1e9 to 1e9",
     ),
     (
         LINE_OF_MATRIX,
