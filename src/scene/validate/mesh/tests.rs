@@ -196,7 +196,7 @@ const BAD: &[(&str, &str, &str)] = &[
     (
         LINE_OF_MATRIX,
         "translate = [1e9, 0, 0]",
-        "shapes[1].file: \"one.obj\" reaches to 1.000000001e9 there; coordinates must be finite, from -1e9 to 1e9",
+        "shapes[1].file: \"one.obj\" reaches to 1.000000001e9 there; coordinates must be from -1e9 to 1e9",
     ),
     (
         "translate = [1, 2, 3]",
