@@ -220,7 +220,7 @@ fn a_device_that_is_not_there_exits_with_4() {
         &place,
         &ran,
         4,
-        "no adapter's name, driver or type contains 'abacus'; available: 1: ",
+        "no adapter's name, driver or type contains 'abacus'; available: cpu, gpu, auto, 1: ",
     );
     for device in ["gpu", "lavapipe"] {
         let ran = place.run_with(&["render", "small.toml", "--device", device], &NO_DRIVER);

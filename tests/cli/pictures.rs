@@ -364,6 +364,7 @@ fn alpha_is_in_a_webp_and_black_in_a_jpeg() {
             "a.jpg",
             "--quality",
             "100",
+            "-q",
         ],
     );
     let image::DynamicImage::ImageRgba8(png) = image::open(place.path("a.png")).unwrap() else {

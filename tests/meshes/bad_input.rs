@@ -89,7 +89,7 @@ const BAD: &[(&str, &str, &str)] = &[
         "v 1 2 3\nf 1 1 -\n",
         "a.obj:2: \"-\" must be a corner of a face: v, v/t, v//n or v/t/n",
     ),
-    ("a.ply", "", "a.ply:1: the file must begin with \"ply\""),
+    ("a.ply", "", "a.ply: the file is empty"),
     ("a.ply", "solid\n", "a.ply:1: the file must begin with \"ply\""),
     (
         "a.ply",
