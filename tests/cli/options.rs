@@ -57,7 +57,8 @@ fn an_integrator_stands_in_for_the_scenes() {
     let ran = place.run(&[&["render", "small.toml", "-o", "option.exr"], &option[..]].concat());
     assert_eq!((ran.code, ran.stdout.as_str()), (0, ""), "{}", ran.stderr);
     let told: Vec<&str> = ran.stderr.lines().collect();
-    assert_eq!(told.len(), 2, "{}", ran.stderr);
+    assert_eq!(told.len(), 3, "{}", ran.stderr);
+    assert!(told[2].contains("render.max_depth is 0"), "{}", told[2]);
     assert!(
         told[0].starts_with("warning: small.toml: render.ambient: no effect"),
         "{}",

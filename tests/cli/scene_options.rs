@@ -128,7 +128,7 @@ fn surroundings_that_cannot_be_are_told_as_options() {
         ),
         (
             ["ball.toml", "--environment", "#12"],
-            "must be an image file (.hdr, .exr, .png, .jpg), studio, sky, a color",
+            "must be studio, sky, an image file (.hdr, .exr, .png, .jpg) or a color",
         ),
         (
             ["ball.toml", "--environment", "1,2,-3"],
