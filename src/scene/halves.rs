@@ -64,7 +64,7 @@ fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Syn
     let (new_width, new_height) = ((width / 2).max(1), (height / 2).max(1));
     let mut texels = vec![DVec3::ZERO; new_width * new_height];
     let lines = texels.par_chunks_mut(new_width).with_min_len(16);
-    if width % 2 == 0 && height % 2 == 0 {
+    if width.is_multiple_of(2) && height.is_multiple_of(2) {
         // The general case with its weights, in the order of its sum.
         lines.enumerate().for_each(|(j, line)| {
             for (i, sum) in line.iter_mut().enumerate() {
