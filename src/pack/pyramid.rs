@@ -189,7 +189,7 @@ mod tests {
         for encoding in [Encoding::Srgb, Encoding::Linear] {
             let (table, bytes) = (decoded(encoding), PackedBytes::new(encoding));
             for i in 0..1_u32 << 16 {
-                let color = [i as u8, (i >> 8) as u8, (i * 40_503 >> 8) as u8];
+                let color = [i as u8, (i >> 8) as u8, ((i * 40_503) >> 8) as u8];
                 let exact = packed(color.map(|byte| steps(table[usize::from(byte)], encoding)));
                 assert_eq!(bytes.packed(color), exact, "{encoding:?} {color:?}");
             }

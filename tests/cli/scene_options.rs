@@ -150,8 +150,14 @@ fn surroundings_that_cannot_be_are_told_as_options() {
             ["ball.toml", "--background", "-1,0,0"],
             "--background: -1 must be finite, from 0 to 1e6",
         ),
-        (["ball.toml", "--turntable", "0"], "must be a whole number from 1 to 100000"),
-        (["ball.toml", "--turntable", "100001"], "must be a whole number from 1 to 100000"),
+        (
+            ["ball.toml", "--turntable", "0"],
+            "must be a whole number from 1 to 100000",
+        ),
+        (
+            ["ball.toml", "--turntable", "100001"],
+            "must be a whole number from 1 to 100000",
+        ),
     ] {
         let before = place.files_but(|_| false);
         let ran = place.run(&[&["render"], &arguments[..]].concat());
