@@ -221,7 +221,14 @@ function fieldOf(field) {
     item.classList.toggle("invalid", Boolean(text));
   };
   let newest = field;
-  const change = (value, i) => write(newest, value, i, note);
+  let accepted = field.value;
+  let kept = null; // the value in the file while the error of a refused one is shown
+  const change = (value, i) =>
+    write(newest, value, i, (text) => {
+      if (text) kept = JSON.stringify(accepted);
+      else accepted = value;
+      note(text);
+    });
   const made = controlOf(field, change);
   if (field.fixed) {
     head.append(make("small", { className: "fixed", textContent: field.fixed }));
@@ -239,6 +246,7 @@ function fieldOf(field) {
   item.append(...made.elements, error);
   let isNew = true;
   const show = (next) => {
+    const before = newest.value;
     newest = next;
     const isAbsent = next.value === undefined;
     origin.textContent = !isAbsent || next.fixed ? "" : next.default === undefined ? "absent" : "default";
@@ -247,6 +255,10 @@ function fieldOf(field) {
     out.hidden = isAbsent || next.required || Boolean(next.fixed);
     if (isBusy(next.path) && !isNew) return;
     isNew = false;
+    // A late answer about an earlier change leaves the error and the value that it is about.
+    const isLate = !error.hidden && JSON.stringify(next.value) === kept && JSON.stringify(before) !== kept;
+    if (isLate) return;
+    accepted = next.value;
     note(""); // the error was about an earlier value
     made.update(next);
   };
