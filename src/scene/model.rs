@@ -122,7 +122,7 @@ pub(super) fn describe(path: &Path, overrides: &Overrides) -> Result<(Descriptio
     };
     let camera = framed(points.iter().copied(), framing);
     Ok((
-        scene(overrides, size, camera, shape, &points).with_environment(studio(overrides)),
+        scene(overrides, size, camera, shape, &points).with_environment(studio(overrides)?),
         mesh,
     ))
 }
@@ -151,11 +151,15 @@ pub(super) fn scene(
 }
 
 /// Returns the light of models that have none. The camera sees gray instead of the studio, unless an environment is selected.
-pub(super) fn studio(overrides: &Overrides) -> EnvironmentDescription {
-    EnvironmentDescription {
+pub(super) fn studio(overrides: &Overrides) -> Result<EnvironmentDescription, SceneError> {
+    if overrides.integrator == Some(Integrator::Phong) {
+        let rule = "phong does not support environment maps, and this model has no other light; use path";
+        return Err(SceneError::Override(Problem::of("integrator", rule)));
+    }
+    Ok(EnvironmentDescription {
         background: overrides.environment.is_none().then_some(BACKGROUND),
         ..EnvironmentDescription::named(EnvironmentName::Studio)
-    }
+    })
 }
 
 /// Returns the vertices in the file's coordinates, or the corners of their bounding box if they are many.

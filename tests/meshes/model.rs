@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use wgray::scene::{Geometry, GltfChoice, Overrides, Presentation, Reflection, Scene, Selection, VertexColors, View};
+use wgray::scene::{
+    Geometry, GltfChoice, Integrator, Overrides, Presentation, Reflection, Scene, Selection, VertexColors, View,
+};
 use wgray::{Description, Device, Options};
 
 use super::readers::in_all_formats;
@@ -217,4 +219,22 @@ fn options_of_gltf_files_are_refused() {
         message,
         format!("camera: only applies to glTF files, and {} is a mesh", path.display())
     );
+}
+
+#[test]
+fn a_model_without_lights_needs_the_path_tracer() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in in_all_formats() {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        for (integrator, is_refused) in [(Integrator::Phong, true), (Integrator::Path, false)] {
+            let overrides = Overrides {
+                integrator: Some(integrator),
+                ..Overrides::default()
+            };
+            let message = Scene::load_with(&path, &overrides).map_or_else(|error| error.to_string(), |_| String::new());
+            let rule = "integrator: phong does not support environment maps";
+            assert_eq!(message.starts_with(rule), is_refused, "{name}: {message}");
+        }
+    }
 }

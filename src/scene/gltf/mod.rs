@@ -173,7 +173,7 @@ pub(super) fn describe(
     };
     let mut description = model::scene(overrides, (width, height), camera, shape, &points);
     if imported.lights.is_empty() {
-        description = description.with_environment(model::studio(overrides));
+        description = description.with_environment(model::studio(overrides)?);
     }
     Ok((description, imported))
 }
