@@ -291,8 +291,8 @@ impl<'a> Bands<'a> {
         Ok(())
     }
 
-    /// Returns the samples at the end of the pass after `have` samples. Passes are long enough that copying films takes little
-    /// of the time, and end at every power of two.
+    /// Returns the samples at the end of the pass that follows `have` samples. A pass is long enough to make the cost of copying
+    /// films small. Every power of two is the end of a pass.
     fn end_of_pass(&self, have: u32) -> u32 {
         let count = match self.bands.len() {
             1 => (self.steps.speed().unwrap_or(0.0) * PASS.as_secs_f64() / self.pixels() as f64) as u32,

@@ -5,7 +5,7 @@ use super::MtlMaterial;
 use super::error::{Fault, shown};
 use super::words::{Words, number};
 
-/// Maximum number of materials of a file: each takes a few hundred bytes, and may have nine in the file.
+/// Maximum number of materials of a file: one takes some hundred bytes, and more for its keywords, but may have only nine in the file.
 pub(super) const MAX_MATERIALS: usize = 1 << 16;
 /// Maximum number of reported lines that cannot be read.
 const MAX_PROBLEMS: usize = 100;

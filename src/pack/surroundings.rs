@@ -18,7 +18,7 @@ const PARTS: usize = 4;
 /// Half the width of a bin of normals, about, as an angle.
 const BIN_RADIUS: f64 = 0.06;
 
-/// Where an image that surrounds the scene is among the texels, if there is one.
+/// The location of the environment map among the texels, if the scene has one.
 #[derive(Default)]
 pub struct Surroundings(Option<Around>);
 
@@ -44,12 +44,12 @@ impl Surroundings {
         Surroundings(image.and_then(|image| around(image, texels)))
     }
 
-    /// What it sends from all directions together.
+    /// Returns the integral of the radiance over all directions.
     pub fn sum(&self) -> Option<f64> {
         self.0.as_ref().map(|around| around.sum)
     }
 
-    /// What kernels know of it as a constant.
+    /// Returns the flags that kernels have as constants.
     pub fn bits(&self, scene: &Scene) -> u32 {
         let any = |test: fn(&scene::Environment) -> bool| scene.environment.as_ref().is_some_and(test);
         let bit = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
@@ -117,15 +117,16 @@ fn around(around: &EnvironmentImage, texels: &mut Vec<u32>) -> Option<Around> {
     })
 }
 
-/// The blocks of a map's cells: [`ENVIRONMENT_BLOCKS`] along a side at most, whose sides are powers of two but at the right and the lower edge.
+/// A division of a map's cells into at most [`ENVIRONMENT_BLOCKS`] x [`ENVIRONMENT_BLOCKS`] blocks. Their sides are powers of two, except at the
+/// right and the lower edge.
 struct Grid {
-    /// Of cells.
+    /// Width of the map in cells.
     width: usize,
-    /// Of cells.
+    /// Height of the map in cells.
     height: usize,
-    /// The binary logarithm of a block's columns.
+    /// Binary logarithm of the width of a block in cells.
     along: usize,
-    /// Of its rows.
+    /// Binary logarithm of the height of a block in cells.
     down: usize,
 }
 
@@ -139,7 +140,7 @@ struct Part {
 }
 
 impl Grid {
-    /// Returns the blocks of a map of so many texels.
+    /// Returns the blocks of a map of this size in texels.
     fn of(width: usize, height: usize) -> Grid {
         let most = ENVIRONMENT_BLOCKS as usize;
         let shift = |count: usize| (0..).find(|shift| (count - 1) >> shift < most).unwrap_or(0);
@@ -305,7 +306,7 @@ fn write_distribution(weights: &[f64], words: &mut Vec<u32>) {
     }
 }
 
-/// Of each cell the mean of its corners times its solid angle.
+/// Returns the weight of each cell: the mean of its corners times its solid angle.
 fn weights(texels: &[u32], width: usize, height: usize) -> Vec<f64> {
     let value = |i: usize| {
         let parts = &texels[3 * i..3 * i + 3];

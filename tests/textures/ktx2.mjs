@@ -1,5 +1,5 @@
-// Makes the files of tests/textures/ktx2: KTX 2 files by the Basis Universal encoder of npm's ktx2-encoder, and a PNG file
-// of what the Basis Universal transcoder of npm's three decodes each to.
+// Makes the files of tests/textures/ktx2: KTX 2 files by the Basis Universal encoder of npm's ktx2-encoder, and for each a PNG
+// file that the Basis Universal transcoder of npm's three decodes from it.
 //
 //     npm install ktx2-encoder@0.6.0 three@0.187.0
 //     node tests/textures/ktx2.mjs tests/textures/ktx2

@@ -23,7 +23,7 @@ impl Previews {
         Previews { images, last: None }
     }
 
-    /// Returns true if the image should be written after so many samples.
+    /// Returns true if the image should be written after this number of samples per pixel.
     pub fn is_due(&self, samples: u32) -> bool {
         samples.is_power_of_two() && self.last.is_none_or(|last| last.elapsed() >= INTERVAL)
     }
