@@ -266,10 +266,16 @@ fn hash_mesh(hasher: &mut blake3::Hasher, mesh: &PackedMesh) {
     }
 }
 
+/// Minimum length of a list that is hashed by all threads.
+const PARALLEL_BYTES: usize = 1 << 20;
+
 /// Hashes bytes with their length in front, so that no two lists of lists hash alike.
 fn list(hasher: &mut blake3::Hasher, bytes: &[u8]) {
     hasher.update(&(bytes.len() as u64).to_le_bytes());
-    hasher.update(bytes);
+    match bytes.len() >= PARALLEL_BYTES {
+        true => hasher.update_rayon(bytes),
+        false => hasher.update(bytes),
+    };
 }
 
 #[cfg(test)]

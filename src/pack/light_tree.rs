@@ -4,6 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DQuat, DVec3, UVec4};
+use rayon::prelude::*;
 
 use super::{LightNode, NOTHING};
 
@@ -158,25 +159,34 @@ impl Bounds {
 /// Children of a node, at most.
 const WIDTH: usize = 4;
 
+/// Minimum number of lamps of a node whose children are built in parallel.
+const PARALLEL: usize = 2048;
+
 /// Builds the tree. The root is node 0.
 pub fn build(lamps: &[Lamp]) -> Vec<LightNode> {
+    build_with(lamps, PARALLEL)
+}
+
+fn build_with(lamps: &[Lamp], parallel: usize) -> Vec<LightNode> {
     let mut order: Vec<u32> = (0..lamps.len() as u32).collect();
-    let mut builder = Builder {
+    let builder = Builder {
         lamps,
         total: lamps.iter().map(|lamp| lamp.intensity).sum(),
-        nodes: Vec::with_capacity(lamps.len() / 2 + 1),
+        parallel,
     };
+    let mut nodes = Vec::with_capacity(lamps.len() / 2 + 1);
     if let Some(part) = builder.part(&mut order, 0) {
-        builder.fill(NOTHING, part);
+        builder.add_subtree(NOTHING, part, &mut nodes);
     }
-    builder.nodes
+    nodes
 }
 
 struct Builder<'a> {
     lamps: &'a [Lamp],
     /// The intensity of all.
     total: f64,
-    nodes: Vec<LightNode>,
+    /// Minimum number of lamps of a node whose children are built in parallel.
+    parallel: usize,
 }
 
 /// Some lamps, which are a node's child.
@@ -193,9 +203,45 @@ impl Builder<'_> {
         Some(Part { order, bounds, level })
     }
 
-    /// Makes the node of some lamps, and all below it, and gives its number.
-    fn fill(&mut self, parent: u32, all: Part) -> u32 {
-        let number = self.nodes.len() as u32;
+    /// Appends the node of some lamps and its descendants in depth-first order, and returns the node's index.
+    fn add_subtree(&self, parent: u32, all: Part, nodes: &mut Vec<LightNode>) -> u32 {
+        let number = nodes.len();
+        let is_parallel = all.order.len() >= self.parallel;
+        let (node, parts) = self.node(parent, all);
+        nodes.push(node);
+        let inner = parts.into_iter().enumerate().filter(|(_, part)| part.order.len() > 1);
+        let parent_of = |i: usize| (4 * number + i) as u32;
+        if !is_parallel {
+            for (i, part) in inner {
+                nodes[number].children[i] = self.add_subtree(parent_of(i), part, nodes);
+            }
+            return number as u32;
+        }
+        let inner: Vec<(usize, Part)> = inner.collect();
+        let subtrees = inner.into_par_iter().map(|(i, part)| {
+            let mut subtree = Vec::new();
+            self.add_subtree(NOTHING, part, &mut subtree);
+            (i, subtree)
+        });
+        for (i, mut subtree) in subtrees.collect::<Vec<_>>() {
+            let first = nodes.len() as u32;
+            for node in &mut subtree {
+                node.parent.x = node.parent.x.wrapping_add(4 * first); // the root's is set below
+                for child in 0..WIDTH {
+                    if node.children[child] != NOTHING {
+                        node.children[child] += first;
+                    }
+                }
+            }
+            subtree[0].parent.x = parent_of(i);
+            nodes[number].children[i] = first;
+            nodes.append(&mut subtree);
+        }
+        number as u32
+    }
+
+    /// Returns the node of some lamps, without the indices of its children, and the lamps of each child.
+    fn node<'a>(&self, parent: u32, all: Part<'a>) -> (LightNode, Vec<Part<'a>>) {
         let size = (all.bounds.high - all.bounds.low).max_element();
         let room = if size > 0.0 { 1e-3 * size } else { 1.0 };
         let mut parts = vec![all];
@@ -229,12 +275,7 @@ impl Builder<'_> {
                 node.index[i] = lamp.index;
             }
         }
-        self.nodes.push(node);
-        for (i, part) in parts.into_iter().enumerate().filter(|(_, part)| part.order.len() > 1) {
-            let child = self.fill(4 * number + i as u32, part);
-            self.nodes[number as usize].children[i] = child;
-        }
-        number
+        (node, parts)
     }
 
     /// Writes down where and how bright a node's child is.
@@ -293,13 +334,16 @@ impl Builder<'_> {
             }
             let room = 1e-3 * size[longest];
             let stretched = size[longest] / size[axis]; // K_r
+            let mut first: Option<Bounds> = None;
             for split in 1..BUCKETS {
-                let cost = |buckets: &[Option<Bounds>]| {
-                    Bounds::of_all(buckets.iter().copied().flatten()).map(|bounds| bounds.cost(room))
+                // Without lamps in the bucket before, this is the split before.
+                let Some(added) = buckets[split - 1] else { continue };
+                let nearer = first.map_or(added, |before| before.with(&added));
+                first = Some(nearer);
+                let Some(farther) = Bounds::of_all(buckets[split..].iter().copied().flatten()) else {
+                    break;
                 };
-                let (Some(first), Some(second)) = (cost(&buckets[..split]), cost(&buckets[split..])) else {
-                    continue;
-                };
+                let (first, second) = (nearer.cost(room), farther.cost(room));
                 let cost = stretched * (first + second);
                 if best.is_none_or(|(least, _, _)| cost < least) {
                     best = Some((cost, axis, split));

@@ -139,8 +139,10 @@ fn approximately_packed(color: DVec3) -> Option<u32> {
         return None;
     }
     let mantissas = steps.map(|x| x / unit(exponent));
-    let is_certain = mantissas.iter().all(|x| (x - x.round()).abs() < CERTAIN);
-    is_certain.then(|| joined(mantissas.map(|x| x.round() as u32), exponent))
+    // Truncation is faster than `round`, and equal where rounding is certain.
+    let rounded = mantissas.map(|x| (x + 0.5) as u32);
+    let is_certain = (mantissas.iter().zip(rounded)).all(|(x, rounded)| (x - f64::from(rounded)).abs() < CERTAIN);
+    is_certain.then(|| joined(rounded, exponent))
 }
 
 /// [`packed`] of bytes, by tables: the finest levels are most of the texels.

@@ -17,7 +17,7 @@ use crate::mesh::{Mesh, MeshError};
 
 /// The longer side of the image in pixels, and samples of a pixel, by default.
 pub(super) const SIDE: u32 = 720;
-const SAMPLES: u32 = 64;
+const SAMPLES: u32 = 32;
 /// Radiance of the background: the grey in the middle of what a display shows.
 const BACKGROUND: DVec3 = DVec3::splat(0.18);
 

@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::texture::{Image, Texels};
 
@@ -50,18 +51,22 @@ const LAMPS: [Lamp; 4] = [
     },
 ];
 
-/// The studio's image.
+/// Returns the studio as an environment map.
 pub fn studio() -> Image {
-    let texel = |i: usize| {
-        let angle = (0.5 + (i / WIDTH) as f64) * PI / HEIGHT as f64;
-        let turn = PI - (0.5 + (i % WIDTH) as f64) * TAU / WIDTH as f64;
-        let direction = DVec3::new(angle.sin() * turn.cos(), angle.sin() * turn.sin(), angle.cos());
-        Vec3::splat(radiance(direction) as f32).into()
+    let azimuths: Vec<(f64, f64)> = (0..WIDTH)
+        .map(|column| (PI - (0.5 + column as f64) * TAU / WIDTH as f64).sin_cos())
+        .collect();
+    let row = |row: usize| {
+        let (sine, cosine) = ((0.5 + row as f64) * PI / HEIGHT as f64).sin_cos();
+        let direction = move |(y, x): &(f64, f64)| DVec3::new(sine * x, sine * y, cosine);
+        let texel = move |azimuth| Vec3::splat(radiance(direction(azimuth)) as f32).into();
+        azimuths.iter().map(texel).collect::<Vec<_>>()
     };
+    let rows: Vec<Vec<[f32; 3]>> = (0..HEIGHT).into_par_iter().map(row).collect();
     Image {
         width: WIDTH as u32,
         height: HEIGHT as u32,
-        texels: Texels::Floats((0..WIDTH * HEIGHT).map(texel).collect()),
+        texels: Texels::Floats(rows.concat()),
     }
 }
 

@@ -56,7 +56,7 @@ fn a_model_by_itself_is_a_picture() {
     let ran = place.run(&["check", "box.glb", "box.gltf"]);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
     for line in ran.stdout.lines() {
-        assert!(line.contains(": ok: 720 x 720 pixels, 64 samples per pixel"), "{line}");
+        assert!(line.contains(": ok: 720 x 720 pixels, 32 samples per pixel"), "{line}");
         assert!(
             line.contains("2 shapes, including 2 instances of 2 meshes (24 triangles"),
             "{line}"

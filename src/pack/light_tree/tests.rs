@@ -165,6 +165,24 @@ fn probabilities(nodes: &[LightNode], count: usize, p: Vec3, n: Vec3) -> Vec<f64
 }
 
 #[test]
+fn a_tree_built_in_parallel_has_the_same_nodes() {
+    let mut random = Random(5);
+    for count in [0, 1, 2, 5, 16, 17, 300, 5000] {
+        let lamps: Vec<Lamp> = (0..count).map(|i| random.lamp(i, i % 3 == 0)).collect();
+        let serial = build_with(&lamps, usize::MAX);
+        for parallel in [1, 40, PARALLEL] {
+            let nodes = build_with(&lamps, parallel);
+            assert!(
+                bytemuck::cast_slice::<_, u32>(&nodes) == bytemuck::cast_slice::<_, u32>(&serial),
+                "{count}, {parallel}"
+            );
+        }
+        let changed = build_with(&lamps[..lamps.len().saturating_sub(1)], 1);
+        assert!(count == 0 || bytemuck::cast_slice::<_, u32>(&changed) != bytemuck::cast_slice::<_, u32>(&serial));
+    }
+}
+
+#[test]
 fn probabilities_sum_to_one_and_whatever_can_shine_has_one() {
     let mut random = Random(2);
     for (count, two_sided) in [(1, false), (2, false), (17, true), (300, false), (300, true)] {
