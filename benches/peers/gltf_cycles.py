@@ -78,7 +78,7 @@ def cycles(asked):
     c.samples, c.use_adaptive_sampling, c.use_denoising, c.use_guiding = asked["spp"], False, False, False
     c.max_bounces = c.diffuse_bounces = c.glossy_bounces = c.transmission_bounces = 15
     c.sample_clamp_direct = c.sample_clamp_indirect = c.blur_glossy = 0
-    c.pixel_filter_type = "BOX"
+    c.pixel_filter_type, c.seed = asked.get("filter", "BOX"), asked.get("seed", 0)
     out.render.filepath = asked["picture"]
     bpy.ops.render.render(write_still=True)
 
@@ -117,4 +117,5 @@ def main():
         print(f"{name}: RMSE {color['rmse']:.4f}, FLIP {color['flip']:.4f}", flush=True)
 
 
-main()
+if __name__ == "__main__":
+    main()
