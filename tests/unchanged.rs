@@ -1,19 +1,25 @@
-//! Pictures have the bits that they had: checksums of the linear pictures of all scenes, kept in `tests/unchanged.txt`. A
-//! change that is to alter no picture is held to it; one that is to alter pictures says so by new lines there, which
-//! `WGRAY_TEST_RECORD=1` writes. That the pictures are right is for other tests to show.
+//! Images have the bits that they had: checksums of the linear images of all scenes, and of those in `tests/unchanged`, are kept in
+//! `tests/unchanged.txt`. A change that is to alter images says so by new lines there, which `WGRAY_TEST_RECORD=1` writes. Other tests
+//! show that the images are right.
 
 use std::collections::BTreeSet;
 use std::fs;
+use std::path::PathBuf;
 
 use bytemuck::cast_slice;
 use wgray::film::Film;
-use wgray::pack::{FirstHit, Packed};
+use wgray::pack::{FirstHit, Packed, pack};
+use wgray::scene::{Description, GltfChoice, Integrator, Overrides, Scene};
 
 use crate::pictures::{Way, first_hits, reference};
+use crate::random_scenes::any_scene;
 use crate::render::{small_scenes, variations};
 use crate::sources;
 
 const KEPT: &str = "tests/unchanged.txt";
+/// Scenes and models of features that the project's scenes do not have. Those named `random` were random scenes; the files of
+/// [`any_scene::folder`] are beside them.
+const FOLDER: &str = "tests/unchanged";
 
 /// The normal, depth, texture coordinates, shape and material: what lines of the file are of.
 fn old_words(hit: &FirstHit) -> [u32; 8] {
@@ -22,10 +28,44 @@ fn old_words(hit: &FirstHit) -> [u32; 8] {
     [x, y, z, hit.depth.to_bits(), u, v, hit.shape, hit.material]
 }
 
+/// The scenes and models of [`FOLDER`]. Every other random scene has layers, if its integrator has any.
+fn special_scenes() -> Vec<(String, Packed)> {
+    let entries = fs::read_dir(sources::path(FOLDER)).expect("the folder");
+    let mut paths: Vec<_> = entries.map(|entry| entry.expect("an entry").path()).collect();
+    paths.sort();
+    let packed = |(i, path): (usize, PathBuf)| {
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        if path.extension().is_some_and(|ending| ending == "glb") {
+            let overrides = Overrides {
+                size: Some((24, 16)),
+                pixel_samples: Some(4),
+                gltf: GltfChoice {
+                    time: name.starts_with("animated").then_some(0.4),
+                    ..GltfChoice::default()
+                },
+                ..Overrides::default()
+            };
+            let scene = Scene::load_with(&path, &overrides).unwrap_or_else(|error| panic!("{error}"));
+            return (name, pack(&scene));
+        }
+        let text = fs::read_to_string(&path).expect("a scene");
+        let description = Description::parse(&text, &name).unwrap_or_else(|error| panic!("{error}"));
+        let packed = any_scene::packed(&description);
+        match i.is_multiple_of(2) && description.integrator() == Integrator::Path {
+            true => (name, packed.with_layers()),
+            false => (name, packed),
+        }
+    };
+    paths.into_iter().enumerate().map(packed).collect()
+}
+
 /// Checksums of the CPU's film of a scene, and of its first hits.
 fn line(name: &str, packed: &Packed) -> String {
-    let Film { sums, moments, .. } = reference(packed);
-    let film = crc32fast::hash(cast_slice(&[sums, moments].concat()));
+    let Film {
+        sums, moments, layers, ..
+    } = reference(packed);
+    let layers = layers.concat();
+    let film = crc32fast::hash(cast_slice(&[sums, moments, layers].concat()));
     let hits = crc32fast::hash(cast_slice(
         &first_hits(packed, Way::Cpu).iter().map(old_words).collect::<Vec<_>>(),
     ));
@@ -34,7 +74,7 @@ fn line(name: &str, packed: &Packed) -> String {
 
 #[test]
 fn pictures_have_the_bits_that_they_had() {
-    let scenes = small_scenes().into_iter().chain(variations());
+    let scenes = small_scenes().into_iter().chain(variations()).chain(special_scenes());
     let found: String = scenes.map(|(name, packed)| line(&name, &packed)).collect();
     let path = sources::path(KEPT);
     if std::env::var_os("WGRAY_TEST_RECORD").is_some_and(|value| value == "1") {

@@ -396,7 +396,7 @@ fn a_file_by_itself_is_a_scene() {
         let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(corners(&scene).len(), 2);
         assert_eq!((scene.width, scene.height), (720, 720));
-        assert_eq!(scene.render.pixel_samples.count, 64);
+        assert_eq!(scene.render.pixel_samples.count, 32);
         assert_eq!(scene.render.integrator, wgray::scene::Integrator::Path);
         assert_eq!(scene.view.transform, wgray::scene::ViewTransform::KhronosPbrNeutral);
         // There is no light in it: a studio shines.
