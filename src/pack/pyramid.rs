@@ -107,7 +107,7 @@ fn packed(steps: [f64; 3]) -> u32 {
 /// large for that.
 fn exponent(largest: f64) -> u32 {
     let exponent = ((largest as f32).to_bits() >> 23).clamp(103, 134) - 103;
-    exponent + u32::from((largest / unit(exponent)).round() > 511.0)
+    exponent + u32::from(largest / unit(exponent) >= 511.5) // rounds to 512
 }
 
 fn mantissa(x: f64, exponent: u32) -> u32 {
