@@ -37,7 +37,7 @@ pub(super) fn hint<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) ->
 
 /// Maximum number of unknown names for which similar ones are searched: a scene may have 100,000 shapes with unknown materials,
 /// and as many materials.
-const MAX_SEARCHES: usize = 100;
+const MAX_SEARCHES: usize = 40;
 
 /// Makes messages about unknown names, whose cost is limited.
 #[derive(Debug, Default)]

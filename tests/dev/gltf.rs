@@ -73,9 +73,9 @@ fn a_model_is_shown_anew_when_it_is_saved() {
     wait_for(&running, RED);
 }
 
-/// An exporter writes a file in pieces: what it has written so far is no error, and the page shows that files are being read.
+/// An exporter writes a file in pieces: incomplete pieces cause no error, and the page shows that files are read.
 #[test]
-fn a_file_that_is_being_written_is_no_error() {
+fn incomplete_files_of_an_exporter_cause_no_error() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("box.glb");
     model(RED).write_glb(folder.path(), "box.glb");

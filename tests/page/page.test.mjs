@@ -99,6 +99,28 @@ test("all errors of a scene are shown", async () => {
   await page.locator("#problems h2").first().waitFor({ state: "detached" });
 });
 
+test("while a file is being written the page says that files are read", async () => {
+  const page = await open(browser, studio);
+  studio.write("box.obj", "v 0 0 0\n");
+  studio.write("scene.toml", `${SCENE}\n[[shapes]]\ntype = "mesh"\nfile = "box.obj"\nmaterial = "red"\n`);
+  await page.locator("#problems h2").waitFor();
+  assert.equal(await text(page, "#problems summary"), "1 problem");
+  const start = Date.now();
+  let reads = false;
+  for (let i = 0; !reads && Date.now() - start < LONGEST; i++) {
+    studio.write("box.obj", "v 0 0 0\n".repeat(i));
+    await page.waitForTimeout(20);
+    reads = await page.evaluate(() =>
+      document.querySelector("#problems summary").textContent === "1 problem. Reading the changed files…" &&
+      document.querySelector("#badge").textContent === "Reading files…");
+  }
+  assert.ok(reads);
+  studio.write("box.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n");
+  await page.locator("#problems h2").waitFor({ state: "detached" });
+  studio.write("scene.toml", SCENE);
+  await showsRendered(page, studio);
+});
+
 test("drags move the camera, and saving writes what the page shows", async () => {
   const page = await open(browser, studio);
   const start = await text(page, "#camera-text");

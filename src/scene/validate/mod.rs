@@ -82,7 +82,10 @@ impl Description {
         };
         let mut scene = match expanded {
             None => self.validate_plain(settings, integrator, assets, files)?,
-            Some(Err(problem)) => self.validate_plain(Err(problem.into()), integrator, assets, files)?,
+            Some(Err(problem)) => {
+                let others = self.validate_plain(Err(problem.into()), integrator, assets, files);
+                others.map_err(Problems::once_per_key)? // the file may have the same problem again
+            }
             Some(Ok(expanded)) => {
                 // The files may have added lights.
                 let settings = expanded.description.settings(integrator);
