@@ -275,14 +275,10 @@ fn option(problem: &Problem) -> Usage {
 /// Prints an error.
 fn report(error: &anyhow::Error, code: u8) {
     let code = Value::from(code);
-    let shader = shader_errors(error);
-    if shader.is_empty() {
-        let hint = match error.downcast_ref() {
-            Some(RenderError::OutOfMemory { .. }) => " (--crop, --size, --device cpu)",
-            _ => "",
-        };
-        let mut facts = facts_of([("exit_code", code.clone())]);
-        if let Some(error) = error.downcast_ref::<SceneError>() {
+    if let Some(error) = error.downcast_ref::<SceneError>() {
+        let (errors, more) = error.each();
+        for error in errors {
+            let mut facts = facts_of([("exit_code", code.clone())]);
             let place = error.place();
             let numbers = [("line", place.line), ("column", place.column)];
             let texts = [("file", place.file), ("key", place.key)];
@@ -290,7 +286,20 @@ fn report(error: &anyhow::Error, code: u8) {
             let all = numbers.map(|(name, number)| (name, number.map(Value::from)));
             let known = all.into_iter().chain(texts);
             facts.extend(known.filter_map(|(name, value)| Some((name.to_owned(), value?))));
+            log::tell(Level::Error, &error.to_string(), facts);
         }
+        if let Some(more) = more {
+            log::tell(Level::Error, &more, facts_of([("exit_code", code)]));
+        }
+        return;
+    }
+    let shader = shader_errors(error);
+    if shader.is_empty() {
+        let hint = match error.downcast_ref() {
+            Some(RenderError::OutOfMemory { .. }) => " (--crop, --size, --device cpu)",
+            _ => "",
+        };
+        let facts = facts_of([("exit_code", code.clone())]);
         log::tell(Level::Error, &format!("{error:#}{hint}"), facts);
     }
     for error in shader {

@@ -43,8 +43,19 @@ impl Diagnostic {
         }
     }
 
-    /// Returns the diagnostic of a scene that cannot be read, with the line of its text.
-    pub fn scene(error: &SceneError, text: &str) -> Diagnostic {
+    /// Returns the diagnostics of a scene that cannot be read, with the lines of its text.
+    pub fn scene(error: &SceneError, text: &str) -> Vec<Diagnostic> {
+        let layout = Layout::of(text).filter(|_| text.len() <= MAX_SEARCHED_BYTES);
+        let (errors, more) = error.each();
+        let shown = errors
+            .iter()
+            .map(|error| Diagnostic::of_value(error, text, layout.as_ref()));
+        let rest = more.map(|more| Diagnostic::plain("scene", more));
+        shown.chain(rest).collect()
+    }
+
+    /// Returns the diagnostic of an error of one value, or of a whole file.
+    fn of_value(error: &SceneError, text: &str, layout: Option<&Layout>) -> Diagnostic {
         let (origin, line, column) = match error {
             SceneError::Syntax {
                 origin, line, column, ..
@@ -61,7 +72,9 @@ impl Diagnostic {
         let message = whole.strip_prefix(&format!("{place}: ")).unwrap_or(&whole).to_string();
         let marked = match (error, column) {
             (_, Some(column)) => Some((column, 1)),
-            (SceneError::Invalid { problem, .. }, None) => mark_of(text, line, problem),
+            (SceneError::Invalid { problem, .. }, None) => {
+                layout.and_then(|layout| mark_of(layout, text, line, problem))
+            }
             _ => None,
         };
         let column = marked.map(|(column, _)| column);
@@ -129,8 +142,7 @@ fn around(text: &str, line: usize, excerpt: &str) -> String {
 const MAX_SEARCHED_BYTES: usize = 1 << 20;
 
 /// Returns column and length of the value that breaks a rule, or of the unknown key, if it is on this line.
-fn mark_of(text: &str, line: usize, problem: &Problem) -> Option<(usize, usize)> {
-    let layout = Layout::of(text).filter(|_| text.len() <= MAX_SEARCHED_BYTES)?;
+fn mark_of(layout: &Layout, text: &str, line: usize, problem: &Problem) -> Option<(usize, usize)> {
     let range = match (problem.message.starts_with("unknown key"), problem.key.0.last()) {
         (true, Some(Segment::Key(key))) => layout.extent(&problem.key).map(|all| all.start..all.start + key.len()),
         _ => layout.value(&problem.key),
@@ -163,11 +175,36 @@ mod tests {
     use super::*;
     use crate::scene::Scene;
 
+    fn of(error: &SceneError, text: &str) -> Diagnostic {
+        let mut shown = Diagnostic::scene(error, text);
+        assert_eq!(shown.len(), 1, "{shown:?}");
+        shown.remove(0)
+    }
+
+    #[test]
+    fn every_error_of_a_scene_is_shown_with_its_line() {
+        let start = "[image]\nwidth = 0\nheight = 4\n[camera]\nposition = [0, 1, 0]\nlook_at = [1, 0, 0]\nfov = 190\n";
+        let shown = Diagnostic::scene(&Scene::parse(start, "s.toml").unwrap_err(), start);
+        let places: Vec<_> = shown.iter().map(|one| (one.place.as_deref(), one.column)).collect();
+        assert_eq!(places, [(Some("s.toml:2:9"), Some(9)), (Some("s.toml:7:7"), Some(7))]);
+        assert_eq!(
+            shown[1].marked_line().as_deref(),
+            Some("    7 | fov = 190\n      |       ^^^")
+        );
+        let many = format!("{start}{}", "[[lights]]\ntype = 'point'\n".repeat(30));
+        let shown = Diagnostic::scene(&Scene::parse(&many, "s.toml").unwrap_err(), &many);
+        assert_eq!(shown.len(), 21);
+        assert_eq!(
+            (shown[20].message.as_str(), &shown[20].place),
+            ("and 10 more errors", &None)
+        );
+    }
+
     #[test]
     fn a_scene_error_is_shown_with_its_line() {
         let text = "[image]\nwidth = 0\nheight = 4\n[camera]\nposition = [0, 1, 0]\nlook_at = [1, 0, 0]\nfov = 40\n";
         let error = Scene::parse(text, "s.toml").unwrap_err();
-        let shown = Diagnostic::scene(&error, text);
+        let shown = of(&error, text);
         assert_eq!(shown.place.as_deref(), Some("s.toml:2:9"));
         assert_eq!(shown.message, "image.width: 0 must be from 1 to 65536");
         let lines = "    1 | [image]\n    2 | width = 0\n      |         ^\n    3 | height = 4";
@@ -179,7 +216,7 @@ mod tests {
         assert!(Path::new(shown.file.as_ref().unwrap()).is_absolute() && shown.file.unwrap().ends_with("s.toml"));
         assert_eq!((shown.line, shown.column), (Some(2), Some(9)));
         let unknown = text.replace("fov", "  fovv");
-        let shown = Diagnostic::scene(
+        let shown = of(
             &Scene::parse(&unknown.replace("= 0", "= 4"), "s.toml").unwrap_err(),
             &unknown,
         );
@@ -190,11 +227,11 @@ mod tests {
         );
         // Without a value the whole line is marked.
         let missing = text.replace("width = 0\n", "");
-        let shown = Diagnostic::scene(&Scene::parse(&missing, "s.toml").unwrap_err(), &missing);
+        let shown = of(&Scene::parse(&missing, "s.toml").unwrap_err(), &missing);
         assert_eq!(shown.column, None);
         let text = "[image]\nwidth = = 2";
         let error = Scene::parse(text, "s.toml").unwrap_err();
-        let shown = Diagnostic::scene(&error, text);
+        let shown = of(&error, text);
         assert_eq!(shown.place.as_deref(), Some("s.toml:2:9"));
         let lines = "    1 | [image]\n    2 | width = = 2\n      |         ^";
         assert_eq!(

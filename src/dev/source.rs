@@ -124,7 +124,7 @@ pub fn are_of_one_scene(a: &Constants, b: &Constants) -> bool {
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     /// The scene or its errors.
-    pub scene: Result<Arc<Loaded>, Diagnostic>,
+    pub scene: Result<Arc<Loaded>, Vec<Diagnostic>>,
     /// The shaders or their errors.
     pub shaders: Result<Arc<Shaders>, Box<Diagnostic>>,
     /// Time spent on reading the files, and on packing the scene.
@@ -145,7 +145,26 @@ pub enum FileStamp {
     Changed(u64, Option<SystemTime>),
 }
 
+impl FileStamp {
+    /// Returns the size in bytes.
+    pub fn size(&self) -> u64 {
+        match self {
+            FileStamp::Absent => 0,
+            FileStamp::Content(bytes) => bytes.len() as u64,
+            FileStamp::Changed(size, _) => *size,
+        }
+    }
+}
+
 impl Sources {
+    /// Returns the states of models, meshes and textures, in a snapshot and now.
+    pub fn assets(&self, snapshot: &Snapshot) -> [Vec<FileStamp>; 2] {
+        let texts = usize::from(!is_model(&self.scene));
+        let files = || snapshot.files.iter().skip(texts);
+        let then = files().map(|(_, stamp)| stamp.clone()).collect();
+        [then, files().map(|(path, _)| self.stamp(path)).collect()]
+    }
+
     /// Returns why the scene file cannot be edited here, if that is so.
     pub fn read_only(&self) -> Option<String> {
         let kind = match &self.scene {
@@ -222,7 +241,7 @@ impl Sources {
             false => read_text(&self.scene).and_then(|read| {
                 text = read;
                 let draft = Draft::read(&text, &origin, folder_of(&self.scene), &self.overrides)?;
-                let assets = self.assets(&draft.description);
+                let assets = self.named_files(&draft.description);
                 files.extend(assets.map(|path| (path.clone(), self.stamp(&path))));
                 draft.check(&mut named)
             }),
@@ -253,7 +272,7 @@ impl Sources {
     }
 
     /// Returns the files that a scene names.
-    fn assets(&self, described: &Description) -> impl Iterator<Item = PathBuf> {
+    fn named_files(&self, described: &Description) -> impl Iterator<Item = PathBuf> {
         described.files(self.scene.parent().unwrap_or(Path::new("")))
     }
 

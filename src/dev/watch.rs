@@ -25,6 +25,14 @@ const DOUBT: Duration = Duration::from_millis(100);
 /// Maximum delay of an error while files keep changing.
 const DOUBTS: Duration = Duration::from_secs(1);
 
+/// Models, meshes and textures that are incomplete or large are read once they have not changed for this time: a program
+/// may be writing them, and reading them too early would delay reading the complete files.
+const GROWTH_QUIET: Duration = Duration::from_millis(300);
+/// They are read after this time at the latest.
+const GROWTH_PATIENCE: Duration = Duration::from_secs(10);
+/// Total size, in bytes, from which such files are large.
+const LARGE: u64 = 1 << 20;
+
 /// The changes of the scene file by this session, which the watcher need not read again.
 #[derive(Default)]
 pub struct Writes {
@@ -116,6 +124,7 @@ fn run(
 ) {
     let mut reads = false; // true after a report of reading, until its end is reported
     let mut again = None; // the event during a possibly incomplete save, and the time of its first change
+    let mut failed = last.scene.is_err(); // whether the last scene that was read has errors, reported or not
     loop {
         let Some((wake, noticed)) = again.take().or_else(|| Some((wakes.recv().ok()?, Instant::now()))) else {
             return;
@@ -135,6 +144,22 @@ fn run(
             }
             next = wakes.recv_timeout(QUIET);
         }
+        let mut begin = || {
+            reads = reads || report(Event::Reading(true));
+        };
+        let [then, now] = sources.assets(&last);
+        let is_large = now.iter().map(FileStamp::size).sum::<u64>() >= LARGE;
+        let is_growing = then != now && (failed || is_large);
+        if is_growing {
+            begin();
+            match wait_settled(wakes, now, || {
+                let [_, now] = sources.assets(&last);
+                now
+            }) {
+                Some(more) => names |= more,
+                None => return,
+            }
+        }
         if names {
             folders.forget(); // a folder may have been replaced by a new one of the same name
         }
@@ -146,14 +171,12 @@ fn run(
             }
             writes.count
         };
-        let begin = || {
-            reads = reads || report(Event::Reading(true));
-        };
-        if let Some(new) = sources.reread(&last, begin) {
+        if let Some(new) = sources.reread(&last, &mut begin) {
+            failed = new.scene.is_err();
             let is_doubtful = new.scene.is_err() && new.scene.as_ref().err() != last.scene.as_ref().err();
             if is_doubtful
                 && noticed.elapsed() < DOUBTS
-                && let Ok(wake) = wakes.recv_timeout(DOUBT)
+                && let Ok(wake) = wakes.recv_timeout(if is_growing { GROWTH_QUIET } else { DOUBT })
             {
                 again = Some((wake, noticed));
                 continue;
@@ -167,6 +190,33 @@ fn run(
             }
         } else if std::mem::take(&mut reads) && !report(Event::Reading(false)) {
             return;
+        }
+    }
+}
+
+/// Waits until files have not changed for some time. Returns whether names may have changed, or `None` if the watch ends.
+fn wait_settled(
+    wakes: &Receiver<Wake>,
+    mut known: Vec<FileStamp>,
+    stamps: impl Fn() -> Vec<FileStamp>,
+) -> Option<bool> {
+    let start = Instant::now();
+    let (mut since, mut names) = (start, false);
+    loop {
+        match wakes.recv_timeout(GROWTH_QUIET.saturating_sub(since.elapsed())) {
+            Ok(Wake::Stop) | Err(RecvTimeoutError::Disconnected) => return None,
+            Ok(Wake::Names) => names = true,
+            Ok(Wake::Content) | Err(RecvTimeoutError::Timeout) => {}
+        }
+        // Other files in these folders may change all the time.
+        let new = stamps();
+        if new != known {
+            (known, since) = (new, Instant::now());
+        } else if since.elapsed() >= GROWTH_QUIET {
+            return Some(names);
+        }
+        if start.elapsed() >= GROWTH_PATIENCE {
+            return Some(names);
         }
     }
 }

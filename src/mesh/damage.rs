@@ -2,13 +2,13 @@
 
 use super::error::{Fault, Place};
 
-pub(super) const VERTEX: &str = "faces with this vertex are left out";
-pub(super) const FACE: &str = "the face is left out";
-pub(super) const UV: &str = "(0, 0) stands in for the texture coordinates";
-pub(super) const NORMAL: &str = "the normal of the triangles stands in";
-pub(super) const COLOR: &str = "white stands in for the color";
-pub(super) const LINE: &str = "the line is ignored";
-pub(super) const REST: &str = "the rest of the line is ignored";
+pub(super) const VERTEX: &str = "faces with this vertex were removed";
+pub(super) const FACE: &str = "the face was removed";
+pub(super) const UV: &str = "the texture coordinates (0, 0) are used instead";
+pub(super) const NORMAL: &str = "the normal of the triangles is used instead";
+pub(super) const COLOR: &str = "white is used instead";
+pub(super) const LINE: &str = "the line was ignored";
+pub(super) const REST: &str = "the other values were ignored";
 
 /// The damage to a file, by its stand-ins.
 #[derive(Default)]
@@ -55,7 +55,7 @@ impl Damage {
         };
         let more = match self.count {
             1 => String::new(),
-            count => format!(" (and {} more)", count - 1),
+            count => format!(" ({} more like this)", count - 1),
         };
         format!("{place}{}; {}{more}", self.first.message, self.stand_in)
     }

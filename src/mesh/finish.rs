@@ -63,8 +63,12 @@ pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh,
         return Err(Place::File.fault(format!("{NO_TRIANGLES} but {dropped} without an area")));
     }
     if dropped > 0 {
-        let (one, several) = ("degenerate triangle dropped", "degenerate triangles dropped");
-        mesh.notes.push(counted(dropped, one, several));
+        mesh.notes.push(removed(
+            dropped,
+            count,
+            "has no area (degenerate)",
+            "have no area (degenerate)",
+        ));
     }
 
     // For a million triangles this and the edges take 0.05 s, a third of the load of a binary PLY file.
@@ -77,15 +81,15 @@ pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh,
     if edges.crowded > 0 {
         mesh.notes.push(counted(
             edges.crowded,
-            "edge belongs to more than two triangles (non-manifold)",
-            "edges belong to more than two triangles (non-manifold)",
+            "edge is shared by more than two triangles (non-manifold mesh); rendered unchanged",
+            "edges are shared by more than two triangles (non-manifold mesh); rendered unchanged",
         ));
     }
     if edges.turned > 0 {
         mesh.notes.push(counted(
             edges.turned,
-            "edge is passed in the same direction by both triangles (windings differ)",
-            "edges are passed in the same direction by both triangles (windings differ)",
+            "edge has inconsistent winding order (its triangles face opposite sides); rendered unchanged",
+            "edges have inconsistent winding order (their triangles face opposite sides); rendered unchanged",
         ));
     }
     match normals {
@@ -223,8 +227,18 @@ fn drop_repeated(mesh: &mut Mesh, repeated: &[u32]) {
     keep(&mut mesh.triangles, &marks);
     keep(&mut mesh.group_of, &marks);
     drop_unused(mesh);
-    let (one, several) = ("duplicate triangle dropped", "duplicate triangles dropped");
-    mesh.notes.push(counted(repeated.len(), one, several));
+    let (one, several) = ("is a duplicate", "are duplicates");
+    mesh.notes.push(removed(repeated.len(), marks.len(), one, several));
+}
+
+/// Returns the note that some of all triangles were removed, and why.
+fn removed(count: usize, all: usize, one: &str, several: &str) -> String {
+    let (why, were) = match count {
+        1 => (one, "was"),
+        _ => (several, "were"),
+    };
+    let triangles = if all == 1 { "triangle" } else { "triangles" };
+    format!("{count} of {all} {triangles} {why} and {were} removed")
 }
 
 /// Normals of the vertices by the triangles around, weighted by their angles: Thürmer and Wüthrich, "Computing Vertex

@@ -262,7 +262,7 @@ fn read_faces(element: &Element, values: &mut impl Values, vertices: usize, draf
         return Err(element.place.fault(format!("element \"face\": {rule}")));
     };
     if element.properties.iter().any(|property| property.name == "texcoord") {
-        let note = "texture coordinates of faces (\"texcoord\") are ignored; only those of vertices are used";
+        let note = "texture coordinates per face corner (\"texcoord\") are not supported and were ignored; use those per vertex";
         draft.notes.push(note.to_string());
     }
     draft.triangles.reserve_exact(element.count.min(MOST));

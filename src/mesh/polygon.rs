@@ -62,12 +62,20 @@ pub(super) fn triangulate(draft: &mut Draft) {
         }
     }
     let notes = [
-        (bent, "polygon is not planar", "polygons are not planar"),
-        (crossing, "polygon intersects itself", "polygons intersect themselves"),
+        (
+            bent,
+            "polygon is not planar; split into triangles",
+            "polygons are not planar; split into triangles",
+        ),
+        (
+            crossing,
+            "polygon intersects itself; split into a triangle fan",
+            "polygons intersect themselves; split into triangle fans",
+        ),
         (
             large,
-            "concave polygon has more than 16384 corners and becomes a fan of triangles",
-            "concave polygons have more than 16384 corners and become fans of triangles",
+            "concave polygon has more than 16384 corners; split into a triangle fan",
+            "concave polygons have more than 16384 corners; split into triangle fans",
         ),
     ];
     let notes = notes.into_iter().filter(|(count, ..)| *count > 0);

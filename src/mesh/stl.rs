@@ -39,8 +39,8 @@ pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
             if more > 0 {
                 facets.draft.notes.push(counted(
                     more as usize,
-                    "byte after the last triangle is ignored",
-                    "bytes after the last triangle are ignored",
+                    "byte after the last triangle was ignored",
+                    "bytes after the last triangle were ignored",
                 ));
             }
         }

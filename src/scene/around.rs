@@ -74,12 +74,10 @@ fn transparent(description: &mut Description) -> Result<(), Problem> {
 }
 
 /// Returns a problem of the environment override as one of the option.
-pub(super) fn of_option(problem: Problem) -> Result<Problem, Problem> {
+pub(super) fn of_option(problem: &Problem) -> Option<Problem> {
     let key = problem.key.to_string();
-    match key.strip_prefix("environment") {
-        Some("" | ".color" | ".file") => Ok(Problem::new(problem.message).at("environment")),
-        _ => Err(problem),
-    }
+    let is_of_option = matches!(key.strip_prefix("environment"), Some("" | ".color" | ".file"));
+    is_of_option.then(|| Problem::new(problem.message.as_str()).at("environment"))
 }
 
 impl FromStr for Background {

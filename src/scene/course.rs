@@ -10,7 +10,7 @@ use serde_json::value::RawValue;
 use toml::Value;
 
 use super::define::Defines;
-use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
+use super::error::{At, KeyPath, Problem, Problems, SceneError, Segment, cut};
 use super::validate::{light, point};
 use super::{
     ColorDescription, ConductorDescription, Description, DiffuseDescription, Integrator, LightDescription,
@@ -111,27 +111,26 @@ pub(super) fn read(text: &str, origin: &str, defines: &mut Defines) -> Result<De
         broken => broken.told(text, origin),
     })?;
     let description = check(&course).and_then(|()| description(&course));
-    description.map_err(|problem| invalid(text, origin, problem, defines))
+    description.map_err(|problem| invalid(text, origin, problem.into(), defines))
 }
 
-/// The error of a text whose description has a bad value at the problem's path, or which has one there itself.
-pub(super) fn invalid(text: &str, origin: &str, problem: Problem, defines: &Defines) -> SceneError {
-    let key = key_in_file(text, &problem.key, defines);
-    // There it has another name.
-    let message = problem.message.replace("\"conductor\"", "\"specular\"");
-    let problem = Problem {
-        key: key.clone(),
-        message,
+/// Returns the error of a text whose description has problems, or which has them itself.
+pub(super) fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) -> SceneError {
+    let problems = problems.map(|problem| Problem {
+        key: key_in_file(text, &problem.key, defines),
+        // The type has another name in the file.
+        message: problem.message.replace("\"conductor\"", "\"specular\""),
         ..problem
-    };
-    if defines.brought(&key) {
-        return SceneError::Override(problem.at("define"));
+    });
+    if let Some(problem) = problems.iter().find(|problem| defines.brought(&problem.key)) {
+        return SceneError::Override(problem.clone().at("define"));
     }
-    SceneError::Invalid {
+    let invalid = |at: usize, problem: Problem| SceneError::Invalid {
         origin: origin.to_owned(),
-        line: place(text, begin(text, &key)).0,
+        line: place(text, at).0,
         problem,
-    }
+    };
+    problems.into_error(|problem| begin(text, &problem.key), invalid)
 }
 
 /// What is wrong with a text.

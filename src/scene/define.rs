@@ -511,7 +511,12 @@ radius = 0.5
             ),
             ("materials.blue={}", "materials.blue.type is missing"),
             ("render.sed=1", "render.sed: unknown key"),
-            ("rendr.seed=1", "rendr: unknown key"),
+            ("rendr.seed=1", "rendr: unknown key; did you mean \"render\"?"),
+            ("seed=1", "seed: unknown key; did you mean render.seed?"),
+            ("spp=16", "spp: unknown key; did you mean render.pixel_samples?"),
+            ("fov=40", "fov: unknown key; did you mean camera.fov?"),
+            ("width=40", "width: unknown key; did you mean image.width?"),
+            ("sed=1", "sed: unknown key; expected one of"),
             ("render.adaptive.max_samples=9", "render.adaptive.error is missing"),
             ("image={width=4}", "image.height is missing"),
         ] {

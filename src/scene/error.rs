@@ -43,6 +43,14 @@ pub enum SceneError {
         /// The problem.
         problem: Problem,
     },
+    /// Several values of the file are invalid, in the order of its lines. The message has one line for each.
+    #[error("{}", self.lines())]
+    Several {
+        /// The first errors.
+        errors: Vec<SceneError>,
+        /// The number of further errors.
+        more: usize,
+    },
     /// The glTF file could not be loaded as a scene.
     #[error("{0}")]
     Gltf(GltfError),
@@ -101,9 +109,26 @@ impl SceneError {
                 key: Some(problem.key.to_string()).filter(|key| !key.is_empty()),
                 ..of_file(origin.clone())
             },
+            SceneError::Several { errors, .. } => errors.first().map(SceneError::place).unwrap_or_default(),
             SceneError::Gltf(error) => error.place(),
             SceneError::Override(_) => ErrorPlace::default(),
         }
+    }
+
+    /// Returns the errors of several values one by one, or this error, and a message about those that are not among them.
+    pub fn each(&self) -> (&[SceneError], Option<String>) {
+        match self {
+            SceneError::Several { errors, more: 0 } => (errors, None),
+            SceneError::Several { errors, more: 1 } => (errors, Some("and 1 more error".to_owned())),
+            SceneError::Several { errors, more } => (errors, Some(format!("and {more} more errors"))),
+            single => (std::slice::from_ref(single), None),
+        }
+    }
+
+    fn lines(&self) -> String {
+        let (errors, more) = self.each();
+        let lines = errors.iter().map(SceneError::to_string).chain(more);
+        lines.collect::<Vec<_>>().join("\n")
     }
 }
 
@@ -160,6 +185,131 @@ impl Problem {
         Self {
             is_damage: true,
             ..Self::new(message)
+        }
+    }
+}
+
+/// Maximum number of problems that are reported. Of each section that many are kept, because the order of the sections in the
+/// file is unknown until all are checked.
+const MAX_PROBLEMS: usize = 20;
+
+/// The problems of a description: at least one.
+#[derive(Clone, Debug)]
+pub(super) struct Problems {
+    pub first: Problem,
+    others: Vec<Problem>,
+    /// The number of further problems.
+    more: usize,
+}
+
+impl From<Problem> for Problems {
+    fn from(first: Problem) -> Self {
+        Problems {
+            first,
+            others: Vec::new(),
+            more: 0,
+        }
+    }
+}
+
+impl Problems {
+    pub fn iter(&self) -> impl Iterator<Item = &Problem> {
+        std::iter::once(&self.first).chain(&self.others)
+    }
+
+    pub fn map(self, change: impl Fn(Problem) -> Problem) -> Problems {
+        Problems {
+            first: change(self.first),
+            others: self.others.into_iter().map(change).collect(),
+            more: self.more,
+        }
+    }
+
+    /// Adds a problem, or only counts it if there are enough.
+    fn add(&mut self, problem: Problem) {
+        match self.others.len() + 1 < MAX_PROBLEMS {
+            true => self.others.push(problem),
+            false => self.more += 1,
+        }
+    }
+
+    /// Adds all problems of another section.
+    fn extend(&mut self, section: Problems) {
+        self.others.push(section.first);
+        self.others.extend(section.others);
+        self.more += section.more;
+    }
+
+    /// Keeps the first problem of each key.
+    pub fn once_per_key(mut self) -> Problems {
+        let mut known = vec![self.first.key.clone()];
+        self.others.retain(|problem| {
+            let is_new = !known.contains(&problem.key);
+            known.push(problem.key.clone());
+            is_new
+        });
+        self
+    }
+
+    /// Returns the error, with the problems in the order of their places in a text.
+    pub fn into_error(
+        self,
+        place: impl Fn(&Problem) -> usize,
+        error: impl Fn(usize, Problem) -> SceneError,
+    ) -> SceneError {
+        let mut all: Vec<(usize, Problem)> = (std::iter::once(self.first).chain(self.others))
+            .map(|problem| (place(&problem), problem))
+            .collect();
+        all.sort_by_key(|(at, _)| *at);
+        let more = self.more + all.len().saturating_sub(MAX_PROBLEMS);
+        all.truncate(MAX_PROBLEMS);
+        let mut errors: Vec<SceneError> = all.into_iter().map(|(at, problem)| error(at, problem)).collect();
+        match (errors.len(), more) {
+            (1, 0) => errors.remove(0),
+            _ => SceneError::Several { errors, more },
+        }
+    }
+}
+
+/// Collects the problems of values that are checked independently.
+#[derive(Debug, Default)]
+pub(super) struct Collector(Option<Problems>);
+
+impl Collector {
+    /// Returns a value, or `None` and keeps its problem.
+    pub fn value<T>(&mut self, checked: Result<T, Problem>) -> Option<T> {
+        let add = |problem| match &mut self.0 {
+            Some(problems) => problems.add(problem),
+            none => *none = Some(problem.into()),
+        };
+        checked.map_err(add).ok()
+    }
+
+    /// Returns a value, or a default that is not used, because [`Collector::end`] returns the problem.
+    pub fn or_default<T: Default>(&mut self, checked: Result<T, Problem>) -> T {
+        self.value(checked).unwrap_or_default()
+    }
+
+    /// Returns a value if there are no problems.
+    pub fn end<T>(self, value: T) -> Result<T, Problems> {
+        match self.0 {
+            None => Ok(value),
+            Some(problems) => Err(problems),
+        }
+    }
+}
+
+/// Returns both values, or the problems of both.
+pub(super) fn both<A, B>(
+    a: Result<A, impl Into<Problems>>,
+    b: Result<B, impl Into<Problems>>,
+) -> Result<(A, B), Problems> {
+    match (a.map_err(Into::into), b.map_err(Into::into)) {
+        (Ok(a), Ok(b)) => Ok((a, b)),
+        (Err(problems), Ok(_)) | (Ok(_), Err(problems)) => Err(problems),
+        (Err(mut problems), Err(others)) => {
+            problems.extend(others);
+            Err(problems)
         }
     }
 }
@@ -302,7 +452,14 @@ impl At for Problem {
     }
 }
 
-impl<T> At for Result<T, Problem> {
+impl At for Problems {
+    fn at(self, segment: impl Into<Segment>) -> Self {
+        let segment = segment.into();
+        self.map(|problem| problem.at(segment.clone()))
+    }
+}
+
+impl<T, P: At> At for Result<T, P> {
     fn at(self, segment: impl Into<Segment>) -> Self {
         self.map_err(|problem| problem.at(segment))
     }

@@ -10,7 +10,7 @@ use super::course;
 use super::define::{Define, Defines};
 #[cfg(feature = "dev")]
 use super::error::KeyPath;
-use super::error::{At, Problem, SceneError};
+use super::error::{At, Problem, Problems, SceneError};
 use super::gltf::{GltfChoice, describe, is_gltf};
 use super::model;
 #[cfg(feature = "dev")]
@@ -263,12 +263,12 @@ fn load_gltf(
         let message = message.strip_prefix(&place).unwrap_or(message);
         message.replace(&format!("\"{name}/"), "\"")
     };
-    let invalid = |problem: Problem| {
+    let invalid = |Problems { first, .. }: Problems| {
         SceneError::Gltf(GltfError::File {
             path: path.to_owned(),
-            message: match problem.key.to_string() == "shapes[0].file" {
-                true => own(&problem.message),
-                false => problem.to_string(),
+            message: match first.key.to_string() == "shapes[0].file" {
+                true => own(&first.message),
+                false => first.to_string(),
             },
         })
     };
@@ -295,7 +295,7 @@ fn load_mesh(
     overrides.apply(&mut description).map_err(SceneError::Override)?;
     let assets = overrides.assets(folder_of(path), folder_of(path));
     let checked = description.validate_and_list(&assets, files);
-    let mut scene = overrides.finish(checked, |problem| model::error_of(path, problem), |_| {})?;
+    let mut scene = overrides.finish(checked, |problems| model::error_of(path, problems.first), |_| {})?;
     // Whose name stands before the notes.
     let place = format!("{}: ", path.file_name().unwrap_or_default().to_string_lossy());
     for note in &mut scene.notes {
@@ -408,9 +408,9 @@ impl<'a> Draft<'a> {
             folder.to_owned()
         };
         let assets = overrides.assets(folder, &root);
-        let invalid = |problem| match is_course {
-            true => course::invalid(text, origin, problem, &defines),
-            false => invalid(text, origin, problem, &defines),
+        let invalid = |problems| match is_course {
+            true => course::invalid(text, origin, problems, &defines),
+            false => invalid(text, origin, problems, &defines),
         };
         let checked = description.validate_and_list(&assets, files);
         let scene = overrides.finish(checked, invalid, |path| path.set_place(origin, line_of_path(text)))?;
@@ -434,13 +434,16 @@ impl Overrides {
     /// A scene that was checked, at its frame, or why there is none.
     fn finish(
         &self,
-        checked: Result<Scene, Problem>,
-        invalid: impl Fn(Problem) -> SceneError,
+        checked: Result<Scene, Problems>,
+        invalid: impl Fn(Problems) -> SceneError,
         place: impl Fn(&mut CameraPath),
     ) -> Result<Scene, SceneError> {
-        let mut scene = checked.map_err(|problem| match self.environment {
-            Some(_) => of_option(problem).map_or_else(&invalid, SceneError::Override),
-            None => invalid(problem),
+        let mut scene = checked.map_err(|problems| {
+            let of_option = self
+                .environment
+                .as_ref()
+                .and_then(|_| problems.iter().find_map(of_option));
+            of_option.map_or_else(|| invalid(problems), SceneError::Override)
         })?;
         if let Some(path) = &mut scene.camera_path {
             place(path);

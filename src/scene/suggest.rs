@@ -1,5 +1,7 @@
 //! Suggestions for misspelled names and keys.
 
+use std::cell::Cell;
+
 use super::error::cut;
 use super::parse::list;
 
@@ -31,6 +33,26 @@ fn closest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<
 /// Returns `; did you mean "NAME"?`, or nothing if no name is similar.
 pub(super) fn hint<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     closest(wrong, names).map_or_else(String::new, |name| format!("; did you mean {name:?}?"))
+}
+
+/// Maximum number of unknown names for which similar ones are searched: a scene may have 100,000 shapes with unknown materials,
+/// and as many materials.
+const MAX_SEARCHES: usize = 40;
+
+/// Makes messages about unknown names, whose cost is limited.
+#[derive(Debug, Default)]
+pub(super) struct Suggestions(Cell<usize>);
+
+impl Suggestions {
+    /// Returns the message that a scene has nothing of a kind by this name. The first messages say what it has instead.
+    pub fn unknown<'a>(&self, kind: &str, wrong: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
+        let searches = self.0.get();
+        self.0.set(searches.saturating_add(1));
+        match searches < MAX_SEARCHES {
+            true => unknown(kind, wrong, names),
+            false => format!("there is no {kind} {:?}", cut(wrong)),
+        }
+    }
 }
 
 /// Returns the message that a scene has nothing of a kind by this name, and what it has instead.

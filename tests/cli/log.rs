@@ -93,6 +93,49 @@ fn a_render_tells_how_far_it_is_and_what_it_took() {
 }
 
 #[test]
+fn each_error_of_a_scene_is_a_message() {
+    let place = Place::new();
+    let bad = SCENE
+        .replace("radius = 0.8", "radius = -1")
+        .replace("fov = 40", "fov = 1000");
+    place.write("bad.toml", &bad);
+    let more = "[[lights]]\ntype = \"point\"\n".repeat(30);
+    place.write("many.toml", &format!("{SCENE}{more}"));
+    for command in ["check", "render", "info"] {
+        let ran = place.run(&[command, "bad.toml"]);
+        let lines: Vec<&str> = ran.stderr.lines().collect();
+        assert_eq!((ran.code, lines.len()), (3, 2), "{}", ran.stderr);
+        assert!(lines[0].starts_with("error: bad.toml:") && lines[0].contains(": camera.fov: 1000 must be"));
+        assert!(
+            lines[1].starts_with("error: bad.toml:22: shapes[0].radius: -1 must be"),
+            "{}",
+            lines[1]
+        );
+        let (code, lines) = log(&place, &[command, "bad.toml"]);
+        let keys: Vec<_> = lines
+            .iter()
+            .map(|line| (&line["key"], &line["exit_code"], &line["file"]))
+            .collect();
+        let [three, file] = [3.into(), "bad.toml".into()];
+        assert_eq!(
+            (code, keys),
+            (
+                3,
+                vec![
+                    (&"camera.fov".into(), &three, &file),
+                    (&"shapes[0].radius".into(), &three, &file)
+                ]
+            )
+        );
+    }
+    let ran = place.run(&["check", "many.toml", "bad.toml"]);
+    let lines: Vec<&str> = ran.stderr.lines().collect();
+    assert_eq!((ran.code, lines.len(), lines[20]), (3, 23, "error: and 10 more errors"));
+    let (_, lines) = log(&place, &["check", "many.toml"]);
+    assert_eq!((lines.len(), &lines[20]["level"]), (21, &"error".into()));
+}
+
+#[test]
 fn errors_tell_their_place_and_exit_code() {
     let place = Place::new();
     place.write("value.toml", &SCENE.replace("radius = 0.8", "radius = -1"));

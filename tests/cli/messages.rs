@@ -305,7 +305,7 @@ fn what_is_odd_about_a_mesh_is_told_once() {
     place.write("odd.obj", "v 0 0 0\nv 1 0 0\nv 0 0 2\nf 1 2 3\nf 1 1 2\n");
     let shape = "[[shapes]]\ntype = 'mesh'\nfile = 'odd.obj'\nmaterial = 'gray'\n";
     place.write("odd.toml", &format!("{SCENE}{shape}"));
-    let told = "warning: odd.toml: odd.obj: 1 degenerate triangle dropped";
+    let told = "warning: odd.toml: odd.obj: 1 of 2 triangles has no area (degenerate) and was removed";
     for options in [&[][..], &["-v"]] {
         let ran = place.run(&[&["render", "odd.toml", "--device", "cpu"], options].concat());
         assert_eq!(ran.code, 0, "{}", ran.stderr);

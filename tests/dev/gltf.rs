@@ -1,7 +1,9 @@
 //! glTF files in the development mode: shown, and shown again whenever they are saved.
 
 use std::fs;
+use std::io::Write as _;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 use wgray::dev::{Command, Move, Sources};
@@ -69,6 +71,44 @@ fn a_model_is_shown_anew_when_it_is_saved() {
     assert!(running.wait_problem().message.contains("box.glb: "));
     fs::write(folder.path().join("box.glb"), whole).unwrap();
     wait_for(&running, RED);
+}
+
+/// An exporter writes a file in pieces: incomplete pieces cause no error, and the page shows that files are read.
+#[test]
+fn incomplete_files_of_an_exporter_cause_no_error() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("box.glb");
+    model(RED).write_glb(folder.path(), "box.glb");
+    let running = start(folder.path(), "box.glb");
+    wait_for(&running, RED);
+    let whole = model(GREEN).glb();
+    // On a busy machine the writer may pause for too long, so that the file does look complete.
+    let shows_no_error = (0..20).any(|_| {
+        let [start, mut written] = [Instant::now(); 2];
+        let (mut was_read, mut has_paused) = (false, false);
+        fs::write(&path, "").unwrap();
+        let mut file = fs::OpenOptions::new().append(true).open(&path).unwrap();
+        for byte in whole.chunks(1) {
+            file.write_all(byte).unwrap();
+            has_paused |= written.elapsed() > Duration::from_millis(80);
+            written = Instant::now();
+            let state = running.state();
+            was_read |= state.reading;
+            if has_paused {
+                break;
+            }
+            assert_eq!(state.problems, [], "after {:?}", start.elapsed());
+            if was_read && start.elapsed() > Duration::from_millis(1500) {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        assert!(was_read || has_paused);
+        fs::write(&path, &whole).unwrap();
+        wait_for(&running, GREEN);
+        !has_paused
+    });
+    assert!(shows_no_error);
 }
 
 #[test]

@@ -429,7 +429,7 @@ fn check_mtl(folder: &std::path::Path, mtl: &[u8]) -> bool {
             !scene
                 .notes
                 .iter()
-                .any(|note| note.ends_with("a grey material stands in"))
+                .any(|note| note.ends_with("a gray material is used instead"))
         }
         Err(error) => panic!("{error}"),
     }

@@ -10,52 +10,52 @@ fn damaged_lines_of_obj_files_have_stand_ins() {
     for (lines, note) in [
         (
             "v nan 0 0\nf 1 2 3\n",
-            "line 5: x: NaN must be from -1e9 to 1e9; faces with this vertex are left out",
+            "line 5: x: NaN must be from -1e9 to 1e9; faces with this vertex were removed",
         ),
         (
             "v 0 inf 0\nv 0 0 1e10\nf 1 2 3\nf 1 2 5\nf 5 1 3 2 4\n",
-            "line 5: y: inf must be from -1e9 to 1e9; faces with this vertex are left out (and 1 more)",
+            "line 5: y: inf must be from -1e9 to 1e9; faces with this vertex were removed (1 more like this)",
         ),
         (
             "v 3.1+e2 0 0\nf 1 2 3\nf 3 2 5\n",
-            "line 5: x: \"3.1+e2\" must be a number; faces with this vertex are left out",
+            "line 5: x: \"3.1+e2\" must be a number; faces with this vertex were removed",
         ),
         (
             "v 1\nf 1 2 3\n",
-            "line 5: y is missing; faces with this vertex are left out",
+            "line 5: y is missing; faces with this vertex were removed",
         ),
         (
             "f 1 2 3\nf 1 2\nf 3\n",
-            "line 6: a face must have 3 corners or more; this one has 2; the face is left out (and 1 more)",
+            "line 6: a face must have 3 corners or more; this one has 2; the face was removed (1 more like this)",
         ),
         (
             "f 1 2 3\nf 1 2 9\n",
-            "line 6: vertex 9 of the face does not exist; there are 4 so far; the face is left out",
+            "line 6: vertex 9 of the face does not exist; there are 4 so far; the face was removed",
         ),
         (
             "f 1 2 3\nf 1 2 x\n",
-            "line 6: \"x\" must be a corner of a face: v, v/t, v//n or v/t/n; the face is left out",
+            "line 6: \"x\" must be a corner of a face: v, v/t, v//n or v/t/n; the face was removed",
         ),
         (
             "f 1/1 2/2 3/3\n",
             "line 5: texture coordinate 1 of the face does not exist; there are 0 so far; \
-             (0, 0) stands in for the texture coordinates (and 2 more)",
+             the texture coordinates (0, 0) are used instead (2 more like this)",
         ),
         (
             "f 1//1 2//2 3//3\n",
-            "line 5: normal 1 of the face does not exist; there are 0 so far; the normal of the triangles stands in (and 2 more)",
+            "line 5: normal 1 of the face does not exist; there are 0 so far; the normal of the triangles is used instead (2 more like this)",
         ),
         (
             "vt 0 nan\nf 1/1 2/1 3/1\n",
-            "line 5: v: NaN must be finite as a 32-bit float; (0, 0) stands in for the texture coordinates",
+            "line 5: v: NaN must be finite as a 32-bit float; the texture coordinates (0, 0) are used instead",
         ),
         (
             "vn 0 1\nf 1//1 2//1 3//1\n",
-            "line 5: z is missing; the normal of the triangles stands in",
+            "line 5: z is missing; the normal of the triangles is used instead",
         ),
         (
             "v 0 0 0 0.5 nan 0\nv 0 0 0 red 0 0\nf 1 2 3\n",
-            "line 5: the color of the vertex must be three finite numbers; white stands in for the color (and 1 more)",
+            "line 5: the color of the vertex must be three finite numbers; white is used instead (1 more like this)",
         ),
     ] {
         let mesh = load("a.obj", format!("{SQUARE}{lines}"), None).unwrap();
@@ -95,17 +95,17 @@ fn damaged_rows_of_ply_files_have_stand_ins() {
         (
             "0 0 0\n1 0 0\n1 1 0\n0 nan 0\n",
             "3 0 1 2\n3 0 1 3\n",
-            "line 13: vertex 3: y: NaN must be from -1e9 to 1e9; faces with this vertex are left out",
+            "line 13: vertex 3: y: NaN must be from -1e9 to 1e9; faces with this vertex were removed",
         ),
         (
             POINTS,
             "3 0 1 2\n2 0 1\n",
-            "line 15: face 1: must have 3 vertices or more; it has 2; the face is left out",
+            "line 15: face 1: must have 3 vertices or more; it has 2; the face was removed",
         ),
         (
             POINTS,
             "3 0 1 4\n3 0 1 2\n",
-            "line 14: face 0: vertex 4 does not exist; there are 4, counted from 0; the face is left out",
+            "line 14: face 0: vertex 4 does not exist; there are 4, counted from 0; the face was removed",
         ),
     ] {
         let mesh = load("a.ply", ply(vertices, faces), None).unwrap();
@@ -121,7 +121,7 @@ fn vertex_colors_that_are_not_finite_are_white() {
     let text = format!("{header}0 0 0 0.5 0.25 0\n1 0 0 nan 0 0\n1 1 0 0 1e39 0\n3 0 1 2\n");
     let mesh = load("a.ply", text, None).unwrap();
     let note = "line 14: vertex 1: the color: its values must be finite as 32-bit floats; \
-                white stands in for the color (and 1 more)";
+                white is used instead (1 more like this)";
     assert_eq!(mesh.notes, [note]);
     assert_eq!(mesh.colors[0].to_array(), [0.5, 0.25, 0.0, 1.0]);
     assert_eq!(mesh.colors[1..], [glam::Vec4::ONE; 2]);
@@ -134,7 +134,9 @@ fn ply_lines_may_have_more_values_than_declared() {
     assert_eq!(corners(&mesh), [FIRST]);
     assert_eq!(
         mesh.notes,
-        ["line 10: the line has more values than the header declares; the rest of the line is ignored (and 3 more)"]
+        [
+            "line 10: the line has more values than the header declares; the other values were ignored (3 more like this)"
+        ]
     );
     // Rows over several lines, and several rows on a line.
     for points in [POINTS.replace("1 1 0", "1 1\n\n0"), POINTS.replace("\n1", " 1")] {
@@ -149,7 +151,7 @@ fn unknown_lines_of_ply_headers_are_ignored() {
     let text = ply(POINTS, "3 0 1 2\n").replace("element face", "Created by a program\nelement face");
     let mesh = load("a.ply", text, None).unwrap();
     assert_eq!(corners(&mesh), [FIRST]);
-    assert!(mesh.notes[0].ends_with("; the line is ignored"), "{:?}", mesh.notes);
+    assert!(mesh.notes[0].ends_with("; the line was ignored"), "{:?}", mesh.notes);
 }
 
 #[test]
@@ -162,7 +164,7 @@ fn facets_of_stl_files_without_a_position_are_left_out() {
     assert_eq!(corners(&mesh), [FIRST]);
     assert_eq!(
         mesh.notes,
-        ["line 11: z: NaN must be from -1e9 to 1e9; the face is left out"]
+        ["line 11: z: NaN must be from -1e9 to 1e9; the face was removed"]
     );
 }
 

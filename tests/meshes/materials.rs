@@ -149,7 +149,9 @@ fn strict_refuses_missing_materials() {
     };
     let notes = load(false).unwrap().notes;
     assert!(
-        notes.iter().any(|note| note.ends_with("; a grey material stands in")),
+        notes
+            .iter()
+            .any(|note| note.ends_with("; a gray material is used instead")),
         "{notes:?}"
     );
     let message = load(true).unwrap_err().to_string();

@@ -193,9 +193,9 @@ fn strict_refuses_damage() {
                 );
             }
             false => {
-                let note = format!("line 5: {rule}; the face is left out");
+                let note = format!("line 5: {rule}; the face was removed");
                 assert_eq!(load(&path).unwrap().notes, std::slice::from_ref(&note));
-                let of_scene = format!("a.obj:5: {rule}; the face is left out");
+                let of_scene = format!("a.obj:5: {rule}; the face was removed");
                 assert_eq!(load(&scene).unwrap().notes, [of_scene]);
             }
         }

@@ -153,7 +153,7 @@ fn odd_polygons_are_noted() {
         Err(message) => vec![message],
     };
     let bow = flat(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]);
-    assert_eq!(notes(&bow)[0], "1 polygon intersects itself");
+    assert_eq!(notes(&bow)[0], "1 polygon intersects itself; split into a triangle fan");
     let pentagram: Vec<DVec3> = (0..5)
         .map(|i| {
             DVec3::new(
@@ -163,10 +163,13 @@ fn odd_polygons_are_noted() {
             )
         })
         .collect();
-    assert_eq!(notes(&pentagram)[0], "1 polygon intersects itself");
+    assert_eq!(
+        notes(&pentagram)[0],
+        "1 polygon intersects itself; split into a triangle fan"
+    );
     let saddle =
         |height: f64| [[0.0, 0.0, height], [1.0, 0.0, 0.0], [1.0, 1.0, height], [0.0, 1.0, 0.0]].map(DVec3::from);
-    assert_eq!(notes(&saddle(0.5)), ["1 polygon is not planar"]);
+    assert_eq!(notes(&saddle(0.5)), ["1 polygon is not planar; split into triangles"]);
     assert!(notes(&saddle(0.01)).is_empty());
     // Points that coincide, on a line, and no area at all.
     let doubled = flat(&[

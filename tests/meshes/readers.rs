@@ -197,7 +197,10 @@ fn degenerate_triangles_are_dropped_and_counted() {
                 g a\nf 1 1 2\nf 1 4 2\nf 1 2 3\nf 6 2 1\ng b\nf 1 2 5\n";
     let mesh = load("a.obj", text, Some(Normals::Smooth)).unwrap();
     assert_eq!(mesh.triangles.len(), 1);
-    assert_eq!(mesh.notes, ["4 degenerate triangles dropped"]);
+    assert_eq!(
+        mesh.notes,
+        ["4 of 5 triangles have no area (degenerate) and were removed"]
+    );
     assert_eq!(mesh.group_of, [1]);
     assert!(mesh.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-6));
     let error = load("a.obj", "v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n", None).unwrap_err();
@@ -219,7 +222,7 @@ fn duplicate_triangles_are_dropped_and_counted() {
     assert_eq!(corners(&mesh), TWO_TRIANGLES);
     assert_eq!(
         (mesh.positions.len(), &mesh.notes[..]),
-        (4, &["1 duplicate triangle dropped".to_string()][..])
+        (4, &["1 of 3 triangles is a duplicate and was removed".to_string()][..])
     );
     // Not those of another group, nor those that look the other way.
     let mesh = load("a.obj", text.replace("f 2 3 5", "g b\nf 2 3 5"), None).unwrap();
@@ -228,7 +231,7 @@ fn duplicate_triangles_are_dropped_and_counted() {
     assert_eq!(mesh.triangles.len(), 3);
     let many = load("a.obj", format!("{text}{}", "f 1 3 4\nf 3 4 1\n".repeat(1000)), None).unwrap();
     assert_eq!(corners(&many), TWO_TRIANGLES);
-    assert_eq!(many.notes, ["2001 duplicate triangles dropped"]);
+    assert_eq!(many.notes, ["2001 of 2003 triangles are duplicates and were removed"]);
 }
 
 #[test]
@@ -334,7 +337,7 @@ fn ply_may_have_all_types_in_any_order() {
     assert_eq!(uvs, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
     assert_eq!(
         mesh.notes,
-        ["texture coordinates of faces (\"texcoord\") are ignored; only those of vertices are used"]
+        ["texture coordinates per face corner (\"texcoord\") are not supported and were ignored; use those per vertex"]
     );
 }
 
@@ -410,7 +413,7 @@ fn binary_stl_is_told_by_its_size() {
     assert!(error.starts_with("a.stl:1: "), "{error}");
     longer[0] = b'x';
     let mesh = load("a.stl", &longer, None).unwrap();
-    assert_eq!(mesh.notes, ["1 byte after the last triangle is ignored"]);
+    assert_eq!(mesh.notes, ["1 byte after the last triangle was ignored"]);
     assert_eq!(
         load("a.stl", &longer[..300], None).unwrap_err(),
         "a.stl: byte 80: 6 triangles take 384 bytes, and the file has 300: it is truncated, or not an STL file"
@@ -485,8 +488,11 @@ fn a_mesh_far_away_keeps_its_digits() {
 fn surfaces_that_are_odd_are_noted() {
     let text = format!("{SQUARE}v 0 0 1\nf 1 2 3\nf 1 4 3\nf 1 5 3\n");
     let mesh = load("a.obj", text, None).unwrap();
-    assert_eq!(mesh.notes, ["1 edge belongs to more than two triangles (non-manifold)"]);
+    assert_eq!(
+        mesh.notes,
+        ["1 edge is shared by more than two triangles (non-manifold mesh); rendered unchanged"]
+    );
     let mesh = load("a.obj", format!("{SQUARE}f 1 2 3\nf 1 4 3\n"), None).unwrap();
-    let told = "1 edge is passed in the same direction by both triangles (windings differ)";
+    let told = "1 edge has inconsistent winding order (its triangles face opposite sides); rendered unchanged";
     assert_eq!(mesh.notes, [told]);
 }

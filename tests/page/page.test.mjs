@@ -86,6 +86,41 @@ test("a broken scene shows its line", async () => {
   await page.locator("#problems h2").waitFor({ state: "detached" });
 });
 
+test("all errors of a scene are shown", async () => {
+  const page = await open(browser, studio);
+  studio.write("scene.toml", SCENE.replace("fov = 40", "fov = 190").replace("shininess = 16", "shininess = -1"));
+  await page.locator("#problems h2").nth(1).waitFor();
+  const articles = await page.locator("#problems article").allInnerTexts();
+  assert.equal(articles.length, 2);
+  assert.match(articles[0], /scene\.toml:9:7\n+camera\.fov: 190 must be[^]*fov = 190\n.*\^\^\^/);
+  assert.match(articles[1], /scene\.toml:19:13\n+materials\.red\.shininess: -1 must be/);
+  assert.match(await text(page, "#problems summary"), /2 problems/);
+  studio.write("scene.toml", SCENE);
+  await page.locator("#problems h2").first().waitFor({ state: "detached" });
+});
+
+test("while a file is being written the page says that files are read", async () => {
+  const page = await open(browser, studio);
+  studio.write("box.obj", "v 0 0 0\n");
+  studio.write("scene.toml", `${SCENE}\n[[shapes]]\ntype = "mesh"\nfile = "box.obj"\nmaterial = "red"\n`);
+  await page.locator("#problems h2").waitFor();
+  assert.equal(await text(page, "#problems summary"), "1 problem");
+  const start = Date.now();
+  let reads = false;
+  for (let i = 0; !reads && Date.now() - start < LONGEST; i++) {
+    studio.write("box.obj", "v 0 0 0\n".repeat(i));
+    await page.waitForTimeout(20);
+    reads = await page.evaluate(() =>
+      document.querySelector("#problems summary").textContent === "1 problem. Reading the changed files…" &&
+      document.querySelector("#badge").textContent === "Reading files…");
+  }
+  assert.ok(reads);
+  studio.write("box.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n");
+  await page.locator("#problems h2").waitFor({ state: "detached" });
+  studio.write("scene.toml", SCENE);
+  await showsRendered(page, studio);
+});
+
 test("drags move the camera, and saving writes what the page shows", async () => {
   const page = await open(browser, studio);
   const start = await text(page, "#camera-text");

@@ -8,14 +8,15 @@ const capitalized = (text) => text[0].toUpperCase() + text.slice(1);
 let shown = "";
 
 // `hasImage`: whether an image from before the error is on the screen.
-export function showProblems({ problems, editor }, hasImage) {
+export function showProblems({ problems, editor, reading }, hasImage) {
+  const count = problems.length === 1 ? "1 problem" : `${problems.length} problems`;
+  element("problems").querySelector("summary").textContent = reading ? `${count}. Reading the changed files…` : count;
   // An unchanged list is left alone, so that text selected in it stays selected.
   const all = JSON.stringify([problems, editor, hasImage]);
   if (all === shown) return;
   shown = all;
   const dock = element("problems");
   dock.hidden = !problems.length;
-  dock.querySelector("summary").textContent = problems.length === 1 ? "1 problem" : `${problems.length} problems`;
   element("problem-list").replaceChildren(...problems.map((problem) => articleOf(problem, editor, hasImage)));
 }
 

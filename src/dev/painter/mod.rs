@@ -299,11 +299,11 @@ impl Painter {
     }
 
     /// Takes a scene or its errors. Returns whether the same rendering must be displayed differently.
-    fn take_scene(&mut self, scene: Result<Arc<Loaded>, Diagnostic>) -> bool {
+    fn take_scene(&mut self, scene: Result<Arc<Loaded>, Vec<Diagnostic>>) -> bool {
         let mut shown_otherwise = false;
         match scene {
             Ok(loaded) => {
-                self.problems.scene = None;
+                self.problems.scene.clear();
                 // An edit of the file's camera shows on screen.
                 if let (Some(camera), Some(old)) = (&self.camera, &self.loaded) {
                     self.camera = merged(camera, &old.camera, &loaded.camera);
@@ -322,7 +322,7 @@ impl Painter {
                 self.loaded = Some(loaded);
                 self.state.scenes += 1;
             }
-            Err(problem) => self.problems.scene = Some(problem),
+            Err(problems) => self.problems.scene = problems,
         }
         shown_otherwise
     }

@@ -18,7 +18,7 @@ use crate::scene::ViewSettings;
 /// The current errors by source.
 #[derive(Default)]
 pub struct Problems {
-    pub scene: Option<Diagnostic>,
+    pub scene: Vec<Diagnostic>,
     pub files: Option<Diagnostic>,
     pub shader: Vec<Diagnostic>,
     /// Invalid annotations in shaders.
@@ -31,8 +31,13 @@ pub struct Problems {
 
 impl Problems {
     fn all(&self) -> impl Iterator<Item = &Diagnostic> {
-        let others = [&self.cut, &self.scene, &self.device, &self.out].into_iter().flatten();
-        self.files.iter().chain(&self.shader).chain(&self.marks).chain(others)
+        let of_shaders = self
+            .files
+            .iter()
+            .chain(&self.shader)
+            .chain(&self.marks)
+            .chain(&self.cut);
+        of_shaders.chain(&self.scene).chain(&self.device).chain(&self.out)
     }
 }
 

@@ -160,7 +160,10 @@ impl Painter {
         let folder = folder_of(&self.sources.scene);
         let read = Draft::read(text, &origin, folder, &self.sources.overrides);
         let read = read.and_then(|draft| draft.check(&mut BTreeSet::new()));
-        let (scene, description) = read.map_err(|error| format!("fix the file first: {error}"))?;
+        let (scene, description) = read.map_err(|error| {
+            let (errors, _) = error.each();
+            format!("fix the file first: {}", errors.first().unwrap_or(&error))
+        })?;
         Ok(Arc::new(Loaded::new(text.to_owned(), scene, description)))
     }
 

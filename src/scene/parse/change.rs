@@ -6,7 +6,7 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use super::parts::{Broken, Kind, Part, Parts, Rest};
-use super::{Read, course, invalid, read, read_camera, read_file, syntax_error, tagged};
+use super::{Problems, Read, course, invalid, read, read_camera, read_file, syntax_error, tagged};
 use crate::scene::define::Defines;
 use crate::scene::error::{At, KeyPath, SceneError, Segment};
 use crate::scene::{CameraDescription, Description};
@@ -41,7 +41,7 @@ impl Description {
                 is_rest,
                 places: Places(parts.parts.into_owned()),
             })),
-            Some(Err(problem)) => Err(invalid(text, origin, problem, defines)),
+            Some(Err(problems)) => Err(invalid(text, origin, problems, defines)),
             None => Ok(None),
         }
     }
@@ -58,7 +58,7 @@ impl Description {
             .cloned()
             .unwrap_or_default();
         let read = read_camera(camera).at("camera");
-        read.map_err(|problem| invalid(text, origin, problem, &Defines::new(&[])))
+        read.map_err(|problem| invalid(text, origin, problem.into(), &Defines::new(&[])))
     }
 }
 
@@ -90,13 +90,13 @@ fn read_changed_part(
     at: &KeyPath,
     defines: &mut Defines,
     before: &Description,
-) -> Result<Option<Read<Description>>, Broken> {
+) -> Result<Option<Result<Description, Problems>>, Broken> {
     let (Some((_, mut table)), Some(step)) = (parts.read(part)?, at.0.get(1)) else {
         return Ok(None);
     };
     let place = [Segment::from(part.kind.name()), step.clone()];
     if let Err(problem) = defines.put(&place, &mut table, |_| false) {
-        return Ok(Some(Err(problem)));
+        return Ok(Some(Err(problem.into())));
     }
     let mut after = before.clone();
     let there = match (part.kind, step) {
@@ -109,7 +109,7 @@ fn read_changed_part(
         _ => None,
     };
     let done = there.map(|read| {
-        read.map_err(|problem| problem.at(step.clone()).at(part.kind.name()))
+        read.map_err(|problem| problem.at(step.clone()).at(part.kind.name()).into())
             .map(|()| after)
     });
     Ok(done)
@@ -125,14 +125,14 @@ fn read_changed_rest(
     parts: &Parts,
     defines: &mut Defines,
     before: &Description,
-) -> Result<Option<Read<Description>>, Broken> {
+) -> Result<Option<Result<Description, Problems>>, Broken> {
     let mut rest = parts.read_rest()?;
     if Kind::ALL.into_iter().any(|kind| rest.contains_key(kind.name())) {
         return Ok(None);
     }
     let is_in_parts = |key: &str| Kind::ALL.into_iter().any(|kind| kind.name() == key);
     let put = defines.put(&[], &mut rest, is_in_parts);
-    let read = put.and_then(|()| read_file(rest));
+    let read = put.map_err(Problems::from).and_then(|()| read_file(rest));
     Ok(Some(read.map(|rest| Description {
         image: rest.image,
         camera: rest.camera,

@@ -22,10 +22,11 @@ use super::define::Defines;
 use super::description::tables::{self, ReadError};
 use super::description::tagged::Tagged;
 use super::description::{
-    CameraDescription, CameraKeyDescription, CameraPathDescription, Description, InstanceDescription, LightDescription,
-    MaterialDescription, MeshFileDescription, ShapeDescription, TextureDescription,
+    CameraDescription, CameraKeyDescription, CameraPathDescription, Description, ImageDescription, InstanceDescription,
+    LightDescription, MaterialDescription, MeshFileDescription, PerspectiveDescription, RenderDescription,
+    ShapeDescription, TextureDescription,
 };
-use super::error::{At, KeyPath, Problem, SceneError, Segment, cut};
+use super::error::{At, Collector, KeyPath, Problem, Problems, SceneError, Segment, both, cut};
 use super::limits::{BLADES, DEEPEST, MOST, UV_SETS};
 use super::suggest;
 use super::validate::depths;
@@ -48,9 +49,8 @@ impl Description {
     /// Returns the description with the defined values.
     pub(super) fn defined(&self, defines: &mut Defines) -> Result<Description, Problem> {
         let mut file = Table::try_from(self).map_err(|error| Problem::new(error.to_string()))?;
-        let put = defines.put(&[], &mut file, |_| false);
-        put.and_then(|()| read_file(file))
-            .map_err(|problem| problem.at("define"))
+        defines.put(&[], &mut file, |_| false).at("define")?;
+        read_file(file).map_err(|problems| problems.first.at("define"))
     }
 
     /// Parses a scene file with the defined values.
@@ -66,64 +66,84 @@ impl Description {
         let read = match read_parts(&parts, defines).map_err(broken)? {
             Some(read) => read,
             None if text.len() > LARGEST => match defines.left() {
-                Some(key) => Err(defines.not_there(key)),
+                Some(key) => Err(defines.not_there(key).into()),
                 None => return Err(broken(Broken::whole(text))),
             },
             None => {
                 let mut file = toml::from_str(text).map_err(|error| broken(Broken::of(0, &error)))?;
                 defines.restart();
                 let put = defines.put(&[], &mut file, |_| false);
-                put.and_then(|()| read_file(file))
+                put.map_err(Problems::from).and_then(|()| read_file(file))
             }
         };
-        read.map_err(|problem| invalid(text, origin, problem, defines))
+        read.map_err(|problems| invalid(text, origin, problems, defines))
     }
 }
 
-/// Returns the error of an invalid value, of the text or of a define.
-pub(super) fn invalid(text: &str, origin: &str, problem: Problem, defines: &Defines) -> SceneError {
-    if defines.brought(&problem.key) {
-        return SceneError::Override(problem.at("define"));
+/// Returns the error of invalid values, of the text or of a define.
+pub(super) fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) -> SceneError {
+    if let Some(problem) = problems.iter().find(|problem| defines.brought(&problem.key)) {
+        return SceneError::Override(problem.clone().at("define"));
     }
-    SceneError::Invalid {
+    let keys = Keys::of(text);
+    let invalid = |at: usize, problem: Problem| SceneError::Invalid {
         origin: origin.to_owned(),
-        line: locate(text, &problem.key),
+        line: line_number(text, at),
         problem,
-    }
-}
-
-/// Returns the line, from 1, of the key at a path, or of the innermost table that exists.
-fn locate(text: &str, path: &KeyPath) -> usize {
-    let at = match text.len() > LARGEST {
-        true => place_in_parts(&Parts::of(text), path),
-        false => place_in(text, path),
     };
-    line_number(text, at)
+    problems.into_error(|problem| keys.place(&problem.key), invalid)
 }
 
 /// Returns the line, from 1, of the path of the camera.
 pub(super) fn line_of_path(text: &str) -> usize {
-    locate(text, &KeyPath(["camera", "path"].map(Segment::from).to_vec()))
+    let path = KeyPath(["camera", "path"].map(Segment::from).to_vec());
+    line_number(text, Keys::of(text).place(&path))
 }
 
-/// Returns the byte offset of the key at a path, in a text that is too large to parse at once.
-fn place_in_parts(parts: &Parts, path: &KeyPath) -> usize {
-    match parts.find(path) {
-        Some((part, path)) => part.place.start + place_in(parts.text(part), &path),
-        None => {
-            let rest = parts.rest();
-            rest.place(place_in(&rest.text, path))
+/// The locations of the keys of a text.
+enum Keys<'a> {
+    Whole(DeValue<'a>),
+    /// Of a text that is too large to parse at once.
+    Parts(Parts<'a>),
+}
+
+impl<'a> Keys<'a> {
+    fn of(text: &'a str) -> Keys<'a> {
+        match text.len() > LARGEST {
+            true => Keys::Parts(Parts::of(text)),
+            false => Keys::Whole(document(text)),
+        }
+    }
+
+    /// Returns the byte offset of the key at a path, or of the innermost table that exists.
+    fn place(&self, path: &KeyPath) -> usize {
+        let parts = match self {
+            Keys::Whole(document) => return place_in(document, path),
+            Keys::Parts(parts) => parts,
+        };
+        match parts.find(path) {
+            Some((part, path)) => part.place.start + place_in(&document(parts.text(part)), &path),
+            None => {
+                let rest = parts.rest();
+                rest.place(place_in(&document(&rest.text), path))
+            }
         }
     }
 }
 
+/// Returns a text with the locations of its keys; an empty table if it cannot be parsed.
+fn document(text: &str) -> DeValue<'_> {
+    DeValue::Table(
+        DeTable::parse(text)
+            .map(|document| document.into_inner())
+            .unwrap_or_default(),
+    )
+}
+
 /// Returns the byte offset of the key at a path.
-fn place_in(text: &str, path: &KeyPath) -> usize {
-    let Ok(document) = DeTable::parse(text) else {
-        return 0;
-    };
+fn place_in(document: &DeValue, path: &KeyPath) -> usize {
     let mut at = 0;
-    let mut value = &DeValue::Table(document.into_inner());
+    let mut value = document;
     for segment in &path.0 {
         let step = match (segment, value) {
             (Segment::Key(name), DeValue::Table(table)) => {
@@ -168,20 +188,78 @@ struct Sections {
     instances: Vec<Table>,
 }
 
-fn read_file(file: Table) -> Result<Description, Problem> {
-    let sections: Sections = read(file)?;
+fn read_file(file: Table) -> Result<Description, Problems> {
+    let sections: Sections = read(file).map_err(with_section)?;
+    let view = both(
+        read(sections.image).at("image"),
+        read_camera(sections.camera).at("camera"),
+    );
+    let settings = both(
+        read(sections.render).at("render"),
+        sections.environment.map(read).transpose().at("environment"),
+    );
+    let appearance = both(
+        read_map(sections.textures, tagged).at("textures"),
+        read_map(sections.materials, tagged).at("materials"),
+    );
+    let objects = both(
+        read_list(sections.lights, tagged).at("lights"),
+        read_list(sections.shapes, tagged).at("shapes"),
+    );
+    let meshes = both(
+        read_map(sections.meshes, read).at("meshes"),
+        read_list(sections.instances, read).at("instances"),
+    );
+    let ((view, settings), (appearance, (objects, meshes))) =
+        both(both(view, settings), both(appearance, both(objects, meshes)))?;
+    let ((image, camera), (render, environment)) = (view, settings);
+    let ((textures, materials), (lights, shapes), (meshes, instances)) = (appearance, objects, meshes);
     Ok(Description {
-        image: read(sections.image).at("image")?,
-        camera: read_camera(sections.camera).at("camera")?,
-        render: read(sections.render).at("render")?,
-        environment: sections.environment.map(read).transpose().at("environment")?,
-        textures: read_map(sections.textures, tagged).at("textures")?,
-        materials: read_map(sections.materials, tagged).at("materials")?,
-        lights: read_list(sections.lights, tagged).at("lights")?,
-        shapes: read_list(sections.shapes, tagged).at("shapes")?,
-        meshes: read_map(sections.meshes, read).at("meshes")?,
-        instances: read_list(sections.instances, read).at("instances")?,
+        image,
+        camera,
+        render,
+        environment,
+        textures,
+        materials,
+        lights,
+        shapes,
+        meshes,
+        instances,
     })
+}
+
+/// Adds the section that has a key to the problem of this key outside of a section.
+fn with_section(problem: Problem) -> Problem {
+    let [Segment::Key(key)] = problem.key.0.as_slice() else {
+        return problem;
+    };
+    // Names of options, and of other renderers.
+    let name = match key.as_str() {
+        "spp" | "samples" => "pixel_samples",
+        "bounces" | "depth" => "max_depth",
+        name => name,
+    };
+    let sections = [
+        ("render", has_key::<RenderDescription>(name)),
+        ("camera", has_key::<PerspectiveDescription>(name)),
+        ("image", has_key::<ImageDescription>(name)),
+    ];
+    let section = sections.iter().find(|(_, has_key)| *has_key);
+    match section.filter(|_| problem.message.starts_with("unknown key")) {
+        Some((section, _)) => Problem {
+            key: problem.key.clone(),
+            ..Problem::new(format!("unknown key; did you mean {section}.{name}?"))
+        },
+        None => problem,
+    }
+}
+
+/// Returns true if a section has a key.
+fn has_key<T: DeserializeOwned>(name: &str) -> bool {
+    let table = Table::from_iter([(name.to_owned(), Value::from(0))]);
+    // An unknown key is reported before a missing one and a wrong type.
+    let error = tables::read::<T>(table).err();
+    !error.is_some_and(|error| error.inner().message().starts_with("unknown field"))
 }
 
 /// Parses a camera. A missing value is taken from the first key of its path that has one.
@@ -218,20 +296,20 @@ fn read_camera(mut camera: Table) -> Result<CameraDescription, Problem> {
     read_tagged(camera, Some(CameraDescription::DEFAULT))
 }
 
-/// The parts of one kind, or the first problem among them.
 type Read<T> = Result<T, Problem>;
 
 /// Parses a file part by part. Returns `None` if the parts depend on each other, so that the file must be parsed at once.
-fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Read<Description>>, Broken> {
+fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Description, Problems>>, Broken> {
     let rest = parts.read_rest();
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut names = BTreeSet::new();
-    let mut textures: Read<BTreeMap<String, TextureDescription>> = Ok(BTreeMap::new());
-    let mut materials: Read<BTreeMap<String, MaterialDescription>> = Ok(BTreeMap::new());
-    let mut lights: Read<Vec<LightDescription>> = Ok(Vec::new());
-    let mut shapes: Read<Vec<ShapeDescription>> = Ok(Vec::new());
-    let mut meshes: Read<BTreeMap<String, MeshFileDescription>> = Ok(BTreeMap::new());
-    let mut instances: Read<Vec<InstanceDescription>> = Ok(Vec::new());
+    let mut found = Collector::default();
+    let mut textures: BTreeMap<String, TextureDescription> = BTreeMap::new();
+    let mut materials: BTreeMap<String, MaterialDescription> = BTreeMap::new();
+    let mut lights: Vec<LightDescription> = Vec::new();
+    let mut shapes: Vec<ShapeDescription> = Vec::new();
+    let mut meshes: BTreeMap<String, MeshFileDescription> = BTreeMap::new();
+    let mut instances: Vec<InstanceDescription> = Vec::new();
     for part in parts.parts.iter() {
         match &rest {
             // Errors are reported in the order of the text.
@@ -245,89 +323,76 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Read<Descri
         let count = counts.entry(part.kind.name()).or_default();
         let step = name.as_deref().map_or(Segment::Index(*count), Segment::from);
         *count += 1;
-        if let Err(problem) = defines.put(&[Segment::from(part.kind.name()), step], &mut table, |_| false) {
-            return Ok(Some(Err(problem)));
+        let path = [Segment::from(part.kind.name()), step];
+        if let Err(problem) = defines.put(&path, &mut table, |_| false) {
+            return Ok(Some(Err(problem.into())));
         }
         if let Some(name) = &name
             && !names.insert((part.kind.name(), name.clone()))
         {
             return parts.twice(name, part).map_or(Ok(None), Err);
         }
-        match (part.kind, name) {
-            (Kind::Textures, Some(name)) => add_named(&mut textures, name, table, tagged),
-            (Kind::Materials, Some(name)) => add_named(&mut materials, name, table, tagged),
-            (Kind::Lights, None) => add(&mut lights, table, tagged),
-            (Kind::Shapes, None) => add(&mut shapes, table, tagged),
-            (Kind::Meshes, Some(name)) => add_named(&mut meshes, name, table, read),
-            (Kind::Instances, None) => add(&mut instances, table, read),
+        let read = match (part.kind, name) {
+            (Kind::Textures, Some(name)) => tagged(table).map(|value| drop(textures.insert(name, value))),
+            (Kind::Materials, Some(name)) => tagged(table).map(|value| drop(materials.insert(name, value))),
+            (Kind::Lights, None) => tagged(table).map(|value| lights.push(value)),
+            (Kind::Shapes, None) => tagged(table).map(|value| shapes.push(value)),
+            (Kind::Meshes, Some(name)) => read(table).map(|value| drop(meshes.insert(name, value))),
+            (Kind::Instances, None) => read(table).map(|value| instances.push(value)),
             _ => return Ok(None),
-        }
+        };
+        let [kind, step] = path;
+        found.value(read.at(step).at(kind));
     }
     let has = |kind: Kind| parts.parts.iter().any(|part| part.kind == kind);
     let mut rest = rest?;
     let is_in_parts = |key: &str| Kind::ALL.into_iter().any(|kind| kind.name() == key && has(kind));
     if let Err(problem) = defines.put(&[], &mut rest, is_in_parts) {
-        return Ok(Some(Err(problem)));
+        return Ok(Some(Err(problem.into())));
     }
     if defines.left().is_some() {
         return Ok(None); // a whole list, or a name or index that does not exist
     }
-    let others = read_file(rest);
-    let together = |mut all: Description| {
+    let read = both(found.end(()), read_file(rest)).map(|((), mut all)| {
         // The parts and the rest have no kind in common.
         if has(Kind::Textures) {
-            all.textures = textures.at("textures")?;
+            all.textures = textures;
         }
         if has(Kind::Materials) {
-            all.materials = materials.at("materials")?;
+            all.materials = materials;
         }
         if has(Kind::Lights) {
-            all.lights = lights.at("lights")?;
+            all.lights = lights;
         }
         if has(Kind::Shapes) {
-            all.shapes = shapes.at("shapes")?;
+            all.shapes = shapes;
         }
         if has(Kind::Meshes) {
-            all.meshes = meshes.at("meshes")?;
+            all.meshes = meshes;
         }
         if has(Kind::Instances) {
-            all.instances = instances.at("instances")?;
+            all.instances = instances;
         }
-        Ok(all)
-    };
-    Ok(Some(others.and_then(together)))
+        all
+    });
+    Ok(Some(read))
 }
 
-/// Adds a named part, unless there was a problem before.
-fn add_named<T>(all: &mut Read<BTreeMap<String, T>>, name: String, table: Table, read: fn(Table) -> Read<T>) {
-    let Ok(map) = all else { return };
-    match read(table).at(name.as_str()) {
-        Ok(value) => {
-            map.insert(name, value);
-        }
-        Err(problem) => *all = Err(problem),
-    }
-}
-
-fn add<T>(all: &mut Read<Vec<T>>, table: Table, read: fn(Table) -> Read<T>) {
-    let Ok(list) = all else { return };
-    match read(table).at(list.len()) {
-        Ok(value) => list.push(value),
-        Err(problem) => *all = Err(problem),
-    }
-}
-
-fn read_map<T>(tables: BTreeMap<String, Table>, read: fn(Table) -> Read<T>) -> Read<BTreeMap<String, T>> {
+fn read_map<T>(tables: BTreeMap<String, Table>, read: fn(Table) -> Read<T>) -> Result<BTreeMap<String, T>, Problems> {
+    let mut found = Collector::default();
     let read = |(name, table): (String, Table)| {
-        let value = read(table).at(name.as_str());
-        value.map(|value| (name, value))
+        let value = found.value(read(table).at(name.as_str()))?;
+        Some((name, value))
     };
-    tables.into_iter().map(read).collect()
+    let all = tables.into_iter().filter_map(read).collect();
+    found.end(all)
 }
 
-fn read_list<T>(tables: Vec<Table>, read: fn(Table) -> Read<T>) -> Read<Vec<T>> {
+fn read_list<T>(tables: Vec<Table>, read: fn(Table) -> Read<T>) -> Result<Vec<T>, Problems> {
+    let mut found = Collector::default();
     let tables = tables.into_iter().enumerate();
-    tables.map(|(i, table)| read(table).at(i)).collect()
+    let all = tables.filter_map(|(i, table)| found.value(read(table).at(i))).collect();
+    found.end(all)
 }
 
 /// Parses a table with the key `type`.

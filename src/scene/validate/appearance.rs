@@ -10,7 +10,7 @@ use super::super::limits::{
     ABSORPTIONS, ANISOTROPIES, ETAS, FACTORS, IORS, KS, LINE_WIDTHS, OFFSETS, SCALES, SHARES, SHININESS, STRENGTHS,
     TURNS, UV_SETS,
 };
-use super::super::suggest;
+use super::super::suggest::Suggestions;
 use super::super::texture::{levels, words, words_around};
 use super::super::{
     Assets, Channel, ChannelReference, ColorDescription, ConductorDescription, Encoding, Facets, Image,
@@ -19,30 +19,37 @@ use super::super::{
     ValueDescription,
 };
 use super::path::needs_path;
-use super::{At, BTreeMap, BTreeSet, Checked, Color, Problem, between, check, color, number, show_pair};
+use super::{
+    At, BTreeMap, BTreeSet, Checked, Collector, Color, Problem, Problems, between, check, color, number, show_pair,
+};
 
 /// What all texels together may take, in bytes, as they are rendered from.
 pub(in crate::scene) const TEXEL_MEMORY: u64 = 1 << 30;
 
-/// Returns the textures, and the indices of those whose image is damaged: a constant, their factor, stands in for each.
+/// Returns the textures, and the indices of those that a constant stands in for: the factor of a damaged image, and any color for
+/// a texture that has a problem or is not read.
 pub(super) fn textures(
     descriptions: &BTreeMap<String, TextureDescription>,
     images: &mut Images,
-) -> Checked<(Vec<Texture>, BTreeSet<usize>)> {
-    let mut damaged = BTreeSet::new();
+) -> (Vec<Texture>, BTreeSet<usize>, Result<(), Problems>) {
+    let mut found = Collector::default();
+    let mut replaced = BTreeSet::new();
     let mut textures = Vec::with_capacity(descriptions.len());
     for (name, description) in descriptions {
-        let texture = texture(description, images).at(name.as_str());
-        textures.push(match (texture, description) {
-            (Err(problem), TextureDescription::Image(image)) if problem.is_damage => {
-                images.tolerate(problem, "the texture is replaced by its factor")?;
-                damaged.insert(textures.len());
-                constant(DVec3::from_slice(&image.factor))
-            }
-            (texture, _) => texture?,
-        });
+        let mut texture = texture(description, images).at(name.as_str());
+        if let (Err(problem), TextureDescription::Image(image)) = (&texture, description)
+            && problem.is_damage
+        {
+            let tolerated = images.tolerate(problem.clone(), "the texture is replaced by its factor");
+            texture = tolerated.map(|()| constant(DVec3::from_slice(&image.factor)));
+            replaced.insert(textures.len());
+        }
+        if texture.is_err() || (!images.reads_files && matches!(description, TextureDescription::Image(_))) {
+            replaced.insert(textures.len());
+        }
+        textures.push(found.value(texture).unwrap_or_else(|| constant(DVec3::ONE)));
     }
-    Ok((textures, damaged))
+    (textures, replaced, found.end(()))
 }
 
 /// Returns a texture of one colour.
@@ -57,6 +64,8 @@ fn constant(color: DVec3) -> Texture {
 /// The images so far: each file is read and kept once, whatever its names and however many textures have it.
 pub(super) struct Images<'a> {
     pub(super) assets: &'a Assets,
+    /// False if the scene has problems already: images of one texel stand in for those of files then.
+    reads_files: bool,
     /// By their place, with the words that each takes.
     files: BTreeMap<Place, Vec<(File, u64)>>,
     /// The memory of all of them, in bytes.
@@ -67,9 +76,10 @@ pub(super) struct Images<'a> {
 
 impl<'a> Images<'a> {
     /// None so far.
-    pub(super) fn new(assets: &'a Assets) -> Images<'a> {
+    pub(super) fn new(assets: &'a Assets, reads_files: bool) -> Images<'a> {
         Images {
             assets,
+            reads_files,
             files: BTreeMap::new(),
             taken: 0,
             notes: Vec::new(),
@@ -125,6 +135,13 @@ impl<'a> Images<'a> {
     /// An image of a file or of memory, of which so many words are rendered from.
     fn with_words(&mut self, file: &str, part: Part, wanted: impl Fn(Header) -> u64) -> Checked<Arc<Image>> {
         let place = self.assets.find(file)?;
+        if !self.reads_files {
+            return Ok(Arc::new(Image {
+                width: 1,
+                height: 1,
+                texels: Texels::Floats(vec![[0.0; 3]]),
+            }));
+        }
         let taken = self.taken;
         // With what it takes already.
         let fits = |header: Header, before: u64| {
@@ -260,10 +277,11 @@ pub(super) struct Textures<'a> {
     pub(super) textures: &'a [Texture],
     /// Those of the alpha of images, which lie behind the others, by their names; or what is wrong with them.
     pub(super) alphas: BTreeMap<&'a str, Result<usize, String>>,
-    /// Those whose image is damaged.
-    pub(super) damaged: BTreeSet<usize>,
+    /// Those that a constant stands in for.
+    pub(super) replaced: BTreeSet<usize>,
     /// Which materials there are depends on it.
     pub(super) integrator: Integrator,
+    pub(super) suggestions: Suggestions,
 }
 
 /// Adds the textures of the alpha of images that materials ask for by `channel = "a"`.
@@ -303,7 +321,7 @@ impl Textures<'_> {
     }
 
     fn find_name(&self, name: &str) -> Checked<usize> {
-        let unknown = || Problem::new(suggest::unknown("texture", name, self.names.iter().copied()));
+        let unknown = || Problem::new(self.suggestions.unknown("texture", name, self.names.iter().copied()));
         // The names are sorted, as those of a map.
         self.names.binary_search(&name).map_err(|_| unknown())
     }
@@ -348,7 +366,7 @@ impl Textures<'_> {
             return Ok(None);
         };
         let texture = self.find(name)?;
-        if self.damaged.contains(&texture) {
+        if self.replaced.contains(&texture) {
             return Ok(None);
         }
         let TextureKind::Image { image, factor, .. } = &self.textures[texture].kind else {
@@ -372,7 +390,7 @@ impl Textures<'_> {
             return Ok(None);
         };
         let texture = self.find_name(name)?;
-        if self.damaged.contains(&texture) {
+        if self.replaced.contains(&texture) {
             return Ok(None);
         }
         let TextureKind::Image { image, factor, .. } = &self.textures[texture].kind else {
@@ -414,8 +432,8 @@ impl Textures<'_> {
         needs_path(self.integrator)?;
         let color = self.color(emission)?;
         // Only parts of a surface shine, as a rule: its factor alone would light the whole scene.
-        let is_damaged = matches!(color, Color::Texture(texture) if self.damaged.contains(&texture));
-        Ok(if is_damaged { Color::BLACK } else { color })
+        let is_replaced = matches!(color, Color::Texture(texture) if self.replaced.contains(&texture));
+        Ok(if is_replaced { Color::BLACK } else { color })
     }
 
     /// Only paths have this type.

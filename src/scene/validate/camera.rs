@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::{Checked, FLATTEST, between, check, length, number, point, show, unit};
 use crate::scene::camera_path::CameraPath;
-use crate::scene::error::{At, Problem};
+use crate::scene::error::{At, Collector, Problem, Problems, both};
 use crate::scene::limits::{APERTURES, BLADES, F_NUMBERS, FOVS, FRAMES, LENGTHS, TURNS};
 use crate::scene::{Camera, CameraDescription, CameraKeyDescription, Lens, PerspectiveDescription, Projection};
 
@@ -20,60 +20,56 @@ impl CameraDescription {
     ///
     /// The first value that breaks a rule.
     pub fn validate(&self) -> Result<Camera, Problem> {
-        camera(self, VERTICAL_UP)
+        camera(self, VERTICAL_UP).map_err(|problems| problems.first)
     }
 
     /// Validates the camera at one frame of its path. A view along `up` is an error, because another `up` would be a jump.
     pub(in crate::scene) fn validate_frame(&self) -> Result<Camera, Problem> {
-        camera(self, DVec3::Z)
+        camera(self, DVec3::Z).map_err(|problems| problems.first)
     }
 }
 
 /// Returns the camera. `vertical_up` replaces an `up` of +z, which is the default, if the view is along it.
-fn camera(description: &CameraDescription, vertical_up: DVec3) -> Checked<Camera> {
-    let mut lens = None;
-    let (position, look_at, up, projection) = match description {
+fn camera(description: &CameraDescription, vertical_up: DVec3) -> Result<Camera, Problems> {
+    let (position, look_at, up) = match description {
+        CameraDescription::Perspective(camera) => (camera.position, camera.look_at, camera.up),
+        CameraDescription::Panorama(camera) => (camera.position, camera.look_at, camera.up),
+        CameraDescription::Orthographic(camera) => (camera.position, camera.look_at, camera.up),
+    };
+    let points = both(point(position).at("position"), point(look_at).at("look_at"));
+    let view = both(points, unit(up).at("up")).and_then(|(_, up)| {
+        let forward = look_at - position;
+        check(forward.length() >= LENGTHS.0, || {
+            format!("{} must differ from the camera's position", show(look_at))
+        })
+        .at("look_at")?;
+        let distance = forward.length();
+        let forward = forward.normalize();
+        let is_vertical = up == DVec3::Z && forward.cross(up).length() <= FLATTEST;
+        let right = forward.cross(if is_vertical { vertical_up } else { up });
+        check(right.length() > FLATTEST, || {
+            let (look_at, up) = (show(look_at), show(up));
+            format!("{look_at} makes the view parallel to up, {up}; choose another up")
+        })
+        .at("look_at")?;
+        Ok((distance, forward, right.normalize()))
+    });
+    let optics = match description {
         CameraDescription::Perspective(camera) => {
-            lens = lens_of(camera)?;
-            let fov = between(camera.fov, FOVS).at("fov")?.to_radians();
-            (
-                camera.position,
-                camera.look_at,
-                camera.up,
-                Projection::Perspective { fov },
-            )
+            let fov = between(camera.fov, FOVS).at("fov");
+            let projection = fov.map(|fov| Projection::Perspective { fov: fov.to_radians() });
+            both(projection, lens_of(camera))
         }
-        CameraDescription::Panorama(camera) => (camera.position, camera.look_at, camera.up, Projection::Panorama),
+        CameraDescription::Panorama(_) => Ok((Projection::Panorama, None)),
         CameraDescription::Orthographic(camera) => {
-            let height = length(camera.height).at("height")?;
-            (
-                camera.position,
-                camera.look_at,
-                camera.up,
-                Projection::Orthographic { height },
-            )
+            let height = length(camera.height).at("height").map_err(Problems::from);
+            height.map(|height| (Projection::Orthographic { height }, None))
         }
     };
-    point(position).at("position")?;
-    point(look_at).at("look_at")?;
-    let up = unit(up).at("up")?;
-    let forward = look_at - position;
-    check(forward.length() >= LENGTHS.0, || {
-        format!("{} must differ from the camera's position", show(look_at))
-    })
-    .at("look_at")?;
+    let ((projection, mut lens), (distance, forward, right)) = both(optics, view)?;
     if let (Some(lens), CameraDescription::Perspective(camera)) = (&mut lens, description) {
-        lens.focus = camera.focus_distance.unwrap_or(forward.length());
+        lens.focus = camera.focus_distance.unwrap_or(distance);
     }
-    let forward = forward.normalize();
-    let is_vertical = up == DVec3::Z && forward.cross(up).length() <= FLATTEST;
-    let right = forward.cross(if is_vertical { vertical_up } else { up });
-    check(right.length() > FLATTEST, || {
-        let (look_at, up) = (show(look_at), show(up));
-        format!("{look_at} makes the view parallel to up, {up}; choose another up")
-    })
-    .at("look_at")?;
-    let right = right.normalize();
     Ok(Camera {
         position,
         look_at,
@@ -85,26 +81,27 @@ fn camera(description: &CameraDescription, vertical_up: DVec3) -> Checked<Camera
     })
 }
 
-/// The lens of a camera, where it has one, not yet focused.
-fn lens_of(camera: &PerspectiveDescription) -> Checked<Option<Lens>> {
-    let focal_length = length(camera.focal_length).at("focal_length")?;
-    if let Some(f_number) = camera.f_number {
-        between(f_number, F_NUMBERS).at("f_number")?;
+/// Returns the lens of a camera, if it has one, not yet focused.
+fn lens_of(camera: &PerspectiveDescription) -> Result<Option<Lens>, Problems> {
+    let mut found = Collector::default();
+    let focal_length = found.or_default(length(camera.focal_length).at("focal_length"));
+    let f_number = camera.f_number.map(|f_number| {
         check(camera.aperture.is_none(), || {
             "cannot be combined with aperture: both set the diameter of the lens".to_owned()
-        })
-        .at("f_number")?;
-    }
-    let aperture = camera.aperture.map(aperture).transpose().at("aperture")?;
-    camera.focus_distance.map(length).transpose().at("focus_distance")?;
+        })?;
+        between(f_number, F_NUMBERS)
+    });
+    let f_number = found.or_default(f_number.transpose().at("f_number"));
+    let aperture = found.or_default(camera.aperture.map(aperture).transpose().at("aperture"));
+    found.value(camera.focus_distance.map(length).transpose().at("focus_distance"));
     let blades = camera.blades;
-    check(blades == 0 || (BLADES.0..=BLADES.1).contains(&blades), || {
+    let valid = check(blades == 0 || (BLADES.0..=BLADES.1).contains(&blades), || {
         format!("{blades} must be 0 or a whole number from {} to {}", BLADES.0, BLADES.1)
-    })
-    .at("blades")?;
-    let rotation = between(camera.blade_rotation, TURNS).at("blade_rotation")?;
-    let diameter = aperture.or(camera.f_number.map(|n| focal_length / n)).unwrap_or(0.0);
-    Ok((diameter > 0.0).then(|| Lens {
+    });
+    found.value(valid.at("blades"));
+    let rotation = found.or_default(between(camera.blade_rotation, TURNS).at("blade_rotation"));
+    let diameter = aperture.or(f_number.map(|n| focal_length / n)).unwrap_or(0.0);
+    found.end((diameter > 0.0).then(|| Lens {
         radius: diameter / 2.0,
         focus: 1.0,
         blades,
@@ -117,23 +114,23 @@ fn aperture(diameter: f64) -> Checked<f64> {
 }
 
 /// Checks a camera and its path, if it has one: each key by itself, the camera as it stands, and the camera at all keys.
-pub(super) fn with_path(camera: &CameraDescription) -> Checked<(Camera, Option<CameraPath>)> {
-    let Some(path) = camera.path() else {
-        return Ok((camera.validate()?, None));
+pub(super) fn with_path(description: &CameraDescription) -> Result<(Camera, Option<CameraPath>), Problems> {
+    let Some(path) = description.path() else {
+        return Ok((camera(description, VERTICAL_UP)?, None));
     };
-    let checked = || -> Checked<()> {
-        check(!path.keys.is_empty(), || "[] must have at least one key".to_owned())?;
-        let mut before = None;
-        for (i, description) in path.keys.iter().enumerate() {
-            key(description, camera, before).at(i)?;
-            before = Some(description.frame);
-        }
-        Ok(())
-    };
-    // First, as the camera may have its values from them.
-    checked().at("keys").at("path")?;
-    let still = camera.validate()?;
-    let moving = CameraPath::of(camera);
+    let mut found = Collector::default();
+    found.value(check(!path.keys.is_empty(), || {
+        "[] must have at least one key".to_owned()
+    }));
+    let mut before = None;
+    for (i, each) in path.keys.iter().enumerate() {
+        found.value(key(each, description, before).at(i));
+        before = Some(each.frame);
+    }
+    // First, because the camera may have its values from them.
+    found.end(()).at("keys").at("path")?;
+    let still = camera(description, VERTICAL_UP)?;
+    let moving = CameraPath::of(description);
     if let Some(moving) = &moving {
         for key in &path.keys {
             moving.at(key.frame)?;

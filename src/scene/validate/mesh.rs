@@ -9,13 +9,14 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 use super::super::error::cut;
 use super::super::image_file::Place;
 use super::super::limits::{FARTHEST, LENGTHS, SCALES, TURNS};
+use super::super::mesh_file;
+use super::super::suggest::Suggestions;
 use super::super::{
     Assets, Geometry, InstanceDescription, Material, MeshDescription, MeshFileDescription, Reflection, Rotation, Scale,
     Shape, ShapeDescription, Up,
 };
-use super::super::{mesh_file, suggest};
 use super::mtl::Looks;
-use super::{At, Checked, FLATTEST, Problem, between, check, list, number, point, show, unit};
+use super::{At, Checked, Collector, FLATTEST, Problem, between, check, list, number, point, show, unit};
 use crate::mesh::{Group, Mesh, Normals};
 
 /// The most groups of all meshes' instances together.
@@ -26,21 +27,24 @@ pub(super) struct Known<'a> {
     pub names: &'a BTreeMap<&'a str, usize>,
     pub looks: Looks<'a>,
     pub assets: &'a Assets,
+    /// False if the scene has problems already: no mesh is needed then.
+    pub reads_files: bool,
+    pub suggestions: Suggestions,
 }
 
 impl Known<'_> {
     /// The index of a material of the scene.
     pub fn material(&self, name: &str) -> Checked<usize> {
-        let unknown = || Problem::new(suggest::unknown("material", name, self.names.keys().copied()));
+        let unknown = || Problem::new(self.suggestions.unknown("material", name, self.names.keys().copied()));
         self.names.get(name).copied().ok_or_else(unknown)
     }
 }
 
 /// A mesh that instances name.
-pub(super) struct NamedMesh {
-    mesh: Arc<Mesh>,
-    up: Up,
-    file: String,
+pub(super) struct NamedMesh<'a> {
+    /// `None` if it cannot be read, or is not needed.
+    mesh: Option<Arc<Mesh>>,
+    description: &'a MeshFileDescription,
 }
 
 /// What places a mesh, and what it is made of.
@@ -53,18 +57,19 @@ struct Placement<'a> {
     matrix: Option<&'a Vec<[f64; 4]>>,
 }
 
-/// A mesh of `[meshes.NAME]`.
-pub(super) fn named(description: &MeshFileDescription, known: &mut Known) -> Checked<NamedMesh> {
-    let MeshFileDescription { file, normals, up } = description;
-    Ok(NamedMesh {
-        mesh: load(file, *normals, known)?,
-        up: *up,
-        file: file.clone(),
-    })
+impl<'a> NamedMesh<'a> {
+    /// Reads a mesh of `[meshes.NAME]`. If that fails, its problem is kept.
+    pub fn read(description: &'a MeshFileDescription, name: &str, known: &mut Known, found: &mut Collector) -> Self {
+        let mesh = load(&description.file, description.normals, known).at(name);
+        NamedMesh {
+            mesh: found.value(mesh).flatten(),
+            description,
+        }
+    }
 }
 
 /// A shape of type `mesh`.
-pub(super) fn mesh(shape: &MeshDescription, known: &mut Known) -> Checked<Shape> {
+pub(super) fn mesh(shape: &MeshDescription, known: &mut Known) -> Checked<Option<Shape>> {
     let mesh = load(&shape.file, shape.normals, known)?;
     let placement = Placement {
         material: shape.material.as_ref(),
@@ -80,12 +85,15 @@ pub(super) fn mesh(shape: &MeshDescription, known: &mut Known) -> Checked<Shape>
 /// One of `[[instances]]`.
 pub(super) fn instance(
     instance: &InstanceDescription,
-    meshes: &BTreeMap<&str, NamedMesh>,
+    meshes: &BTreeMap<&str, NamedMesh<'_>>,
     known: &mut Known,
-) -> Checked<Shape> {
+) -> Checked<Option<Shape>> {
     let name = &instance.mesh;
-    let unknown = || Problem::new(suggest::unknown("mesh", name, meshes.keys().copied()));
-    let NamedMesh { mesh, up, file } = meshes.get(name.as_str()).ok_or_else(unknown).at("mesh")?;
+    let unknown = || Problem::new(known.suggestions.unknown("mesh", name, meshes.keys().copied()));
+    let NamedMesh {
+        mesh,
+        description: file,
+    } = meshes.get(name.as_str()).ok_or_else(unknown).at("mesh")?;
     let placement = Placement {
         material: instance.material.as_ref(),
         materials: &instance.materials,
@@ -94,7 +102,7 @@ pub(super) fn instance(
         scale: instance.scale,
         matrix: instance.matrix.as_ref(),
     };
-    placed(Arc::clone(mesh), *up, file, &placement, known)
+    placed(mesh.clone(), file.up, &file.file, &placement, known)
 }
 
 /// The words of all groups have to be numbered.
@@ -125,7 +133,7 @@ pub(super) fn notes(
         ) => Some((&description.file, mesh)),
         _ => None,
     });
-    let named = meshes.values().map(|named| (&named.file, &named.mesh));
+    let named = (meshes.values()).filter_map(|named| Some((&named.description.file, named.mesh.as_ref()?)));
     let of_mesh = |(file, mesh): (&String, &Arc<Mesh>)| -> Vec<String> {
         mesh.notes.iter().map(|note| located(file, note)).collect()
     };
@@ -141,10 +149,11 @@ fn located(file: &str, note: &str) -> String {
     }
 }
 
-fn load(file: &str, normals: Option<Normals>, known: &mut Known) -> Checked<Arc<Mesh>> {
+/// Returns a mesh; `None` if no files are read.
+fn load(file: &str, normals: Option<Normals>, known: &mut Known) -> Checked<Option<Arc<Mesh>>> {
     if let Some(mesh) = known.assets.meshes.get(file) {
         return match mesh.broken_rule() {
-            None => Ok(Arc::clone(mesh)),
+            None => Ok(Some(Arc::clone(mesh))),
             Some(rule) => Err(Problem::new(format!("{file:?}: {rule}"))).at("file"),
         };
     }
@@ -152,6 +161,9 @@ fn load(file: &str, normals: Option<Normals>, known: &mut Known) -> Checked<Arc<
     let Place::File(path) = place else {
         return Err(Problem::new(format!("{file:?} is an image in memory, and no mesh"))).at("file");
     };
+    if !known.reads_files {
+        return Ok(None);
+    }
     let mesh = mesh_file::load(&path, normals)
         .map_err(|error| Problem::new(error.to_string()))
         .at("file")?;
@@ -159,11 +171,29 @@ fn load(file: &str, normals: Option<Normals>, known: &mut Known) -> Checked<Arc<
         return Err(Problem::damage(damage.clone().of(Path::new(file)).to_string())).at("file");
     }
     known.looks.know(&mesh);
-    Ok(mesh)
+    Ok(Some(mesh))
 }
 
-fn placed(mesh: Arc<Mesh>, up: Up, file: &str, placement: &Placement, known: &mut Known) -> Checked<Shape> {
+/// Returns a placed mesh; without a mesh only the values of its placement are checked.
+fn placed(
+    mesh: Option<Arc<Mesh>>,
+    up: Up,
+    file: &str,
+    placement: &Placement,
+    known: &mut Known,
+) -> Checked<Option<Shape>> {
     let map = self::placement(placement.translate, placement.rotate, placement.scale, placement.matrix)?;
+    let Some(mesh) = mesh else {
+        placement
+            .material
+            .map(|name| known.material(name))
+            .transpose()
+            .at("material")?;
+        for (group, name) in placement.materials {
+            known.material(name).at(group.as_str()).at("materials")?;
+        }
+        return Ok(None);
+    };
     let to_world = map * turned_up(up);
     let corners: Vec<DVec3> = mesh.corners().map(|corner| to_world.transform_point3(corner)).collect();
     let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
@@ -184,19 +214,19 @@ fn placed(mesh: Arc<Mesh>, up: Up, file: &str, placement: &Placement, known: &mu
     })
     .at("file")?;
     let materials = materials(&mesh, file, placement, known)?;
-    Ok(Shape {
+    Ok(Some(Shape {
         material: materials.first().copied().unwrap_or(0),
         geometry: Geometry::Mesh {
             mesh,
             to_world,
             materials,
         },
-    })
+    }))
 }
 
 /// For each group of a mesh the index of its material: what the scene says, else what the mesh's own file does.
 fn materials(mesh: &Arc<Mesh>, file: &str, placement: &Placement, known: &mut Known) -> Checked<Vec<usize>> {
-    let named = |name: &String| {
+    let named = |name: &String| -> Checked<usize> {
         let index = known.material(name)?;
         check(
             !mesh.uvs.is_empty() || !has_textures(&known.looks.materials[index]),

@@ -19,19 +19,20 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use self::appearance::{Images, Textures};
-use self::mesh::Known;
+use self::mesh::{Known, NamedMesh};
 use self::mtl::Looks;
-use super::error::{At, Problem, cut};
+use super::error::{At, Collector, Problem, Problems, both, cut};
 use super::gltf::Expanded;
 use super::limits::{
     CLAMPS, COLORS, DEEPEST, FARTHEST, FILTER_RADII, LEAST_ADAPTIVE, LENGTHS, MOST, SHADOW_EPSILONS, SHARES,
 };
 use super::parse::list;
+use super::suggest::Suggestions;
 use super::{
-    Adaptive, AdaptiveDescription, Assets, Color, Description, EllipsoidDescription, Environment, Geometry,
-    ImageDescription, InstanceDescription, Integrator, Light, LightDescription, Material, Parallelogram, Pattern,
-    PixelFilter, PixelFilterDescription, Render, RenderDescription, Samples, SamplesDescription, Scene, Shadows, Shape,
-    ShapeDescription, Texture, ViewSettings,
+    Adaptive, AdaptiveDescription, Assets, Camera, CameraPath, Color, Description, EllipsoidDescription, Environment,
+    Geometry, ImageDescription, InstanceDescription, Integrator, Light, LightDescription, Material, Parallelogram,
+    Pattern, PixelFilter, PixelFilterDescription, Render, RenderDescription, Samples, SamplesDescription, Scene,
+    Shadows, Shape, ShapeDescription, Texture, ViewSettings,
 };
 
 pub(super) use self::appearance::TEXEL_MEMORY;
@@ -51,7 +52,7 @@ impl Description {
     ///
     /// # Errors
     ///
-    /// The first value that breaks a rule.
+    /// A value that breaks a rule. [`Scene::parse`](super::Scene::parse) reports all of them.
     pub fn validate(&self) -> Result<Scene, Problem> {
         self.validate_with(&Assets::beside(Path::new(".")))
     }
@@ -60,25 +61,38 @@ impl Description {
     ///
     /// # Errors
     ///
-    /// The first value that breaks a rule.
+    /// A value that breaks a rule.
     pub fn validate_with(&self, assets: &Assets) -> Result<Scene, Problem> {
-        self.validate_and_list(assets, &mut BTreeSet::new())
+        let scene = self.validate_and_list(assets, &mut BTreeSet::new());
+        scene.map_err(|problems| problems.first)
     }
 
-    /// [`Description::validate_with`]. What files the scene is made of is told even if it breaks a rule.
-    pub(super) fn validate_and_list(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problem> {
+    /// [`Description::validate_with`] with all problems. Lists the files of the scene even if it has problems.
+    pub(super) fn validate_and_list(&self, assets: &Assets, files: &mut BTreeSet<PathBuf>) -> Result<Scene, Problems> {
         files.extend(self.files_beside(assets));
         let integrator = self.integrator();
+        let settings = self.settings(integrator);
         let has_gltf = self
             .shapes
             .iter()
             .any(|shape| matches!(shape, ShapeDescription::Gltf(_)));
-        let mut scene = match has_gltf {
-            false => self.validate_plain(integrator, assets, files)?,
-            true => {
-                let expanded = Expanded::of(self, assets, files)?;
-                let scene = expanded.description.validate_plain(integrator, &expanded.assets, files);
-                let mut scene = scene.map_err(|problem| expanded.place(self, problem))?;
+        let expanded = match &settings {
+            Ok(_) if has_gltf => Some(Expanded::of(self, assets, files)),
+            _ => None,
+        };
+        let mut scene = match expanded {
+            None => self.validate_plain(settings, integrator, assets, files)?,
+            Some(Err(problem)) => {
+                let others = self.validate_plain(Err(problem.into()), integrator, assets, files);
+                others.map_err(Problems::once_per_key)? // the file may have the same problem again
+            }
+            Some(Ok(expanded)) => {
+                // The files may have added lights.
+                let settings = expanded.description.settings(integrator);
+                let described = &expanded.description;
+                let scene = described.validate_plain(settings, integrator, &expanded.assets, files);
+                let place = |problem| expanded.place(self, problem);
+                let mut scene = scene.map_err(|problems| problems.map(place).once_per_key())?;
                 scene.notes.splice(0..0, expanded.notes);
                 scene.imported = expanded.imported;
                 scene
@@ -89,49 +103,89 @@ impl Description {
         Ok(scene)
     }
 
-    /// Validates a description without glTF files.
+    /// Validates the sections that name no files.
+    fn settings(&self, integrator: Integrator) -> Result<Settings, Problems> {
+        let image = both(
+            image(&self.image).at("image"),
+            camera::with_path(&self.camera).at("camera"),
+        );
+        let render = render(&self.render, integrator).at("render");
+        let lights = each(&self.lights, light).at("lights");
+        let ((((width, height), view), (camera, camera_path)), (render, lights)) = both(image, both(render, lights))?;
+        Ok(Settings {
+            width,
+            height,
+            view,
+            camera,
+            camera_path,
+            render,
+            lights,
+        })
+    }
+
+    /// Validates a description without glTF files. If the settings have problems, files are not read, because no scene can be made of
+    /// them; all other values are checked nevertheless.
     fn validate_plain(
         &self,
+        settings: Result<Settings, Problems>,
         integrator: Integrator,
         assets: &Assets,
         files: &mut BTreeSet<PathBuf>,
-    ) -> Result<Scene, Problem> {
+    ) -> Result<Scene, Problems> {
         // A map is sorted: a material's index is its place among the names.
         let names = self.materials.keys().map(String::as_str);
         let indices: BTreeMap<_, _> = names.zip(0..).collect();
-        let mut images = Images::new(assets);
-        let (mut textures, damaged) = appearance::textures(&self.textures, &mut images).at("textures")?;
-        let alphas = appearance::alphas(&self.materials, &self.textures, &mut images, &mut textures);
+        let reads_files = settings.is_ok();
+        let mut images = Images::new(assets, reads_files);
+        let (mut textures, replaced, of_textures) = appearance::textures(&self.textures, &mut images);
+        let alphas = match reads_files && of_textures.is_ok() {
+            true => appearance::alphas(&self.materials, &self.textures, &mut images, &mut textures),
+            false => BTreeMap::new(),
+        };
         let known = Textures {
             names: self.textures.keys().map(String::as_str).collect(),
             textures: &textures,
             alphas,
-            damaged,
+            replaced,
             integrator,
+            suggestions: Suggestions::default(),
         };
+        let [stand_in, _] = default_material::default_materials(integrator);
+        let mut of_materials = Collector::default();
         let materials = (self.materials.iter())
-            .map(|(name, description)| known.material(description).at(name.as_str()))
-            .collect::<Checked<Vec<_>>>()
-            .at("materials")?;
-        let environment = environment::environment(self, integrator, &mut images).at("environment")?;
+            .map(|(name, description)| of_materials.value(known.material(description).at(name.as_str())))
+            .map(|material| material.unwrap_or_else(|| stand_in.clone()))
+            .collect();
+        let appearance = both(of_textures.at("textures"), of_materials.end(()).at("materials"));
+        let environment = environment::environment(self, integrator, &mut images).at("environment");
         let own = (self.materials.keys().cloned().collect(), materials);
         let mut known = Known {
             names: &indices,
             looks: Looks::new(own, textures, images, files, integrator),
             assets,
+            reads_files,
+            suggestions: Suggestions::default(),
         };
-        let mut shapes = each(&self.shapes, |description| shape(description, &mut known)).at("shapes")?;
-        let meshes = (self.meshes.iter())
-            .map(|(name, description)| Ok((name.as_str(), mesh::named(description, &mut known).at(name.as_str())?)))
-            .collect::<Checked<BTreeMap<_, _>>>()
-            .at("meshes")?;
+        let shapes = each(&self.shapes, |description| shape(description, &mut known)).at("shapes");
+        let mut of_meshes = Collector::default();
+        let meshes: BTreeMap<_, _> = (self.meshes.iter())
+            .map(|(name, description)| {
+                let mesh = NamedMesh::read(description, name, &mut known, &mut of_meshes);
+                (name.as_str(), mesh)
+            })
+            .collect();
+        let of_meshes = of_meshes.end(()).at("meshes");
         let instance = |description: &InstanceDescription| mesh::instance(description, &meshes, &mut known);
-        shapes.extend(each(&self.instances, instance).at("instances")?);
+        let instances = each(&self.instances, instance).at("instances");
+        let appearance = both(appearance, environment);
+        let objects = both(shapes, both(of_meshes, instances));
+        let (settings, ((_, environment), (shapes, (_, instances)))) = both(settings, both(appearance, objects))?;
+        let shapes: Vec<Shape> = shapes.into_iter().chain(instances).flatten().collect();
         mesh::few_groups(&shapes).at("instances")?;
         let mut notes = mesh::notes(&self.shapes, &shapes, &meshes);
         let mut looks = known.looks;
         if let Some(damage) = looks.damage() {
-            return Err(damage);
+            return Err(damage.into());
         }
         let material_names = std::mem::take(&mut looks.names);
         let materials = std::mem::take(&mut looks.materials);
@@ -144,22 +198,29 @@ impl Description {
             &textures,
         ));
         notes.extend(environment::note(self, environment.as_ref()));
-        let mut render = render(&self.render, integrator).at("render")?;
+        let Settings {
+            width,
+            height,
+            view,
+            camera,
+            camera_path,
+            mut render,
+            lights,
+        } = settings;
         if render.integrator == Integrator::Path {
             render.background = environment
                 .as_ref()
                 .map_or(DVec3::ZERO, |environment| environment.color);
         }
-        let (camera, camera_path) = camera::with_path(&self.camera).at("camera")?;
         Ok(Scene {
-            width: side(self.image.width).at("width").at("image")?,
-            height: side(self.image.height).at("height").at("image")?,
-            view: view(&self.image).at("image")?,
+            width,
+            height,
+            view,
             camera,
             camera_path,
             render,
             environment,
-            lights: each(&self.lights, light).at("lights")?,
+            lights,
             textures,
             materials,
             material_names,
@@ -172,6 +233,23 @@ impl Description {
     }
 }
 
+/// The sections of a scene that name no files.
+struct Settings {
+    width: u32,
+    height: u32,
+    view: ViewSettings,
+    camera: Camera,
+    camera_path: Option<CameraPath>,
+    render: Render,
+    lights: Vec<Light>,
+}
+
+/// Returns the size of an image, and how it is displayed.
+fn image(image: &ImageDescription) -> Result<((u32, u32), ViewSettings), Problems> {
+    let size = both(side(image.width).at("width"), side(image.height).at("height"));
+    both(size, view(image))
+}
+
 pub(super) fn view(image: &ImageDescription) -> Checked<ViewSettings> {
     let rule = |rule: String| Problem::of("exposure", format!("{} {rule}", image.exposure));
     Ok(ViewSettings {
@@ -180,9 +258,13 @@ pub(super) fn view(image: &ImageDescription) -> Checked<ViewSettings> {
     })
 }
 
-fn each<D, T>(descriptions: &[D], mut check: impl FnMut(&D) -> Checked<T>) -> Checked<Vec<T>> {
+fn each<D, T>(descriptions: &[D], mut check: impl FnMut(&D) -> Checked<T>) -> Result<Vec<T>, Problems> {
+    let mut found = Collector::default();
     let descriptions = descriptions.iter().enumerate();
-    descriptions.map(|(i, description)| check(description).at(i)).collect()
+    let all = descriptions
+        .filter_map(|(i, description)| found.value(check(description).at(i)))
+        .collect();
+    found.end(all)
 }
 
 /// The number of pixels along a side.
@@ -217,29 +299,43 @@ fn samples(description: &SamplesDescription, integrator: Integrator) -> Checked<
     Ok(Samples { pattern, count })
 }
 
-fn render(description: &RenderDescription, integrator: Integrator) -> Checked<Render> {
+fn render(description: &RenderDescription, integrator: Integrator) -> Result<Render, Problems> {
     let is_path = integrator == Integrator::Path;
-    let ambient = color(description.ambient).at("ambient")?;
+    let mut found = Collector::default();
+    let ambient = found.or_default(color(description.ambient).at("ambient"));
+    let background = found.or_default(color(description.background).at("background"));
+    let shadow_epsilon = between(description.shadow_epsilon, SHADOW_EPSILONS).at("shadow_epsilon");
+    let shadow_epsilon = found.or_default(shadow_epsilon);
+    let max_depth = found.or_default(max_depth(description.max_depth, integrator).at("max_depth"));
+    let rr_depth = found.or_default(of_path(integrator, description.rr_depth, rr_depth).at("rr_depth"));
+    let clamp = found.or_default(of_path(integrator, description.clamp, clamp).at("clamp"));
+    let alpha = found.or_default(of_path(integrator, description.alpha, Ok).at("alpha"));
+    // Adaptive sampling depends on the samples of pixels.
+    let pixel_samples = samples(&description.pixel_samples, integrator).at("pixel_samples");
+    let pixels = pixel_samples.and_then(|samples| {
+        let adaptive = description.adaptive.as_ref();
+        let adaptive = adaptive.map(|adaptive| self::adaptive(adaptive, &description.pixel_samples, integrator));
+        Ok((samples, adaptive.transpose().at("adaptive")?))
+    });
+    let light_samples = samples(&description.light_samples, integrator).at("light_samples");
+    let samples = both(both(pixels, light_samples), filter(&description.filter).at("filter"));
+    let (_, (((pixel_samples, adaptive), light_samples), filter)) = both(found.end(()), samples)?;
     Ok(Render {
         integrator,
         ambient: if is_path { DVec3::ZERO } else { ambient },
-        background: color(description.background).at("background")?,
-        shadow_epsilon: between(description.shadow_epsilon, SHADOW_EPSILONS).at("shadow_epsilon")?,
+        background,
+        shadow_epsilon,
         shadows: if is_path { Shadows::Opaque } else { description.shadows },
-        max_depth: max_depth(description.max_depth, integrator).at("max_depth")?,
-        rr_depth: of_path(integrator, description.rr_depth, rr_depth)
-            .at("rr_depth")?
-            .unwrap_or(RR_DEPTH),
-        clamp: of_path(integrator, description.clamp, clamp).at("clamp")?,
-        alpha: of_path(integrator, description.alpha, Ok).at("alpha")?.unwrap_or(false),
+        max_depth,
+        rr_depth: rr_depth.unwrap_or(RR_DEPTH),
+        clamp,
+        alpha: alpha.unwrap_or(false),
         ray_differentials: description.ray_differentials,
         seed: description.seed,
-        pixel_samples: samples(&description.pixel_samples, integrator).at("pixel_samples")?,
-        light_samples: samples(&description.light_samples, integrator).at("light_samples")?,
-        filter: filter(&description.filter).at("filter")?,
-        adaptive: (description.adaptive.as_ref())
-            .map(|adaptive| self::adaptive(adaptive, &description.pixel_samples, integrator).at("adaptive"))
-            .transpose()?,
+        pixel_samples,
+        light_samples,
+        filter,
+        adaptive,
     })
 }
 
@@ -338,7 +434,8 @@ pub(super) fn light(description: &LightDescription) -> Checked<Light> {
     })
 }
 
-fn shape(description: &ShapeDescription, known: &mut Known) -> Checked<Shape> {
+/// Returns a shape; `None` if it has a file that is not read.
+fn shape(description: &ShapeDescription, known: &mut Known) -> Checked<Option<Shape>> {
     let (geometry, name) = match description {
         ShapeDescription::Rectangle(shape) => {
             let rectangle = rectangle(shape.center, shape.size, shape.normal, shape.tangent)?;
@@ -365,7 +462,11 @@ fn shape(description: &ShapeDescription, known: &mut Known) -> Checked<Shape> {
         ShapeDescription::Triangle(shape) => (triangle(shape.vertices).at("vertices")?, &shape.material),
         ShapeDescription::Tetrahedron(shape) => (tetrahedron(shape.vertices).at("vertices")?, &shape.material),
         ShapeDescription::Mesh(shape) => return mesh::mesh(shape, known),
-        ShapeDescription::Gltf(_) => return Err(Problem::new("is expanded before it is checked")),
+        // Expanded, unless there are problems.
+        ShapeDescription::Gltf(shape) => {
+            placement(shape.translate, shape.rotate, shape.scale, shape.matrix.as_ref())?;
+            return known.assets.find(&shape.file).at("file").map(|_| None);
+        }
         ShapeDescription::Plane(shape) => {
             let point = point(shape.point).at("point")?;
             let (tangent, bitangent) = frame(shape.normal, shape.tangent)?;
@@ -399,7 +500,7 @@ fn shape(description: &ShapeDescription, known: &mut Known) -> Checked<Shape> {
         })
         .at("material")?;
     }
-    Ok(Shape { geometry, material })
+    Ok(Some(Shape { geometry, material }))
 }
 
 fn rectangle(center: DVec3, size: [f64; 2], normal: DVec3, tangent: Option<DVec3>) -> Checked<Parallelogram> {

@@ -158,7 +158,7 @@ impl<'a> Looks<'a> {
 
     /// Warns of a group without a material, or returns it as an error ([`Assets::tolerate`](super::super::Assets::tolerate)).
     pub fn without_material(&mut self, damage: Problem) -> Checked<()> {
-        let note = self.images.assets.tolerate(damage, "a grey material stands in")?;
+        let note = self.images.assets.tolerate(damage, "a gray material is used instead")?;
         self.unmatched.insert(note);
         Ok(())
     }

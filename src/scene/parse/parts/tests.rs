@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::scene::Description;
-use crate::scene::parse::{place_in, read_file, syntax_error};
+use crate::scene::error::SceneError;
+use crate::scene::parse::{Defines, invalid, read_file, syntax_error};
 
 const START: &str = "\
 image = { width = 4, height = 4 }
@@ -13,14 +14,11 @@ const SPHERE: &str = "[[shapes]]\ntype = 'sphere'\nmaterial = 'a'\ncenter = [0, 
 const RED: &str = "[materials.a]\ntype = 'phong'\ncolor = [1, 0, 0]\n";
 const BLUE: &str = "[materials.\"b c\"]\ntype = 'phong'\ncolor = [0, 0, 1]\n";
 
-/// What a text says, or what is wrong with it and in which line, read as a whole.
-fn whole(text: &str) -> Result<Description, (usize, String)> {
-    let line = |at: usize| 1 + text[..at].matches('\n').count();
-    let table = toml::from_str(text).map_err(|error| {
-        let at = Broken::of(0, &error).at;
-        (line(at), syntax_error(text, "s", at, error.message()).to_string())
-    })?;
-    read_file(table).map_err(|problem| (line(place_in(text, &problem.key)), problem.to_string()))
+/// Returns the description of a text that is parsed as a whole, or its error.
+fn whole(text: &str) -> Result<Description, SceneError> {
+    let table =
+        toml::from_str(text).map_err(|error| syntax_error(text, "s", Broken::of(0, &error).at, error.message()))?;
+    read_file(table).map_err(|problems| invalid(text, "s", problems, &Defines::new(&[])))
 }
 
 /// The same by parts, with line and column of what is wrong.
@@ -31,13 +29,7 @@ fn by_parts(text: &str) -> Result<Description, String> {
 fn assert_same(text: &str) {
     match (whole(text), by_parts(text)) {
         (Ok(whole), Ok(parts)) => assert!(whole == parts, "{text}"),
-        (Err((line, whole)), Err(parts)) => {
-            assert!(
-                parts.starts_with(&format!("s:{line}:")),
-                "{text}\n{line}: {whole}\n{parts}"
-            );
-            assert!(parts.ends_with(&whole), "{text}\n{whole}\n{parts}");
-        }
+        (Err(whole), Err(parts)) => assert_eq!(whole.to_string(), parts, "{text}"),
         (whole, parts) => panic!("{text}\n{whole:?}\n{parts:?}"),
     }
 }

@@ -505,7 +505,10 @@ fn values_at_the_limits_are_good() {
 fn what_is_odd_is_noted_once_for_each_file() {
     assert_eq!(parse(GOOD).unwrap().notes, Vec::<String>::new());
     let scene = parse(&GOOD.replace("one.obj", "odd.obj")).unwrap();
-    assert_eq!(scene.notes, ["odd.obj: 1 degenerate triangle dropped"]);
+    assert_eq!(
+        scene.notes,
+        ["odd.obj: 1 of 2 triangles has no area (degenerate) and was removed"]
+    );
     let text = GOOD.replace("one.obj", "odd.obj") + "[meshes.other]\nfile = './odd.obj'\n";
     assert_eq!(parse(&text).unwrap().notes.len(), 2);
 }

@@ -227,7 +227,7 @@ fn a_map_needs_texture_coordinates() {
 #[test]
 fn a_default_stands_in_for_missing_materials() {
     let place = Place::new("newmtl red\n");
-    let note = |rest: &str| format!("in/a.obj: no material {rest}; a grey material stands in");
+    let note = |rest: &str| format!("in/a.obj: no material {rest}; a gray material is used instead");
     let notes = |keys: &str| place.scene(&format!("{MESH}{keys}")).unwrap().notes;
     let scene = place.scene(MESH).unwrap();
     assert_eq!(scene.notes, [note("\"blue\": its MTL files do not have it")]);

@@ -354,5 +354,5 @@ fn descriptions_made_in_code_are_read_back() {
     );
     description.render.integrator = Some(Integrator::Phong);
     let told = description.validate().unwrap_err().to_string();
-    assert_eq!(told, "materials.clay.type: \"diffuse\" needs integrator = \"path\"");
+    assert_eq!(told, "render.rr_depth: needs integrator = \"path\"");
 }
