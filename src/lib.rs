@@ -63,6 +63,7 @@ struct Readme;
 
 #[doc(hidden)]
 pub mod backend;
+mod color;
 #[doc(hidden)]
 pub mod compare;
 #[doc(hidden)]

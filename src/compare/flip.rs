@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::colors::Colors;
 use super::picture::{Kind, Picture};
+use crate::color::srgb_to_linear;
 
 /// Pixels for each degree of what is seen, where nothing else is said: a screen 0.7 m wide with 3840 columns, 0.7 m away.
 pub const PIXELS_PER_DEGREE: f64 = 3840.0 * PI / 180.0;
@@ -497,14 +498,5 @@ fn screen_to_linear(curve: &[f64; 256], value: f64) -> f64 {
         curve[usize::from(step)]
     } else {
         srgb_to_linear(value)
-    }
-}
-
-/// The linear value of what a screen shows: IEC 61966-2-1.
-fn srgb_to_linear(value: f64) -> f64 {
-    if value <= 0.04045 {
-        value / 12.92
-    } else {
-        ((value + 0.055) / 1.055).powf(2.4)
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use super::picture::Scaled;
+use crate::color::srgb_to_linear;
 use crate::compare::{self, Channel, Kind, PIXELS_PER_DEGREE, Picture, Plane};
 use crate::image::Pixels;
 use crate::scene::{ViewSettings, ViewTransform};
@@ -81,8 +82,7 @@ impl Reference {
 fn light_of(value: f64, transform: ViewTransform) -> f64 {
     match transform {
         ViewTransform::Gamma22 => value.powf(2.2),
-        _ if value <= 0.04045 => value / 12.92,
-        _ => ((value + 0.055) / 1.055).powf(2.4), // IEC 61966-2-1
+        _ => srgb_to_linear(value),
     }
 }
 

@@ -4,6 +4,7 @@
 //! largest finite one, and what is negative, for which a display has no light, as 0.
 
 use super::agx::agx;
+use crate::color::linear_to_srgb;
 use crate::scene::{ViewSettings, ViewTransform};
 
 /// A colour in 64-bit floats.
@@ -133,14 +134,9 @@ fn gamma22(light: f64) -> f64 {
     light.min(1.0).powf(GAMMA)
 }
 
-/// Clamped, and encoded by IEC 61966-2-1:1999, section 5.2.
+/// Clamped and encoded.
 fn srgb(light: f64) -> f64 {
-    let light = light.clamp(0.0, 1.0);
-    if light <= 0.003_130_8 {
-        12.92 * light
-    } else {
-        1.055 * light.powf(1.0 / 2.4) - 0.055
-    }
+    linear_to_srgb(light.clamp(0.0, 1.0))
 }
 
 /// PBR Neutral: Khronos Group, "PBR Neutral Tone Mapper" specification (2024), with its F90 = 0.04, Ks = 0.8 - 0.04 and Kd = 0.15.

@@ -99,14 +99,6 @@ pub(super) fn texture_coordinate(x: f64) -> Result<f32, String> {
     }
 }
 
-/// Returns the linear value of a component of an sRGB color, from 0 to 1 (IEC 61966-2-1).
-pub(super) fn linear(srgb: f64) -> f64 {
-    match srgb <= 0.04045 {
-        true => srgb / 12.92,
-        false => ((srgb + 0.055) / 1.055).powf(2.4),
-    }
-}
-
 /// A normal of length 1; zero where there is none.
 pub(crate) fn unit(normal: DVec3) -> Vec3 {
     let largest = normal.abs().max_element();

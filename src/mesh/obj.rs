@@ -9,11 +9,12 @@ use std::hash::BuildHasher;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use hashbrown::{DefaultHashBuilder, HashTable};
 
-use super::draft::{Draft, coordinate, counted, linear, texture_coordinate, unit};
+use super::draft::{Draft, coordinate, counted, texture_coordinate, unit};
 use super::error::{Fault, Place, shown};
 use super::words::Words;
 use super::{Group, MOST};
 use super::{damage, words};
+use crate::color::srgb_to_linear;
 
 /// No number of a vertex.
 const NONE: u32 = u32::MAX;
@@ -168,7 +169,7 @@ impl Reader {
         }
         let mut color = Vec4::ONE;
         match values.iter().all(|x| x.is_finite()) {
-            true => color = Vec3::from(values.map(|x| linear(x.clamp(0.0, 1.0)) as f32)).extend(1.0),
+            true => color = Vec3::from(values.map(|x| srgb_to_linear(x.clamp(0.0, 1.0)) as f32)).extend(1.0),
             false => {
                 let rule = || words.fault("the color of the vertex must be three finite numbers");
                 self.draft.damages.add(damage::COLOR, rule);

@@ -11,10 +11,11 @@ use glam::{DVec3, Vec2, Vec4};
 use self::header::{Element, Format, Header, Property, Scalar, header};
 use self::values::{Ascii, Binary, Values};
 use super::damage::{self, Damages};
-use super::draft::{Draft, coordinate, linear, texture_coordinate, unit};
+use super::draft::{Draft, coordinate, texture_coordinate, unit};
 use super::error::{Fault, Place, shown_number};
 use super::words::Words;
 use super::{Group, MOST};
+use crate::color::srgb_to_linear;
 
 /// Reads a file. Normals are kept if they are wanted.
 pub(super) fn read(bytes: &[u8], normals_wanted: bool) -> Result<Draft, Fault> {
@@ -157,7 +158,7 @@ fn color_value(value: f64, scalar: Scalar, is_opacity: bool) -> f32 {
     let share = (value / largest).clamp(0.0, 1.0);
     match is_opacity {
         true => share as f32,
-        false => linear(share) as f32,
+        false => srgb_to_linear(share) as f32,
     }
 }
 

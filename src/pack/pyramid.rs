@@ -3,8 +3,8 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::color::linear_to_srgb;
 use crate::scene::halves::{Level, decoded, half_of};
-use crate::scene::image_file::linear_to_srgb;
 use crate::scene::texture::words;
 use crate::scene::{Encoding, Image, Texels};
 

@@ -6,9 +6,9 @@ use std::str::FromStr;
 use glam::DVec3;
 
 use super::error::{At, Problem};
-use super::image_file::srgb_to_linear;
 use super::validate::{color, view};
 use super::{Description, EnvironmentDescription, EnvironmentName, Integrator};
+use crate::color::srgb_to_linear;
 
 /// The background that the camera sees in place of the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]

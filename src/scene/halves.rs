@@ -3,8 +3,8 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::image_file::{linear_to_srgb, srgb_to_linear};
 use super::{Encoding, Image, Texels};
+use crate::color::{linear_to_srgb, srgb_to_linear};
 
 /// A level in linear light.
 pub(crate) struct Level {

@@ -15,6 +15,7 @@ use super::decode::{Channels, Format, Header, LONGEST_SIDE, Refused, decode};
 use super::halves::halved;
 use super::parse::list;
 use super::texture::{Encoding, Image, Texels};
+use crate::color::srgb_to_linear;
 use crate::mesh::Mesh;
 
 /// The largest file, in bytes.
@@ -437,22 +438,4 @@ fn alpha(image: DynamicImage) -> Option<Texels> {
         DynamicImage::ImageRgba8(colors) => bytes(colors.pixels().map(|texel| texel.0[3]).collect()),
         deep => Texels::Floats(deep.into_rgba32f().pixels().map(|texel| [texel.0[3]; 3]).collect()),
     })
-}
-
-/// The linear value of one by the sRGB curve: IEC 61966-2-1.
-pub(crate) fn srgb_to_linear(x: f64) -> f64 {
-    if x <= 0.04045 {
-        x / 12.92
-    } else {
-        ((x + 0.055) / 1.055).powf(2.4)
-    }
-}
-
-/// The value by the sRGB curve of a linear one.
-pub(crate) fn linear_to_srgb(x: f64) -> f64 {
-    if x <= 0.003_130_8 {
-        x * 12.92
-    } else {
-        1.055 * x.powf(1.0 / 2.4) - 0.055
-    }
 }

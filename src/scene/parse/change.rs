@@ -6,7 +6,7 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use super::parts::{Broken, Kind, Part, Parts, Rest};
-use super::{Problems, Read, course, invalid, read, read_camera, read_file, syntax_error, tagged};
+use super::{Problems, Read, course, invalid, read, read_camera, read_file, tagged};
 use crate::scene::define::Defines;
 use crate::scene::error::{At, KeyPath, SceneError, Segment};
 use crate::scene::{CameraDescription, Description};
@@ -24,7 +24,7 @@ impl Description {
         if course::is_course(Path::new(origin)) {
             return Ok(None);
         }
-        let broken = |broken: Broken| syntax_error(text, origin, broken.at, &broken.message);
+        let broken = |broken: Broken| broken.into_error(text, origin);
         let parts = Parts::of(text);
         if let Some(large) = parts.too_large() {
             return Err(broken(large));
@@ -49,9 +49,7 @@ impl Description {
     /// The camera that a text describes, without other values.
     pub(crate) fn parse_camera(text: &str, origin: &str) -> Result<CameraDescription, SceneError> {
         let parts = Parts::of(text);
-        let rest = parts
-            .read_rest()
-            .map_err(|broken| syntax_error(text, origin, broken.at, &broken.message))?;
+        let rest = parts.read_rest().map_err(|broken| broken.into_error(text, origin))?;
         let camera = rest
             .get("camera")
             .and_then(Value::as_table)

@@ -58,7 +58,7 @@ impl Description {
         if course::is_course(Path::new(origin)) {
             return course::read(text, origin, defines);
         }
-        let broken = |broken: Broken| syntax_error(text, origin, broken.at, &broken.message);
+        let broken = |broken: Broken| broken.into_error(text, origin);
         let parts = Parts::of(text);
         if let Some(large) = parts.too_large() {
             return Err(broken(large));

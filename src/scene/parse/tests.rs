@@ -275,7 +275,7 @@ fn text_that_is_no_toml_is_told_with_line_and_column() {
     for (added, told) in [
         ("é = 3", "8:1: "),
         ("up = [0, 1", "8:11: "),
-        ("fov = 46", "8:1: camera.fov: is defined twice"),
+        ("fov = 46", "8:1: duplicate key: fov = 46"),
         ("focal_length = ", "8:16: "),
         ("focal_length = 1e999", "8:16: "),
     ] {

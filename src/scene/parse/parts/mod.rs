@@ -10,7 +10,8 @@ use toml::{Table, Value};
 use toml_parser::Source;
 use toml_parser::lexer::{Token, TokenKind};
 
-use crate::scene::error::{KeyPath, Segment};
+use super::syntax::{explained, syntax_error};
+use crate::scene::error::{KeyPath, SceneError, Segment};
 
 /// The largest part in bytes, and the largest file that has to be read as a whole.
 pub const LARGEST: usize = 4 << 20;
@@ -67,23 +68,41 @@ pub struct Parts<'a> {
     pub parts: Cow<'a, [Part]>,
 }
 
-/// What is wrong with a text, and at which byte.
+/// An error in a text.
 #[derive(Debug)]
 pub struct Broken {
+    /// Byte offset.
     pub at: usize,
-    pub message: String,
+    message: String,
+    /// Whether the message is the TOML parser's.
+    is_syntax: bool,
 }
 
 impl Broken {
-    fn new(at: usize, message: impl Into<String>) -> Broken {
-        let message = message.into();
-        Broken { at, message }
+    /// Returns the parser's error of the document that begins at `start`.
+    pub fn of(start: usize, error: &Error) -> Broken {
+        Broken {
+            at: start + error.span().map_or(0, |span| span.start),
+            message: error.message().to_owned(),
+            is_syntax: true,
+        }
     }
 
-    /// An error of the document that begins at `start`.
-    pub fn of(start: usize, error: &Error) -> Broken {
-        let at = error.span().map_or(0, |span| span.start);
-        Broken::new(start + at, error.message())
+    fn too_large(at: usize, message: String) -> Broken {
+        Broken {
+            at,
+            message,
+            is_syntax: false,
+        }
+    }
+
+    /// Returns the error of the text of a file.
+    pub fn into_error(self, text: &str, origin: &str) -> SceneError {
+        let message = match self.is_syntax {
+            true => explained(text, self.at, &self.message),
+            false => self.message,
+        };
+        syntax_error(text, origin, self.at, &message)
     }
 
     /// A text that would have to be read as a whole, and is too large for that.
@@ -95,7 +114,7 @@ impl Broken {
             "in a file larger than {} MiB {rule}; it has {size:.1} MiB",
             LARGEST >> 20
         );
-        Broken::new(0, message)
+        Broken::too_large(0, message)
     }
 }
 
@@ -170,7 +189,7 @@ impl<'a> Parts<'a> {
         let large = self.parts.iter().find(|part| part.place.len() > LARGEST);
         if let Some(part) = large {
             let message = format!("the table that starts here is larger than {} MiB", LARGEST >> 20);
-            return Some(Broken::new(part.place.start, message));
+            return Some(Broken::too_large(part.place.start, message));
         }
         let parts: usize = self.parts.iter().map(|part| part.place.len()).sum();
         let rest = self.text.len() - parts;
@@ -182,7 +201,10 @@ impl<'a> Parts<'a> {
         let rest = self.rest();
         toml::from_str(&rest.text).map_err(|error| {
             let broken = Broken::of(0, &error);
-            Broken::new(rest.place(broken.at), broken.message)
+            Broken {
+                at: rest.place(broken.at),
+                ..broken
+            }
         })
     }
 
@@ -214,7 +236,10 @@ impl<'a> Parts<'a> {
             Some(at) => part.place.start + at,
             None => first.place.start + at,
         };
-        Some(Broken::new(start, error.message()))
+        Some(Broken {
+            at: start,
+            ..Broken::of(0, &error)
+        })
     }
 
     /// The part that a key path leads into, and the path in it.
