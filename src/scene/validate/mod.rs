@@ -110,7 +110,7 @@ impl Description {
             camera::with_path(&self.camera).at("camera"),
         );
         let render = render(&self.render, integrator).at("render");
-        let lights = each(&self.lights, light).at("lights");
+        let lights = each(&self.lights, |description| light(description).map(Some)).at("lights");
         let ((((width, height), view), (camera, camera_path)), (render, lights)) = both(image, both(render, lights))?;
         Ok(Settings {
             width,
@@ -180,7 +180,8 @@ impl Description {
         let appearance = both(appearance, environment);
         let objects = both(shapes, both(of_meshes, instances));
         let (settings, ((_, environment), (shapes, (_, instances)))) = both(settings, both(appearance, objects))?;
-        let shapes: Vec<Shape> = shapes.into_iter().chain(instances).flatten().collect();
+        let mut shapes: Vec<Shape> = shapes;
+        shapes.extend(instances);
         mesh::few_groups(&shapes).at("instances")?;
         let mut notes = mesh::notes(&self.shapes, &shapes, &meshes);
         let mut looks = known.looks;
@@ -258,11 +259,12 @@ pub(super) fn view(image: &ImageDescription) -> Checked<ViewSettings> {
     })
 }
 
-fn each<D, T>(descriptions: &[D], mut check: impl FnMut(&D) -> Checked<T>) -> Result<Vec<T>, Problems> {
+/// Checks all entries of a list. `check` returns `None` where files are not read.
+fn each<D, T>(descriptions: &[D], mut check: impl FnMut(&D) -> Checked<Option<T>>) -> Result<Vec<T>, Problems> {
     let mut found = Collector::default();
     let descriptions = descriptions.iter().enumerate();
     let all = descriptions
-        .filter_map(|(i, description)| found.value(check(description).at(i)))
+        .filter_map(|(i, description)| found.value(check(description).at(i)).flatten())
         .collect();
     found.end(all)
 }

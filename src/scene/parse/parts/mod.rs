@@ -74,7 +74,7 @@ pub struct Broken {
     /// Byte offset.
     pub at: usize,
     message: String,
-    /// Whether the message is the TOML parser's.
+    /// Whether the message is the TOML parser's, and the place is known.
     is_syntax: bool,
 }
 
@@ -84,7 +84,7 @@ impl Broken {
         Broken {
             at: start + error.span().map_or(0, |span| span.start),
             message: error.message().to_owned(),
-            is_syntax: true,
+            is_syntax: error.span().is_some(),
         }
     }
 
