@@ -160,6 +160,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 fn listen_error(address: &str, error: &io::Error) -> anyhow::Error {
     match (error.kind(), address.rsplit_once(':')) {
         (io::ErrorKind::AddrInUse, Some((_, port))) => anyhow!("Port {port} is in use; choose another with --listen"),
+        (io::ErrorKind::InvalidInput, _) => Usage(format!(
+            "--listen: {address:?} must be ADDRESS:PORT, such as 127.0.0.1:7878: {error}"
+        ))
+        .into(),
         _ => anyhow!("--listen: {error}"),
     }
 }

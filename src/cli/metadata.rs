@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use wgray::device::DeviceInfo;
-use wgray::image::{Metadata, read_metadata};
+use wgray::image::{Metadata, is_complete, read_metadata};
 use wgray::job::{hash_of_scene, hash_of_shaders};
 use wgray::pack::Packed;
 use wgray::scene::Scene;
@@ -12,9 +12,9 @@ use wgray::scene::Scene;
 /// Name of the mark of an image that was written before it was complete: `32 of 64 samples`.
 const PARTIAL: &str = "partial";
 
-/// Returns true if a file is an image that was written before it was complete.
-pub fn is_partial(path: &Path) -> bool {
-    read_metadata(path).is_some_and(|metadata| metadata.get(PARTIAL).is_some())
+/// Returns true if a file is a whole image with all of its samples.
+pub fn is_finished(path: &Path) -> bool {
+    is_complete(path) && read_metadata(path).is_none_or(|metadata| metadata.get(PARTIAL).is_none())
 }
 
 /// Returns the samples per pixel of an image file, the maximum under adaptive sampling; `None` if wgray did not write it.

@@ -9,7 +9,7 @@ use wgray::film::Region;
 use wgray::image::{self, Aov, Format, Layers, Output, Pending, Target};
 
 use super::Usage;
-use super::metadata::is_partial;
+use super::metadata::is_finished;
 use super::picture_options::PictureOptions;
 
 /// The destinations of a render.
@@ -206,13 +206,14 @@ impl Outputs {
         Ok(())
     }
 
-    /// Returns true if all files exist and no image is partial. Image streams never exist; a statistics stream is ignored.
+    /// Returns true if all files exist and all images are whole and have all of their samples. Image streams never exist; a statistics
+    /// stream is ignored.
     pub fn exist(&self) -> bool {
         let exists = |output: &Output| output.path().is_some_and(Path::is_file);
         let mut pictures = self.pictures.iter().flat_map(|picture| &picture.files);
         let figures = self.stats.iter().filter(|stats| stats.is_file());
         self.part.iter().chain(figures).all(exists)
-            && pictures.all(|(_, output)| exists(output) && !output.path().is_some_and(is_partial))
+            && pictures.all(|(_, output)| exists(output) && output.path().is_some_and(is_finished))
     }
 
     /// Returns the images that are files, which can be written more than once: the format, the image and its layers.

@@ -4,6 +4,7 @@
 
 mod agx;
 mod aov;
+mod complete;
 mod difference;
 mod exr;
 mod file;
@@ -24,6 +25,7 @@ use crate::scene::ViewSettings;
 #[cfg(feature = "dev")]
 pub(crate) use aov::Channel;
 pub use aov::{Aov, AovSource};
+pub use complete::is_complete;
 pub use difference::{Difference, difference};
 pub use exr::read_exr;
 pub use file::Pending;

@@ -4,7 +4,7 @@
 //! largest finite one, and what is negative, for which a display has no light, as 0.
 
 use super::agx::agx;
-use crate::color::linear_to_srgb;
+use crate::color::{linear_to_srgb, srgb_to_linear};
 use crate::scene::{ViewSettings, ViewTransform};
 
 /// A colour in 64-bit floats.
@@ -69,8 +69,27 @@ fn transformed(transform: ViewTransform, light: Rgb) -> Rgb {
     }
 }
 
-/// Solves `transformed(transform, light) == display` by bisection of one channel after the other, as each grows with its own light.
+/// Returns the light that is displayed as a color, or nearly so if none is displayed as it: then the nearest of what [`solution`] finds and
+/// the multiples of the linear color.
 fn inverse(transform: ViewTransform, display: Rgb) -> Rgb {
+    const EXACT: f64 = 0.5 / 255.0;
+    let distance = |light: &Rgb| {
+        let found = transformed(transform, *light);
+        let squares = (0..3).map(|i| (found[i] - display[i]).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    let found = solution(transform, display);
+    if distance(&found) < EXACT {
+        return found;
+    }
+    let linear = display.map(srgb_to_linear);
+    let multiples = (0..=400).map(|i| linear.map(|x| x * (0.025 * f64::from(i - 200)).exp2()));
+    let all = multiples.chain([found]);
+    all.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(found)
+}
+
+/// Solves `transformed(transform, light) == display` by bisection of one channel after the other, as each grows with its own light.
+fn solution(transform: ViewTransform, display: Rgb) -> Rgb {
     /// The maximum light of a channel. PBR Neutral only approaches white.
     const MAX_LIGHT: f64 = 1e3;
     /// A displayed value that is rounded to white in 8 bits.
@@ -255,6 +274,27 @@ mod tests {
         let white = 1.0 - 1.0 / (0.15 * (2.0 - peak) + 1.0);
         let expected = srgb.display([peak as f32, (peak * white) as f32, (peak * white) as f32]);
         assert!(apart(neutral.display([2.0, 0.0, 0.0]), expected) < 1e-6);
+    }
+
+    #[test]
+    fn colors_that_are_not_displayed_exactly_have_a_near_one() {
+        let distance = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>();
+        for transform in [ViewTransform::KhronosPbrNeutral, ViewTransform::Agx] {
+            let view = view(transform);
+            let shown = |light: [f64; 3]| view.display(light.map(|x| x as f32));
+            for color in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 0.0]] {
+                let found = distance(shown(view.light_of(color)), color);
+                for other in [color.map(srgb_to_linear), solution(transform, color)] {
+                    assert!(found < distance(shown(other), color), "{transform:?} {color:?}");
+                }
+            }
+        }
+        let [red, green, blue] = view(ViewTransform::KhronosPbrNeutral).display(
+            view(ViewTransform::KhronosPbrNeutral)
+                .light_of([1.0, 0.0, 0.0])
+                .map(|x| x as f32),
+        );
+        assert!(red > 0.85 && green < 0.15 && blue < 0.15, "{red} {green} {blue}");
     }
 
     /// By `benches/peers/view_check.py`: its own formula in numpy, and what Blender's tables have.

@@ -19,7 +19,7 @@ use crate::pack::FirstHit;
 
 pub use bands::{Bands, Finished, Flow, Watch, there_is_memory};
 pub use identity::{Identity, hash_of_scene, hash_of_shaders};
-pub use part::{PartError, PartHeader, Parts, Tile, read_part_header, write_part};
+pub use part::{PartError, PartHeader, Parts, Tile, read_part, write_part};
 pub use piece::{CheckpointStore, INTERVAL, NoCheckpoint, Piece, StoredPiece};
 pub use steps::{Order, Reached, Steps};
 

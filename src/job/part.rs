@@ -166,17 +166,14 @@ pub fn write_part(
     Ok(file.finish()?)
 }
 
-/// What a file is a part of, and which one, by its header.
+/// Returns what a file is a part of, and which one.
 ///
 /// # Errors
 ///
-/// What cannot be read, and what is no part.
-pub fn read_part_header(path: &Path) -> io::Result<(Identity, PartHeader)> {
-    let (header, ..) = pieces_file::read_header(&mut File::open(path)?)?;
-    match header.part {
-        Some(part) => Ok((header.identity, part)),
-        None => Err(io::Error::new(io::ErrorKind::InvalidData, "is a checkpoint")),
-    }
+/// Files that cannot be read, are not parts, or are damaged or truncated.
+pub fn read_part(path: &Path) -> Result<(Identity, PartHeader), PartError> {
+    let (_, header, part, _) = open(path)?;
+    Ok((header.identity, part))
 }
 
 /// Why parts cannot be joined.

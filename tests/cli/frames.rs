@@ -4,6 +4,7 @@ use std::fs;
 use std::time::{Duration, SystemTime};
 
 use super::{NO_DRIVER, Place, SCENE};
+use crate::gltf::build::png;
 
 /// The small scene with a camera that goes from the left to the right, in front of it at frame 5.
 fn moving(place: &Place, interpolation: &str) {
@@ -206,9 +207,10 @@ fn ten_thousand_frames_are_no_cliff() {
         "--light-samples",
         "1",
     ];
+    let whole = png(1, &[[9; 4]]);
     for frame in 1..=10_000 {
         if frame % 20 != 7 {
-            place.write(&format!("o.{frame:04}.png"), "");
+            fs::write(place.path(&format!("o.{frame:04}.png")), &whole).unwrap();
         }
     }
     let start = std::time::Instant::now();
@@ -218,7 +220,7 @@ fn ten_thousand_frames_are_no_cliff() {
     assert_eq!(ran.stderr, "note: skipped 9500 of 10000: the output files exist\n");
     assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
     for frame in 1..=10_000 {
-        let is_rendered = !place.read(&format!("o.{frame:04}.png")).is_empty();
+        let is_rendered = place.read(&format!("o.{frame:04}.png")) != whole;
         assert_eq!(is_rendered, frame % 20 == 7, "{frame}");
     }
     assert_eq!(place.files().len(), 10_001);
@@ -288,7 +290,10 @@ fn frames_that_are_there_stay_if_that_is_asked_for() {
     ]
     .concat();
     place.quietly(&one);
-    assert!(place.read("p.png").is_empty());
+    let whole = place.read("p.png");
+    assert!(!whole.is_empty(), "an empty file is not complete");
+    place.quietly(&one);
+    assert_eq!(place.read("p.png"), whole);
 }
 
 #[test]
@@ -533,4 +538,26 @@ fn scenes_in_json_take_frames_and_defines_of_their_own_keys() {
     assert_eq!(ran.code, 0);
     assert_eq!(ran.stderr, "warning: a.json: no camera.path: all frames are equal\n");
     assert_eq!(bits(&place, "f1.exr"), bits(&place, "f2.exr"));
+}
+
+#[test]
+fn truncated_images_and_parts_are_rendered_again() {
+    let place = Place::new();
+    for name in ["a.png", "a.exr", "a.jpg", "a.webp", "a.part"] {
+        let tile: &[&str] = if name == "a.part" { &["--tile", "1/2"] } else { &[] };
+        let arguments = [&["render", "small.toml", "-o", name, "--skip-existing"], tile, &CPU].concat();
+        let skips = || {
+            let ran = place.run(&arguments);
+            assert_eq!(ran.code, 0, "{name}: {}", ran.stderr);
+            ran.stderr.contains("skipped 1 of 1")
+        };
+        assert!(!skips(), "{name}");
+        let whole = place.read(name);
+        for length in [0, 10, whole.len() / 2, whole.len() - 1] {
+            fs::write(place.path(name), &whole[..length]).unwrap();
+            assert!(!skips(), "{name} of {length} bytes");
+            assert_eq!(place.read(name), whole, "{name} of {length} bytes");
+        }
+        assert!(skips(), "{name} is whole");
+    }
 }

@@ -54,7 +54,8 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
                 continue;
             }
             let name = part.display();
-            let message = format!("{name}: belongs to another scene or other options; rendering it again");
+            let message =
+                format!("{name}: is damaged, or belongs to another scene or other options; rendering it again");
             job.log.log(Level::Note, &message);
         }
         picture(&plan, outputs, &mut signals, start)?;

@@ -102,9 +102,9 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Returns true if the header of a file identifies it as the part that this render would write.
+    /// Returns true if a file is the part that this render would write, and is whole.
     pub fn is_done(&self, path: &Path) -> bool {
-        let (Some((tile, _)), Ok((identity, found))) = (self.tile, job::read_part_header(path)) else {
+        let (Some((tile, _)), Ok((identity, found))) = (self.tile, job::read_part(path)) else {
             return false;
         };
         let layout = self.layout(f32::from_bits(found.middle_depth));
