@@ -1,4 +1,4 @@
-//! Whether an image file is whole, by its last bytes: a file whose writer was killed, or whose disk was full, is not.
+//! Detects truncated image files, whose writer was killed or whose disk was full, by their last bytes.
 
 use std::fs::File;
 use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
