@@ -78,7 +78,7 @@ pub struct Mesh {
     /// The files of materials that come with the file, for groups to name. They are what the groups look like where a scene
     /// says nothing else.
     pub libraries: Vec<Library>,
-    /// What is odd about the file, and how it was dealt with, for a user to read: `1 of 12 triangles is a duplicate and was removed`.
+    /// Warnings about the file, with the action taken: `1 of 12 triangles is a duplicate and was removed`.
     pub notes: Vec<String>,
     /// Damage to the file, as the errors that it is where damage is refused.
     pub(crate) damage: Vec<Fault>,

@@ -114,7 +114,7 @@ pub struct Scene {
     pub instances: usize,
     /// The files that the scene is made of, in order: its textures' images, meshes, and what these name.
     pub files: Vec<PathBuf>,
-    /// What a user should know of the scene and of its meshes, if anything: `rock.ply: 1 of 12 triangles is a duplicate and was removed`.
+    /// Warnings about the scene and its meshes: `rock.ply: 1 of 12 triangles is a duplicate and was removed`.
     pub notes: Vec<String>,
     /// The glTF files, as long as what was made of them is in use.
     pub(crate) imported: Vec<Arc<Imported>>,

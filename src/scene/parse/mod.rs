@@ -103,7 +103,7 @@ pub(super) fn line_of_path(text: &str) -> usize {
 /// The locations of the keys of a text.
 enum Keys<'a> {
     Whole(DeValue<'a>),
-    /// Of a text that is too large to parse at once.
+    /// The parts of a text that is too large to parse at once.
     Parts(Parts<'a>),
 }
 
