@@ -15,6 +15,7 @@ pub mod ellipsoid;
 pub mod emitter;
 pub mod energy;
 pub mod environment;
+mod ewa;
 pub mod filter;
 pub mod footprint;
 pub mod geometry;

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::geometry::Trees;
 use super::light_tree::{self, Cone, Lamp};
@@ -449,7 +450,7 @@ fn mean_of(scene: &Scene, color: &Color) -> f64 {
                 mean(*factor)
                     * match &image.texels {
                         Texels::Bytes(_, bytes) => {
-                            let sum: u64 = bytes.iter().flatten().map(|byte| u64::from(*byte)).sum();
+                            let sum: u64 = bytes.as_flattened().par_iter().map(|byte| u64::from(*byte)).sum();
                             sum as f64 / 255.0 / (3 * bytes.len().max(1)) as f64
                         }
                         Texels::Floats(floats) => {

@@ -38,53 +38,56 @@ pub fn pyramid(image: &Image, levels: u32, texels: &mut Vec<u32>) -> u32 {
     table as u32
 }
 
-/// Lines of this many words behind what is there, for all threads.
-fn lines(
+/// Appends rows of this many words in parallel. Memory that is set to zero first would be touched by a single thread.
+fn append<I: Iterator<Item = u32>>(
     texels: &mut Vec<u32>,
-    words: usize,
-    count: usize,
-) -> impl IndexedParallelIterator<Item = (usize, &mut [u32])> {
-    let start = texels.len();
-    texels.resize(start + words * count, 0);
-    let lines = texels[start..].par_chunks_mut(words);
-    lines.with_min_len(16).enumerate()
+    (words, rows): (usize, usize),
+    row: impl Fn(usize) -> I + Sync,
+) {
+    let (start, count) = (texels.len(), words * rows);
+    texels.reserve(count);
+    let slots = texels.spare_capacity_mut()[..count].par_chunks_mut(words);
+    slots.with_min_len(16).enumerate().for_each(|(i, slots)| {
+        let mut values = row(i);
+        for slot in slots {
+            slot.write(values.next().expect("a row has a value for each word"));
+        }
+    });
+    // SAFETY: the loop wrote every slot up to the new length, or panicked.
+    unsafe { texels.set_len(start + count) };
 }
 
 fn write_finest(image: &Image, texels: &mut Vec<u32>) {
     let (width, height) = (image.width as usize, image.height as usize);
-    let row = |line: usize| (height - 1 - line) * width..(height - line) * width; // from the bottom
+    let row = |i: usize| (height - 1 - i) * width..(height - i) * width; // from the bottom
     match &image.texels {
         Texels::Bytes(encoding, bytes) => {
             let table = PackedBytes::new(*encoding);
-            lines(texels, width, height).for_each(|(line, words)| {
-                for (word, texel) in words.iter_mut().zip(&bytes[row(line)]) {
-                    *word = table.packed(*texel);
-                }
+            append(texels, (width, height), |i| {
+                bytes[row(i)].iter().map(|texel| table.packed(*texel))
             });
         }
-        Texels::Floats(floats) => lines(texels, 3 * width, height).for_each(|(line, words)| {
-            for (words, texel) in words.chunks_exact_mut(3).zip(&floats[row(line)]) {
-                words.copy_from_slice(&texel.map(f32::to_bits));
-            }
+        Texels::Floats(floats) => append(texels, (3 * width, height), |i| {
+            floats[row(i)].as_flattened().iter().map(|x| x.to_bits())
         }),
     }
 }
 
 fn write_level(image: &Image, level: &Level, texels: &mut Vec<u32>) {
-    let colors = level.texels.chunks_exact(level.width);
-    let colors: Vec<&[DVec3]> = colors.collect();
+    let (width, height) = (level.width, level.rows.len());
+    let exact = |color: DVec3, encoding| packed(color.to_array().map(|x| steps(x, encoding)));
     match &image.texels {
-        Texels::Bytes(encoding, _) => lines(texels, level.width, level.height).for_each(|(line, words)| {
-            for (word, color) in words.iter_mut().zip(colors[line]) {
-                let quick = || approximately_packed(*color);
-                let quick = if *encoding == Encoding::Srgb { quick() } else { None };
-                *word = quick.unwrap_or_else(|| packed(color.to_array().map(|x| steps(x, *encoding))));
-            }
+        Texels::Bytes(Encoding::Srgb, _) => append(texels, (width, height), |i| {
+            let word = |color: &DVec3| approximately_packed(*color).unwrap_or_else(|| exact(*color, Encoding::Srgb));
+            level.rows[i].iter().map(word)
         }),
-        Texels::Floats(_) => lines(texels, 3 * level.width, level.height).for_each(|(line, words)| {
-            for (words, color) in words.chunks_exact_mut(3).zip(colors[line]) {
-                words.copy_from_slice(&color.as_vec3().to_array().map(f32::to_bits));
-            }
+        Texels::Bytes(Encoding::Linear, _) => append(texels, (width, height), |i| {
+            level.rows[i].iter().map(|color| exact(*color, Encoding::Linear))
+        }),
+        Texels::Floats(_) => append(texels, (3 * width, height), |i| {
+            level.rows[i]
+                .iter()
+                .flat_map(|color| color.to_array().map(|x| (x as f32).to_bits()))
         }),
     }
 }
@@ -107,11 +110,14 @@ fn packed(steps: [f64; 3]) -> u32 {
 /// large for that.
 fn exponent(largest: f64) -> u32 {
     let exponent = ((largest as f32).to_bits() >> 23).clamp(103, 134) - 103;
-    exponent + u32::from(largest / unit(exponent) >= 511.5) // rounds to 512
+    exponent + u32::from(largest * units(exponent) >= 511.5) // rounds to 512
 }
 
 fn mantissa(x: f64, exponent: u32) -> u32 {
-    (x / unit(exponent)).round() as u32
+    // Rounded half up, without a call of the C library.
+    let x = x * units(exponent);
+    let whole = x as u32;
+    whole + u32::from(x - f64::from(whole) >= 0.5)
 }
 
 fn joined([red, green, blue]: [u32; 3], exponent: u32) -> u32 {
@@ -138,7 +144,7 @@ fn approximately_packed(color: DVec3) -> Option<u32> {
     if exponent != self::exponent(largest * (1.0 + ERROR)) {
         return None;
     }
-    let mantissas = steps.map(|x| x / unit(exponent));
+    let mantissas = steps.map(|x| x * units(exponent));
     // Truncation is faster than `round`, and equal where rounding is certain.
     let rounded = mantissas.map(|x| (x + 0.5) as u32);
     let is_certain = (mantissas.iter().zip(rounded)).all(|(x, rounded)| (x - f64::from(rounded)).abs() < CERTAIN);
@@ -173,8 +179,9 @@ impl PackedBytes {
     }
 }
 
-fn unit(exponent: u32) -> f64 {
-    f64::from(f32::from_bits((exponent + 95) << 23))
+/// Returns how many units of an exponent are 1: a power of two.
+fn units(exponent: u32) -> f64 {
+    f64::from(f32::from_bits((159 - exponent) << 23))
 }
 
 #[cfg(test)]
@@ -215,9 +222,9 @@ mod tests {
     #[test]
     fn mantissas_above_511_have_the_next_exponent() {
         // The largest mantissa of an exponent, and the smallest of the next one.
-        for steps in [511.4 * unit(20), 511.6 * unit(20)] {
+        for steps in [511.4 / units(20), 511.6 / units(20)] {
             assert_eq!(packed([steps; 3]) >> 27, exponent(steps), "{steps}");
         }
-        assert_ne!(exponent(511.4 * unit(20)), exponent(511.6 * unit(20)));
+        assert_ne!(exponent(511.4 / units(20)), exponent(511.6 / units(20)));
     }
 }

@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::{BACKGROUND, ENVIRONMENT_BLOCKS, Environment, IMAGE_AROUND, NORMAL_BINS, UNSEEN_AROUND};
 use crate::scene::halves::linear;
@@ -177,7 +178,7 @@ impl Grid {
 
     /// Writes the tables by which the cells of each block are chosen.
     fn write_cells(&self, weights: &[f64], words: &mut Vec<u32>) {
-        for (columns, rows) in self.blocks() {
+        let table = |(columns, rows): (Range<usize>, Range<usize>)| {
             let places: Vec<(usize, usize)> = rows
                 .flat_map(|row| columns.clone().map(move |column| (row, column)))
                 .collect();
@@ -187,12 +188,19 @@ impl Grid {
                 .collect();
             let mean = rest.iter().sum::<f64>() / rest.len() as f64;
             let scale = if mean > 0.0 { 1.0 / mean } else { 0.0 };
-            let start = words.len();
-            write_table(rest.into_iter().map(|weight| weight * scale).collect(), words);
-            for pair in words[start..].chunks_mut(2) {
+            let mut words = Vec::with_capacity(2 * rest.len());
+            write_table(rest.into_iter().map(|weight| weight * scale).collect(), &mut words);
+            for pair in words.chunks_mut(2) {
                 let (row, column) = places[pair[1] as usize];
                 pair[1] = (row << 16 | column) as u32;
             }
+            words
+        };
+        // A row of blocks at a time, which bounds the memory.
+        let blocks: Vec<_> = self.blocks().collect();
+        for blocks in blocks.chunks(self.columns()) {
+            let tables: Vec<Vec<u32>> = blocks.par_iter().cloned().map(table).collect();
+            tables.iter().for_each(|table| words.extend_from_slice(table));
         }
     }
 
@@ -246,7 +254,7 @@ impl Grid {
                 (*block, x * mean.x + y * mean.y + z * mean.z, *power, spread.min(1.0))
             })
             .collect();
-        for bin in 0..NORMAL_BINS * NORMAL_BINS {
+        let bins = (0..NORMAL_BINS * NORMAL_BINS).into_par_iter().map(|bin| {
             let normal = bin_normal(bin);
             let mut cosines = vec![0.0; powers.len()];
             for (block, mean, power, spread) in &lobes {
@@ -254,8 +262,12 @@ impl Grid {
             }
             // Of light from behind alone no sample counts.
             let any = cosines.iter().any(|weight| *weight > 0.0);
-            write_bin(if any { &cosines } else { &powers }, words);
-        }
+            let mut words = Vec::new();
+            write_bin(if any { &cosines } else { &powers }, &mut words);
+            words
+        });
+        let bins: Vec<Vec<u32>> = bins.collect();
+        bins.iter().for_each(|bin| words.extend_from_slice(bin));
         write_bin(&powers, words);
     }
 }

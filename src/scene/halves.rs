@@ -9,8 +9,7 @@ use crate::color::{linear_to_srgb, srgb_to_linear};
 /// A level in linear light.
 pub(crate) struct Level {
     pub width: usize,
-    pub height: usize,
-    pub texels: Vec<DVec3>,
+    pub rows: Vec<Vec<DVec3>>,
 }
 
 /// Returns the linear value of each byte.
@@ -37,7 +36,7 @@ pub(crate) fn linear(image: &Image) -> impl Fn(usize) -> DVec3 + Sync {
 impl Level {
     /// Returns the next level.
     pub fn half(&self) -> Level {
-        half(self.width, self.height, |x, y| self.texels[y * self.width + x])
+        half(self.width, self.rows.len(), |x, y| self.rows[y][x])
     }
 }
 
@@ -62,33 +61,30 @@ pub(crate) fn half_of(image: &Image, row: impl Fn(usize) -> usize + Sync) -> Lev
 /// Returns the level after one: each texel the mean over the part of that level that it covers.
 fn half(width: usize, height: usize, texel: impl Fn(usize, usize) -> DVec3 + Sync) -> Level {
     let (new_width, new_height) = ((width / 2).max(1), (height / 2).max(1));
-    let mut texels = vec![DVec3::ZERO; new_width * new_height];
-    let lines = texels.par_chunks_mut(new_width).with_min_len(16);
-    if width.is_multiple_of(2) && height.is_multiple_of(2) {
+    let lines = (0..new_height).into_par_iter().with_min_len(16);
+    let rows = if width.is_multiple_of(2) && height.is_multiple_of(2) {
         // The general case with its weights, in the order of its sum.
-        lines.enumerate().for_each(|(j, line)| {
-            for (i, sum) in line.iter_mut().enumerate() {
-                let texel = |x: usize, y: usize| texel(2 * i + x, 2 * j + y) * 0.25;
-                *sum = DVec3::ZERO + texel(0, 0) + texel(1, 0) + texel(0, 1) + texel(1, 1);
-            }
-        });
+        let color = |i: usize, j: usize| {
+            let texel = |x: usize, y: usize| texel(2 * i + x, 2 * j + y) * 0.25;
+            DVec3::ZERO + texel(0, 0) + texel(1, 0) + texel(0, 1) + texel(1, 1)
+        };
+        lines.map(|j| (0..new_width).map(|i| color(i, j)).collect()).collect()
     } else {
         let (columns, rows) = (covers(width, new_width), covers(height, new_height));
-        lines.zip(&rows).for_each(|(line, row)| {
-            for (sum, column) in line.iter_mut().zip(&columns) {
-                for (y, v) in row {
-                    for (x, u) in column {
-                        *sum += texel(*x, *y) * (u * v);
-                    }
+        let color = |column: &[(usize, f64)], row: &[(usize, f64)]| {
+            let mut sum = DVec3::ZERO;
+            for (y, v) in row {
+                for (x, u) in column {
+                    sum += texel(*x, *y) * (u * v);
                 }
             }
-        });
-    }
-    Level {
-        width: new_width,
-        height: new_height,
-        texels,
-    }
+            sum
+        };
+        lines
+            .map(|j| columns.iter().map(|column| color(column, &rows[j])).collect())
+            .collect()
+    };
+    Level { width: new_width, rows }
 }
 
 /// Returns, for each of `to` texels in a line, the texels among `from` that it covers, with their weights; `to` is half of `from`, rounded
@@ -109,15 +105,17 @@ fn covers(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
 
 /// Returns an image of half its width and height, each rounded down, but at least 1.
 pub(super) fn halved(image: &Image) -> Image {
-    let Level { width, height, texels } = half_of(image, |row| row);
+    let Level { width, rows } = half_of(image, |row| row);
+    let height = rows.len();
+    let texels = rows.into_iter().flatten();
     let texels = match &image.texels {
-        Texels::Floats(_) => Texels::Floats(texels.into_iter().map(|color| color.as_vec3().to_array()).collect()),
+        Texels::Floats(_) => Texels::Floats(texels.map(|color| color.as_vec3().to_array()).collect()),
         Texels::Bytes(encoding, _) => {
             let byte = |x: f64| match encoding {
                 Encoding::Srgb => (linear_to_srgb(x) * 255.0).round() as u8,
                 Encoding::Linear => (x * 255.0).round() as u8,
             };
-            let bytes = texels.into_iter().map(|color| color.to_array().map(byte));
+            let bytes = texels.map(|color| color.to_array().map(byte));
             Texels::Bytes(*encoding, bytes.collect())
         }
     };

@@ -53,13 +53,14 @@ const LAMPS: [Lamp; 4] = [
 
 /// Returns the studio as an environment map.
 pub fn studio() -> Image {
+    let lamps = LAMPS.map(|lamp| lamp.facing());
     let azimuths: Vec<(f64, f64)> = (0..WIDTH)
         .map(|column| (PI - (0.5 + column as f64) * TAU / WIDTH as f64).sin_cos())
         .collect();
     let row = |row: usize| {
         let (sine, cosine) = ((0.5 + row as f64) * PI / HEIGHT as f64).sin_cos();
         let direction = move |(y, x): &(f64, f64)| DVec3::new(sine * x, sine * y, cosine);
-        let texel = move |azimuth| Vec3::splat(radiance(direction(azimuth)) as f32).into();
+        let texel = |azimuth| Vec3::splat(radiance(&lamps, direction(azimuth)) as f32).into();
         azimuths.iter().map(texel).collect::<Vec<_>>()
     };
     let rows: Vec<Vec<[f32; 3]>> = (0..HEIGHT).into_par_iter().map(row).collect();
@@ -70,31 +71,49 @@ pub fn studio() -> Image {
     }
 }
 
-fn radiance(direction: DVec3) -> f64 {
+fn radiance(lamps: &[Facing], direction: DVec3) -> f64 {
     let z = direction.z;
     // The floor meets the walls in a wide curve, as a studio's does.
     let room = match z < 0.0 {
         true => WALL + (FLOOR - WALL) * smooth(-3.0 * z),
         false => WALL + (CEILING - WALL) * smooth(z),
     };
-    let lamps = LAMPS.iter().map(|lamp| lamp.radiance * lamp.share(direction));
+    let lamps = lamps.iter().map(|lamp| lamp.radiance * lamp.share(direction));
     lamps.fold(room, f64::max)
 }
 
+/// A lamp with the axes of its rectangle.
+struct Facing {
+    axis: DVec3,
+    sides: [DVec3; 2],
+    half: [f64; 2],
+    radiance: f64,
+}
+
 impl Lamp {
-    /// 1 on the lamp, 0 beside it.
-    fn share(&self, direction: DVec3) -> f64 {
+    fn facing(&self) -> Facing {
         let axis = self.towards.normalize();
-        let ahead = direction.dot(axis);
-        if ahead <= 0.0 {
-            return 0.0;
-        }
         let right = match axis.z.abs() < 0.99 {
             true => axis.cross(DVec3::Z).normalize(),
             false => DVec3::X,
         };
-        let up = right.cross(axis);
-        let at = [right, up].map(|side| direction.dot(side).abs() / ahead);
+        Facing {
+            axis,
+            sides: [right, right.cross(axis)],
+            half: self.half,
+            radiance: self.radiance,
+        }
+    }
+}
+
+impl Facing {
+    /// 1 on the lamp, 0 beside it.
+    fn share(&self, direction: DVec3) -> f64 {
+        let ahead = direction.dot(self.axis);
+        if ahead <= 0.0 {
+            return 0.0;
+        }
+        let at = self.sides.map(|side| direction.dot(side).abs() / ahead);
         let inside = |i: usize| smooth((1.0 + EDGE - at[i] / self.half[i]) / EDGE);
         inside(0) * inside(1)
     }

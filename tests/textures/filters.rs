@@ -87,6 +87,38 @@ fn a_constant_image_is_constant_under_every_filter_and_footprint() {
 }
 
 #[test]
+fn weights_kept_for_the_next_texture_are_those_computed_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let byte = |x: u32, y: u32, i: u32| ((37 * x + 101 * y + 59 * i) % 256) as u8;
+    write_png(&path("a.png"), 16, 8, |x, y| [0, 1, 2].map(|i| byte(x, y, i)));
+    write_png(&path("b.png"), 16, 8, |x, y| [3, 4, 5].map(|i| byte(y, x, i)));
+    write_png(&path("c.png"), 8, 16, |x, y| [6, 7, 8].map(|i| byte(x, y, i)));
+    write_exr(&path("d.exr"), 16, 8, |x, y| [x as f32, y as f32, 0.5]);
+    let scenes = [
+        "file = 'a.png'",
+        "file = 'b.png'",
+        "file = 'a.png'\nencoding = 'linear'",
+        "file = 'a.png'\nwrap = 'clamp'",
+        "file = 'a.png'\nmax_anisotropy = 2",
+        "file = 'c.png'",
+        "file = 'd.exr'",
+    ]
+    .map(|keys| textured(folder.path(), &format!("type = 'image'\nfilter = 'ewa'\n{keys}")));
+    let mut different = 0;
+    for (uv, dx, dy) in footprints() {
+        let here = scenes.each_ref().map(|scene| color(scene, uv, dx, dy));
+        for (scene, found) in scenes.iter().zip(here) {
+            // A new thread has kept no weights.
+            let anew = std::thread::scope(|threads| threads.spawn(|| color(scene, uv, dx, dy)).join());
+            assert_eq!(found.to_array().map(f32::to_bits), anew.unwrap().to_array().map(f32::to_bits));
+        }
+        different += u32::from((1..here.len()).all(|i| here[i] != here[0]));
+    }
+    assert!(different > 100, "{different}"); // the control: the lookups differ
+}
+
+#[test]
 fn values_of_the_srgb_curve_are_those_of_the_standard() {
     for byte in 0..=255 {
         let x = f64::from(byte) / 255.0;
