@@ -1,30 +1,65 @@
-//! Weights of the texels in an EWA footprint, computed once for all textures of a size that a material looks up at a point. The textures of a
-//! model are mostly of one size, and the weights take most of the time of a lookup.
+//! `ewa_color` with weights that are computed once for all textures of a size that a material looks up at a point. The textures of a model are
+//! mostly of one size, and the weights take most of the time of a lookup. The bits are those of [`super::texture::ewa_color`].
 
 use std::cell::RefCell;
 use std::sync::LazyLock;
 
 use glam::{Vec2, Vec3};
 
-use super::footprint::{footprint_ellipse, wrap_u, wrap_v};
+use super::footprint::{Footprint, footprint_ellipse, wrap_u, wrap_v};
 use super::math::{floor, max};
-use super::texel::{gaussian_weight, near_coordinate, unpacked_color, wrapped_index};
-use super::texture::Level;
+use super::texel::{gaussian_weight, level_size, near_coordinate, unpacked_color, wrapped_index};
+use super::texture::level_of_length;
 use crate::pack::{FLOAT, LINEAR8, Packed, SRGB8, Texture};
+
+/// Returns `ewa_color` of `shaders/texture.wgsl`.
+pub fn color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
+    LAST.with_borrow_mut(|kernel| {
+        let key = Key::of(t, f);
+        if kernel.key != key {
+            kernel.set(key, t, f);
+        }
+        kernel.color(scene, t)
+    })
+}
+
+thread_local! {
+    static LAST: RefCell<Kernel> = const { RefCell::new(Kernel::NONE) };
+}
 
 /// Everything that the weights depend on.
 #[derive(Clone, Copy, PartialEq)]
 struct Key {
-    /// Width and height of the texture, and of the level.
-    sizes: [u32; 4],
+    size: [u32; 2],
+    levels: u32,
     wrap: u32,
-    /// Position, footprint and maximum anisotropy, as bits.
+    /// The footprint and the maximum anisotropy, as bits.
     place: [u32; 7],
 }
 
+impl Key {
+    fn of(t: &Texture, Footprint { uv, dx, dy }: Footprint) -> Key {
+        Key {
+            size: [t.width, t.height],
+            levels: t.levels,
+            wrap: t.wrap,
+            place: [uv.x, uv.y, dx.x, dx.y, dy.x, dy.y, t.parameter].map(f32::to_bits),
+        }
+    }
+}
+
 /// The texels in a footprint and their weights.
-struct Weights {
+struct Kernel {
     key: Key,
+    /// The finer level, and the one after it if both are mixed.
+    levels: [Weights; 2],
+    finer: u32,
+    /// Share of the coarser level.
+    between: f32,
+}
+
+/// The texels of a level in a footprint and their weights.
+struct Weights {
     /// Index within the level.
     texels: Vec<u32>,
     weights: Vec<f32>,
@@ -34,45 +69,86 @@ struct Weights {
     scale: f32,
 }
 
-impl Weights {
-    const NONE: Weights = Weights {
+impl Kernel {
+    const NONE: Kernel = Kernel {
         key: Key {
-            sizes: [0; 4],
+            size: [0; 2],
+            levels: 0,
             wrap: 0,
             place: [0; 7],
         },
+        levels: [Weights::NONE, Weights::NONE],
+        finer: 0,
+        between: 0.0,
+    };
+
+    fn set(&mut self, key: Key, t: &Texture, f: Footprint) {
+        self.key = key;
+        let size = Vec2::new(t.width as f32, t.height as f32);
+        let minor = footprint_ellipse(f.dx * size, f.dy * size, t.parameter).minor;
+        let lod = level_of_length(t, 0.45 * minor);
+        let finer = floor(lod);
+        self.finer = finer as u32;
+        self.between = max(4.0 * (lod - finer) - 3.0, 0.0);
+        let coarsest = lod >= (t.levels - 1) as f32;
+        let f = Footprint {
+            uv: f.uv,
+            dx: if coarsest { Vec2::ZERO } else { f.dx },
+            dy: if coarsest { Vec2::ZERO } else { f.dy },
+        };
+        let count = if self.between > 0.0 { 2 } else { 1 };
+        for (level, weights) in (self.finer..).zip(&mut self.levels[..count]) {
+            weights.set(t, level, f);
+        }
+    }
+
+    fn color(&self, scene: &Packed, t: &Texture) -> Vec3 {
+        let level = |i: u32| {
+            let start = scene.texels[(t.texels + self.finer + i) as usize] as usize;
+            self.levels[i as usize].mean(&scene.texels[start..], t.format)
+        };
+        let color = level(0);
+        match self.between > 0.0 {
+            true => color + (level(1) - color) * self.between,
+            false => color,
+        }
+    }
+}
+
+impl Weights {
+    const NONE: Weights = Weights {
         texels: Vec::new(),
         weights: Vec::new(),
         base: 0,
         scale: 0.0,
     };
 
-    fn set(&mut self, key: Key, t: &Texture, level: Level, uv: Vec2, dx: Vec2, dy: Vec2) {
-        self.key = key;
+    fn set(&mut self, t: &Texture, level: u32, f: Footprint) {
         self.texels.clear();
         self.weights.clear();
-        let size = Vec2::new(level.width as f32, level.height as f32);
+        self.base = 0;
+        let (width, height) = (level_size(t.width, level), level_size(t.height, level));
+        let size = Vec2::new(width as f32, height as f32);
         let q = size / Vec2::new(t.width as f32, t.height as f32);
         let edges = Vec2::new(
-            if level.width == 1 { 0.0 } else { size.x },
-            if level.height == 1 { 0.0 } else { size.y },
+            if width == 1 { 0.0 } else { size.x },
+            if height == 1 { 0.0 } else { size.y },
         );
-        let ellipse = footprint_ellipse(dx * edges, dy * edges, t.parameter);
+        let ellipse = footprint_ellipse(f.dx * edges, f.dy * edges, t.parameter);
         let m = ellipse.m;
         let least = 1.0 - ellipse.minor * ellipse.minor;
         let xx = m.x + max((4.0 * (q.x * q.x) - 1.0) / 3.0, least);
         let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, least);
         let slope = m.y / yy;
         let across = xx - m.y * slope;
-        let x = near_coordinate(uv.x, wrap_u(t)) * size.x - 0.5;
-        let y = near_coordinate(uv.y, wrap_v(t)) * size.y - 0.5;
+        let x = near_coordinate(f.uv.x, wrap_u(t)) * size.x - 0.5;
+        let y = near_coordinate(f.uv.y, wrap_v(t)) * size.y - 0.5;
         let reach = yy.sqrt();
         let first_row = -(floor(reach - y) as i32);
         let last_row = floor(y + reach) as i32;
         let mut total = 0.0;
-        self.base = 0;
         for row in first_row..=last_row {
-            let start = wrapped_index(row, level.height, wrap_v(t)) * level.width;
+            let start = wrapped_index(row, height, wrap_v(t)) * width;
             let h = row as f32 - y;
             let along = h * h / yy;
             let middle = x + h * slope;
@@ -84,7 +160,7 @@ impl Weights {
                 if total == 0.0 {
                     self.base = self.texels.len();
                 }
-                self.texels.push(start + wrapped_index(column, level.width, wrap_u(t)));
+                self.texels.push(start + wrapped_index(column, width, wrap_u(t)));
                 self.weights.push(weight);
                 total += weight;
             }
@@ -93,46 +169,26 @@ impl Weights {
     }
 
     /// Returns the weighted mean of the colors of a level.
-    fn mean(&self, color: impl Fn(u32) -> Vec3) -> Vec3 {
+    fn mean(&self, texels: &[u32], format: u32) -> Vec3 {
+        let table = match format {
+            FLOAT => return self.mean_of(|i| Vec3::from_slice(bytemuck::cast_slice(&texels[3 * i..3 * i + 3]))),
+            SRGB8 => &*SRGB,
+            _ => &*LINEAR,
+        };
+        self.mean_of(|i| table.color(texels[i]))
+    }
+
+    fn mean_of(&self, color: impl Fn(usize) -> Vec3) -> Vec3 {
         let Some(base) = self.texels.get(self.base) else {
             return Vec3::ZERO;
         };
-        let base = color(*base);
+        let base = color(*base as usize);
         let mut sum = Vec3::ZERO;
         for (texel, weight) in self.texels.iter().zip(&self.weights).skip(self.base) {
-            sum += (color(*texel) - base) * *weight;
+            sum += (color(*texel as usize) - base) * *weight;
         }
         base + sum * self.scale
     }
-}
-
-thread_local! {
-    /// The last two: of the two levels that a lookup mixes.
-    static LAST: RefCell<[Weights; 2]> = const { RefCell::new([Weights::NONE, Weights::NONE]) };
-}
-
-/// Returns the mean over one level's texels in the footprint: `ewa_level_color` in `shaders/texture.wgsl`, with the same bits.
-pub fn level_color(scene: &Packed, t: &Texture, level: Level, uv: Vec2, dx: Vec2, dy: Vec2) -> Vec3 {
-    let key = Key {
-        sizes: [t.width, t.height, level.width, level.height],
-        wrap: t.wrap,
-        place: [uv.x, uv.y, dx.x, dx.y, dy.x, dy.y, t.parameter].map(f32::to_bits),
-    };
-    LAST.with_borrow_mut(|last| {
-        if last[0].key != key {
-            last.swap(0, 1);
-            if last[0].key != key {
-                last[0].set(key, t, level, uv, dx, dy);
-            }
-        }
-        if t.format == FLOAT {
-            let texels: &[f32] = bytemuck::cast_slice(&scene.texels[level.start as usize..]);
-            return last[0].mean(|i| Vec3::from_slice(&texels[3 * i as usize..3 * i as usize + 3]));
-        }
-        let texels = &scene.texels[level.start as usize..];
-        let table = if t.format == SRGB8 { &*SRGB } else { &*LINEAR };
-        last[0].mean(|i| table.color(texels[i as usize]))
-    })
 }
 
 static SRGB: LazyLock<Table> = LazyLock::new(|| Table::new(SRGB8));

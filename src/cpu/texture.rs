@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::differential::Arrival;
+use super::ewa;
 use super::footprint::{Footprint, footprint_ellipse, texture_footprint, wrap_u, wrap_v};
 use super::geometry::footprint_of;
 use super::lobe::direction_turn;
@@ -14,7 +15,7 @@ use super::ray::Hit;
 use super::surface::Surface;
 use super::vertices::footprint_in_set;
 
-use super::texel::{level_size, near_coordinate, unpacked_color, wrapped_index};
+use super::texel::{gaussian_weight, level_size, near_coordinate, unpacked_color, wrapped_index};
 use crate::pack::{
     ANISOTROPY_CHANNEL, COAT_CHANNEL, COAT_ROUGHNESS_CHANNEL, EWA, FLOAT, FOR_AMBIENT, FOR_ANISOTROPY, FOR_COAT,
     FOR_COAT_NORMAL, FOR_COAT_ROUGHNESS, FOR_DIFFUSE, FOR_DIRECTION, FOR_EMISSION, FOR_METALLIC, FOR_NORMAL,
@@ -30,7 +31,7 @@ pub fn texture_color(scene: &Packed, t: &Texture, surface: Footprint) -> Vec3 {
     } else if t.kind == NEAREST {
         nearest_color(scene, t, f.uv)
     } else if t.kind == EWA {
-        ewa_color(scene, t, f)
+        ewa::color(scene, t, f)
     } else {
         linear_color(scene, t, f)
     };
@@ -137,7 +138,43 @@ pub fn ewa_color(scene: &Packed, t: &Texture, f: Footprint) -> Vec3 {
 }
 
 pub fn ewa_level_color(scene: &Packed, t: &Texture, level: Level, uv: Vec2, dx: Vec2, dy: Vec2) -> Vec3 {
-    super::ewa::level_color(scene, t, level, uv, dx, dy)
+    let size = Vec2::new(level.width as f32, level.height as f32);
+    let q = size / Vec2::new(t.width as f32, t.height as f32);
+    let edges = Vec2::new(
+        if level.width == 1 { 0.0 } else { size.x },
+        if level.height == 1 { 0.0 } else { size.y },
+    );
+    let ellipse = footprint_ellipse(dx * edges, dy * edges, t.parameter);
+    let m = ellipse.m;
+    let least = 1.0 - ellipse.minor * ellipse.minor;
+    let xx = m.x + max((4.0 * (q.x * q.x) - 1.0) / 3.0, least);
+    let yy = m.z + max((4.0 * (q.y * q.y) - 1.0) / 3.0, least);
+    let slope = m.y / yy;
+    let across = xx - m.y * slope;
+    let x = near_coordinate(uv.x, wrap_u(t)) * size.x - 0.5;
+    let y = near_coordinate(uv.y, wrap_v(t)) * size.y - 0.5;
+    let reach = yy.sqrt();
+    let first_row = -(floor(reach - y) as i32);
+    let last_row = floor(y + reach) as i32;
+    let mut base = Vec3::ZERO;
+    let mut sum = Vec3::ZERO;
+    let mut total = 0.0;
+    for row in first_row..=last_row {
+        let h = row as f32 - y;
+        let along = h * h / yy;
+        let middle = x + h * slope;
+        let half = (across * max(1.0 - along, 0.0)).sqrt();
+        let last = floor(middle + half) as i32;
+        for column in -(floor(half - middle) as i32)..=last {
+            let w = column as f32 - middle;
+            let weight = max(gaussian_weight(along + w * w / across), 0.0);
+            let color = load_texel(scene, t, level, column, row);
+            base = if total == 0.0 { color } else { base };
+            sum += (color - base) * weight;
+            total += weight;
+        }
+    }
+    base + sum * if total > 0.0 { 1.0 / total } else { 0.0 }
 }
 
 pub fn channel_of(color: Vec3, lookup: &Lookup, place: u32) -> f32 {

@@ -107,8 +107,19 @@ pub(super) fn asset_root(folder: &Path) -> PathBuf {
 /// Reads the text of a file; `origin` is its name in messages.
 pub(super) fn read(text: &str, origin: &str, defines: &mut Defines) -> Result<Description, SceneError> {
     let course = read_json(text, defines).map_err(|broken| match broken {
-        Broken::Value(problem) if defines.brought(&problem.key) => SceneError::Override(problem.at("define")),
-        broken => broken.told(text, origin),
+        Broken::Values(problems) => {
+            let of_define = problems.iter().find(|problem| defines.brought(&problem.key)).cloned();
+            let error = |at, problem: Problem| syntax_error(origin, place(text, at), problem.to_string());
+            match of_define {
+                Some(problem) => SceneError::Override(problem.at("define")),
+                None => problems.into_error(|problem| begin(text, &problem.key), error),
+            }
+        }
+        Broken::Text(error, key) => text_error(text, origin, error, key),
+        Broken::Large => {
+            let rule = format!("a JSON scene must not be larger than {} MiB", LARGEST >> 20);
+            syntax_error(origin, (1, 1), rule)
+        }
     })?;
     let description = check(&course).and_then(|()| description(&course));
     description.map_err(|problem| invalid(text, origin, problem.into(), defines))
@@ -137,56 +148,41 @@ pub(super) fn invalid(text: &str, origin: &str, problems: Problems, defines: &De
 enum Broken {
     /// With the text as JSON.
     Text(serde_json::Error, KeyPath),
-    /// With the type of a value, or a key.
-    Value(Problem),
+    /// With the types of values, or keys.
+    Values(Problems),
     /// With its length.
     Large,
 }
 
-impl Broken {
-    fn told(self, text: &str, origin: &str) -> SceneError {
-        let (line, column, message) = match self {
-            Broken::Text(error, key) => {
-                let (line, bytes) = (error.line().max(1), error.column());
-                // It counts bytes.
-                let before = text.lines().nth(line - 1).unwrap_or_default().as_bytes();
-                let before = &before[..bytes.saturating_sub(1).min(before.len())];
-                let column = String::from_utf8_lossy(before).chars().count() + 1;
-                let whole = error.to_string();
-                let message = whole.rsplit_once(" at line ").map_or(&*whole, |(message, _)| message);
-                let message = message
-                    .replace(", expected any valid TOML value", "")
-                    .replace('`', "\"")
-                    .replace(
-                        "recursion limit exceeded",
-                        "lists and objects must be nested at most 127 levels deep",
-                    );
-                (
-                    line,
-                    column,
-                    Problem {
-                        key,
-                        ..Problem::new(message)
-                    }
-                    .to_string(),
-                )
-            }
-            Broken::Value(problem) => {
-                let (line, column) = place(text, begin(text, &problem.key));
-                (line, column, problem.to_string())
-            }
-            Broken::Large => (
-                1,
-                1,
-                format!("a JSON scene must not be larger than {} MiB", LARGEST >> 20),
-            ),
-        };
-        SceneError::Syntax {
-            origin: origin.to_owned(),
-            line,
-            column,
-            message,
-        }
+/// Returns the error of a text that is not JSON.
+fn text_error(text: &str, origin: &str, error: serde_json::Error, key: KeyPath) -> SceneError {
+    let (line, bytes) = (error.line().max(1), error.column());
+    // It counts bytes.
+    let before = text.lines().nth(line - 1).unwrap_or_default().as_bytes();
+    let before = &before[..bytes.saturating_sub(1).min(before.len())];
+    let column = String::from_utf8_lossy(before).chars().count() + 1;
+    let whole = error.to_string();
+    let message = whole.rsplit_once(" at line ").map_or(&*whole, |(message, _)| message);
+    let message = message
+        .replace(", expected any valid TOML value", "")
+        .replace('`', "\"")
+        .replace(
+            "recursion limit exceeded",
+            "lists and objects must be nested at most 127 levels deep",
+        );
+    let problem = Problem {
+        key,
+        ..Problem::new(message)
+    };
+    syntax_error(origin, (line, column), problem.to_string())
+}
+
+fn syntax_error(origin: &str, (line, column): (usize, usize), message: String) -> SceneError {
+    SceneError::Syntax {
+        origin: origin.to_owned(),
+        line,
+        column,
+        message,
     }
 }
 
@@ -203,10 +199,12 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, Broken> {
     end.map_err(|error| Broken::Text(error, KeyPath::default()))?;
     let Value::Table(mut table) = value else {
         let message = format!("{} must be an object: {{ \"spp\": ... }}", cut(&one_line(text)));
-        return Err(Broken::Value(Problem::new(message)));
+        return Err(Broken::Values(Problem::new(message).into()));
     };
-    defines.put(&[], &mut table, |_| false).map_err(Broken::Value)?;
-    parse::read_for(table, Integrator::Path).map_err(|problem| {
+    defines
+        .put(&[], &mut table, |_| false)
+        .map_err(|problem| Broken::Values(problem.into()))?;
+    let in_json = |problem: Problem| {
         // It is told in TOML's words.
         let shown = find(text, &problem.key).filter(|value| value.starts_with('{'));
         let message = match (problem.message.rsplit_once(" must be "), shown) {
@@ -218,8 +216,9 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, Broken> {
             "must be a list",
         );
         let message = message.replace("must be a table", "must be an object");
-        Broken::Value(Problem { message, ..problem })
-    })
+        Problem { message, ..problem }
+    };
+    parse::read_for(table, Integrator::Path).map_err(|problems| Broken::Values(problems.map(in_json)))
 }
 
 /// Checks what is not told in the file's own numbers once it is turned.

@@ -226,7 +226,7 @@ impl Problems {
     }
 
     /// Adds a problem, or only counts it if there are enough.
-    fn add(&mut self, problem: Problem) {
+    pub fn add(&mut self, problem: Problem) {
         match self.others.len() + 1 < MAX_PROBLEMS {
             true => self.others.push(problem),
             false => self.more += 1,
@@ -281,6 +281,20 @@ impl Collector {
         let add = |problem| match &mut self.0 {
             Some(problems) => problems.add(problem),
             none => *none = Some(problem.into()),
+        };
+        checked.map_err(add).ok()
+    }
+
+    /// Returns a value, or `None` and keeps its problems.
+    pub fn values<T>(&mut self, checked: Result<T, Problems>) -> Option<T> {
+        let add = |found: Problems| match &mut self.0 {
+            Some(problems) => {
+                problems.more += found.more;
+                std::iter::once(found.first)
+                    .chain(found.others)
+                    .for_each(|problem| problems.add(problem));
+            }
+            none => *none = Some(found),
         };
         checked.map_err(add).ok()
     }

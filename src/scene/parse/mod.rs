@@ -189,7 +189,7 @@ struct Sections {
 }
 
 fn read_file(file: Table) -> Result<Description, Problems> {
-    let sections: Sections = read(file).map_err(with_section)?;
+    let sections: Sections = read(file).map_err(|problems: Problems| problems.map(with_section))?;
     let view = both(
         read(sections.image).at("image"),
         read_camera(sections.camera).at("camera"),
@@ -263,7 +263,7 @@ fn has_key<T: DeserializeOwned>(name: &str) -> bool {
 }
 
 /// Parses a camera. A missing value is taken from the first key of its path that has one.
-fn read_camera(mut camera: Table) -> Result<CameraDescription, Problem> {
+fn read_camera(mut camera: Table) -> Read<CameraDescription> {
     if let Some(Value::Table(path)) = camera.get("path") {
         // First, so that an error in a key is reported there.
         let path: CameraPathDescription = read(path.clone()).at("path")?;
@@ -296,7 +296,7 @@ fn read_camera(mut camera: Table) -> Result<CameraDescription, Problem> {
     read_tagged(camera, Some(CameraDescription::DEFAULT))
 }
 
-type Read<T> = Result<T, Problem>;
+type Read<T> = Result<T, Problems>;
 
 /// Parses a file part by part. Returns `None` if the parts depend on each other, so that the file must be parsed at once.
 fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Description, Problems>>, Broken> {
@@ -342,7 +342,7 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Desc
             _ => return Ok(None),
         };
         let [kind, step] = path;
-        found.value(read.at(step).at(kind));
+        found.values(read.at(step).at(kind));
     }
     let has = |kind: Kind| parts.parts.iter().any(|part| part.kind == kind);
     let mut rest = rest?;
@@ -381,7 +381,7 @@ fn read_parts(parts: &Parts, defines: &mut Defines) -> Result<Option<Result<Desc
 fn read_map<T>(tables: BTreeMap<String, Table>, read: fn(Table) -> Read<T>) -> Result<BTreeMap<String, T>, Problems> {
     let mut found = Collector::default();
     let read = |(name, table): (String, Table)| {
-        let value = found.value(read(table).at(name.as_str()))?;
+        let value = found.values(read(table).at(name.as_str()))?;
         Some((name, value))
     };
     let all = tables.into_iter().filter_map(read).collect();
@@ -391,7 +391,9 @@ fn read_map<T>(tables: BTreeMap<String, Table>, read: fn(Table) -> Read<T>) -> R
 fn read_list<T>(tables: Vec<Table>, read: fn(Table) -> Read<T>) -> Result<Vec<T>, Problems> {
     let mut found = Collector::default();
     let tables = tables.into_iter().enumerate();
-    let all = tables.filter_map(|(i, table)| found.value(read(table).at(i))).collect();
+    let all = tables
+        .filter_map(|(i, table)| found.values(read(table).at(i)))
+        .collect();
     found.end(all)
 }
 
@@ -400,43 +402,78 @@ fn tagged<T: Tagged>(table: Table) -> Read<T> {
     read_tagged(table, None)
 }
 
-fn read<T: DeserializeOwned>(table: Table) -> Result<T, Problem> {
+fn read<T: DeserializeOwned>(table: Table) -> Read<T> {
     let is_said = |integrator: &Integrator| table.get("integrator").and_then(Value::as_str) == Some(integrator.name());
     let said = Integrator::ALL.into_iter().find(is_said);
     read_for(table, said.unwrap_or(Integrator::Phong))
 }
 
 /// Parses a table. The ranges in messages depend on the integrator.
-pub(super) fn read_for<T: DeserializeOwned>(table: Table, integrator: Integrator) -> Result<T, Problem> {
-    // The copy is for the message, because parsing consumes the values.
-    tables::read(table.clone()).map_err(|error| {
-        let error = with_names(error, &table, |table| tables::read::<T>(table).err());
-        explain(error, table, false, integrator)
-    })
+pub(super) fn read_for<T: DeserializeOwned>(table: Table, integrator: Integrator) -> Read<T> {
+    read_keys(table, false, integrator, tables::read)
 }
 
-fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) -> Result<T, Problem> {
+fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) -> Read<T> {
     let tag = match (table.remove("type"), default) {
         (Some(tag), _) => tag,
         (None, Some(default)) => Value::from(default),
         (None, None) => {
             let message = format!("is missing; it must be one of {}", list(T::TYPES));
-            return Err(Problem::predicate(message).at("type"));
+            return Err(Problem::predicate(message).at("type").into());
         }
     };
-    let body = table.clone();
-    match tag.as_str().and_then(|tag| T::read(tag, body)) {
-        Some(result) => result.map_err(|error| {
-            let read = |body| tag.as_str().and_then(|tag| T::read(tag, body)?.err());
-            let error = with_names(error, &table, read);
-            explain(error, table, true, Integrator::Phong)
+    match tag.as_str().filter(|tag| T::TYPES.contains(tag)) {
+        Some(tag) => read_keys(table, true, Integrator::Phong, |body| {
+            T::read(tag, body).expect("a type of the list can be read")
         }),
         None => {
             let hint = tag.as_str().map(|tag| suggest::hint(tag, T::TYPES.iter().copied()));
             let hint = hint.unwrap_or_default();
             let message = format!("{} must be one of {}{hint}", show(&tag), list(T::TYPES));
-            Err(Problem::new(message).at("type"))
+            Err(Problem::new(message).at("type").into())
         }
+    }
+}
+
+/// Parses a table, whose key `type` was removed if it is `tagged`. serde stops at the first error, so its key is removed and the table parsed
+/// again, for the errors of the other keys.
+fn read_keys<T>(
+    mut table: Table,
+    tagged: bool,
+    integrator: Integrator,
+    read: impl Fn(Table) -> Result<T, ReadError>,
+) -> Read<T> {
+    let mut problems: Option<Problems> = None;
+    let mut removed = BTreeSet::new();
+    loop {
+        let error = match (read(table.clone()), problems) {
+            (Ok(value), None) => return Ok(value),
+            (Ok(_), Some(found)) => return Err(found),
+            (Err(error), found) => {
+                problems = found;
+                error
+            }
+        };
+        let error = with_names(error, &table, |table| read(table).err());
+        let problem = explain(error, &table, tagged, integrator);
+        let key = match problem.key.0.first() {
+            Some(Segment::Key(key)) => Some(key.clone()),
+            _ => None,
+        };
+        let found = match problems {
+            // Missing, because it was removed.
+            Some(found) if key.as_ref().is_some_and(|key| removed.contains(key)) => return Err(found),
+            Some(mut found) => {
+                found.add(problem);
+                found
+            }
+            None => problem.into(),
+        };
+        match key {
+            Some(key) if table.remove(&key).is_some() => removed.insert(key),
+            _ => return Err(found),
+        };
+        problems = Some(found);
     }
 }
 
@@ -497,15 +534,15 @@ fn with_names(error: ReadError, table: &Table, read: impl Fn(Table) -> Option<Re
 const NAMES_EXPECTED: &str = ", expected string only";
 
 /// Converts serde's error about `table`, whose key `type` was removed if it is `tagged`.
-fn explain(error: ReadError, table: Table, tagged: bool, integrator: Integrator) -> Problem {
+fn explain(error: ReadError, table: &Table, tagged: bool, integrator: Integrator) -> Problem {
     let mut path = segments(error.path());
-    let mut value = Some(&Value::Table(table));
-    for segment in &path {
-        value = match segment {
-            Segment::Key(key) => value.and_then(|value| value.get(key)),
-            Segment::Index(index) => value.and_then(|value| value.get(*index)),
-        };
-    }
+    let value = match path.split_first() {
+        Some((Segment::Key(key), path)) => path.iter().fold(table.get(key), |value, segment| match segment {
+            Segment::Key(key) => value?.get(key),
+            Segment::Index(index) => value?.get(*index),
+        }),
+        _ => None,
+    };
     let message = error.inner().message();
     // serde has the name and the rule only as text.
     let quoted = |text: &str| {
