@@ -19,6 +19,8 @@ use super::{Interrupted, Usage, signal};
 #[derive(Debug, clap::Args)]
 #[command(after_help = super::EXIT_CODES)]
 #[command(allow_negative_numbers = true)] // report negative numbers as out of range
+#[command(override_usage = "wgray merge [OPTIONS] -o <FILE> <PART>...")]
+#[command(mut_arg("output", |output| output.help("Write FILE.png, .exr, .jpg, .webp, or - (stdout); required")))]
 pub struct Args {
     /// All parts of an image, written by wgray render --tile, or folders of parts
     #[arg(value_name = "PART", required = true)]
@@ -44,14 +46,14 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         output: named.collect::<Result<_, _>>()?,
         ..args.pictures.clone()
     };
-    let [first, ..] = pictures.output.as_slice() else {
-        return Err(Usage("--output: is required: -o NAME.exr".to_owned()).into());
-    };
     let files = files(&args.parts)?;
     let parts = Parts::open(
         &files,
         args.pictures.view_transform.is_some() && args.pictures.exposure.is_some(),
     )?;
+    let [first, ..] = pictures.output.as_slice() else {
+        return Err(Usage("--output: is required: -o NAME.exr".to_owned()).into());
+    };
     let mut layout = parts.layout();
     layout.view = args.pictures.view(layout.view);
     let outputs = Outputs::find(&pictures, first, (&layout.aovs, Layered::Available), None)?;

@@ -8,6 +8,7 @@ pub(super) const UV: &str = "the texture coordinates (0, 0) are used instead";
 pub(super) const NORMAL: &str = "the normal of the triangles is used instead";
 pub(super) const COLOR: &str = "white is used instead";
 pub(super) const LINE: &str = "the line was ignored";
+pub(super) const END: &str = "the facets up to there are used";
 pub(super) const REST: &str = "the other values were ignored";
 
 /// The damage to a file, by its stand-ins.

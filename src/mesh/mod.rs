@@ -373,12 +373,29 @@ fn read_library(folder: &Path, file: &Path) -> Result<Vec<u8>, String> {
     }
 }
 
-/// A file that another one in a folder names. Where there is none, as by a path on somebody else's machine, the file of that name
-/// in the folder itself, if it is there.
+/// Returns a file that another one in a folder names. If it does not exist, as with a path of another machine, this is the file of that
+/// name in the folder itself, then one whose name differs in the case of letters only.
 pub(crate) fn file_beside(folder: &Path, name: &str) -> PathBuf {
     let slashes = name.replace('\\', "/"); // written on Windows
     let last = slashes.rsplit('/').next().unwrap_or(&slashes);
     let tried = [name, &slashes, last].map(|name| folder.join(name));
     let [_, plain, _] = &tried;
-    tried.iter().find(|path| path.is_file()).unwrap_or(plain).clone()
+    match tried.iter().find(|path| path.is_file()) {
+        Some(path) => path.clone(),
+        None => in_other_case(&folder.join(last)).unwrap_or_else(|| plain.clone()),
+    }
+}
+
+/// Returns an existing file whose name differs from that of a path in the case of letters only.
+pub(crate) fn in_other_case(path: &Path) -> Option<PathBuf> {
+    let (folder, name) = (path.parent()?, path.file_name()?);
+    let folder = if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    };
+    let entries = fs::read_dir(folder).ok()?;
+    let names = entries.filter_map(|entry| Some(entry.ok()?.file_name()));
+    let found = names.filter(|other| other.eq_ignore_ascii_case(name)).min()?;
+    Some(path.with_file_name(found)).filter(|path| path.is_file())
 }

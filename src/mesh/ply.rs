@@ -93,9 +93,9 @@ fn check_size(element: &Element, values: &impl Values) -> Result<(), Fault> {
     match all <= values.left() as u128 {
         true => Ok(()),
         false => Err(element.place.fault(format!(
-            "element {:?}: {} of them take {all} bytes or more; the file has {} left",
-            element.name,
+            "the file is truncated: {} elements {:?} take {all} bytes or more; the file has {} left",
             element.count,
+            element.name,
             values.left()
         ))),
     }

@@ -104,7 +104,11 @@ fn solid(words: &mut Words, facets: &mut Facets) -> Result<(), Fault> {
             Some(word) if word.eq_ignore_ascii_case(b"endsolid") => return Ok(()),
             Some(word) if word.eq_ignore_ascii_case(b"facet") => {}
             Some(word) => return Err(words.fault(format!("{} must be \"facet\" or \"endsolid\"", shown(word)))),
-            None => return Err(words.fault("the file ends inside of a solid; \"endsolid\" is missing")),
+            None => {
+                let rule = "the file ends inside of a solid; \"endsolid\" is missing";
+                facets.draft.damages.add(damage::END, || words.fault(rule));
+                return Ok(());
+            }
         }
         let place = words.place();
         expect(words, "normal")?;

@@ -14,6 +14,8 @@ const WIDEST: f64 = 2.0;
 const INSIDE: f64 = 0.9;
 /// Smallest distance from the camera to the nearest point, relative to the scene's extent: a long object is not seen from inside its end.
 const NEAREST: f64 = 0.1;
+/// Smallest and largest diagonal of the bounds of a framed scene: distances and coordinates then stay within their limits.
+const EXTENTS: (f64, f64) = (1e-8, 4e8);
 /// Elevation in degrees from which on the vertical axis cannot be up in the image.
 const STEEPEST: f64 = 89.9;
 
@@ -158,6 +160,21 @@ impl Framing {
 
     fn direction(&self) -> (DVec3, DVec3) {
         self.orbit.map_or(self.view.direction(), Orbit::direction)
+    }
+}
+
+/// Returns the rule that a model breaks whose extent the automatic camera cannot frame.
+pub fn check_extent(points: impl Iterator<Item = DVec3>) -> Result<(), String> {
+    let (low, top) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, top), p| {
+        (low.min(p), top.max(p))
+    });
+    let size = (top - low).length();
+    let (least, most) = EXTENTS;
+    match size > 0.0 && low.x <= top.x && !(least..=most).contains(&size) {
+        true => Err(format!(
+            "the diagonal of the model's bounds is {size:.3e} units; the automatic camera needs {least:e} to {most:e}: scale the model"
+        )),
+        false => Ok(()),
     }
 }
 

@@ -16,7 +16,7 @@ use super::halves::halved;
 use super::parse::list;
 use super::texture::{Encoding, Image, Texels};
 use crate::color::srgb_to_linear;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, in_other_case};
 
 /// The largest file, in bytes.
 const LARGEST_FILE: u64 = 512 << 20;
@@ -220,6 +220,14 @@ impl Assets {
         })
     }
 
+    /// Returns a file's name for messages: relative to the current folder if it was given on the command line.
+    fn shown<'f>(&self, file: &'f str) -> &'f str {
+        let is_given = self.elsewhere.contains(Path::new(file));
+        let here = std::env::current_dir().ok().filter(|_| is_given);
+        let inside = here.and_then(|here| Path::new(file).strip_prefix(here).ok()?.to_str());
+        inside.unwrap_or(file)
+    }
+
     /// Where an image is.
     pub(super) fn find(&self, file: &str) -> Result<Place, Problem> {
         if let Some(why) = self.absent.get(file) {
@@ -232,7 +240,12 @@ impl Assets {
             return Ok(Place::Encoded(file.to_owned()));
         }
         let path = self.folder.join(file).canonicalize();
-        let path = path.map_err(|error| Problem::damage(unreadable(file, &error)))?;
+        let path = path.map_err(|error| {
+            let other = in_other_case(&self.folder.join(file));
+            let other = other.as_deref().and_then(Path::file_name);
+            let hint = other.map_or_else(String::new, |name| format!("; did you mean {name:?}?"));
+            Problem::damage(unreadable(self.shown(file), &error) + &hint)
+        })?;
         let root = self.root.canonicalize().map_err(|error| {
             let root = self.root.display();
             format!("{file:?} must lie in the asset root, {root}, which cannot be found: {error}; check --asset-root")

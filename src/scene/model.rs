@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use super::error::{Problem, SceneError};
+use super::framing::check_extent;
 use super::load::Overrides;
 use super::validate::turned_up;
 use super::{
@@ -120,6 +121,12 @@ pub(super) fn describe(path: &Path, overrides: &Overrides) -> Result<(Descriptio
         turns: overrides.turntable.is_some(),
         ..(presentation.framing(overrides.gltf.view, aspect)).map_err(SceneError::Override)?
     };
+    check_extent(points.iter().copied()).map_err(|rule| {
+        SceneError::Mesh(MeshError::File {
+            path: path.to_owned(),
+            message: rule,
+        })
+    })?;
     let camera = framed(points.iter().copied(), framing);
     Ok((
         scene(overrides, size, camera, shape, &points).with_environment(studio(overrides)?),
@@ -153,7 +160,7 @@ pub(super) fn scene(
 /// Returns the light of models that have none. The camera sees gray instead of the studio, unless an environment is selected.
 pub(super) fn studio(overrides: &Overrides) -> Result<EnvironmentDescription, SceneError> {
     if overrides.integrator == Some(Integrator::Phong) {
-        let rule = "phong does not support environment maps, and this model has no other light; use path";
+        let rule = "phong does not support environment light, and this model has no other light; use path";
         return Err(SceneError::Override(Problem::of("integrator", rule)));
     }
     Ok(EnvironmentDescription {

@@ -110,12 +110,12 @@ fn values_of_a_wrong_kind_are_told_with_the_right_kind() {
         (
             samples,
             "pixel_samples = 16.5",
-            "bad.toml:6: render.pixel_samples: 16.5 must be a whole number or a table, such as { pattern = \"grid\", count = 16 }",
+            "bad.toml:6: render.pixel_samples: 16.5 must be a whole number from 1 to 65536, or a table such as { pattern = \"grid\", count = 16 }",
         ),
         (
             samples,
             "pixel_samples = 'sobol'",
-            "bad.toml:6: render.pixel_samples: \"sobol\" must be a whole number or a table, such as { pattern =",
+            "bad.toml:6: render.pixel_samples: \"sobol\" must be a whole number from 1 to 65536, or a table such as { pattern =",
         ),
         (
             samples,

@@ -65,6 +65,15 @@ fn damaged_lines_of_obj_files_have_stand_ins() {
 }
 
 #[test]
+fn facets_of_an_stl_file_without_its_end_are_kept() {
+    let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendloop\nendfacet\n";
+    let mesh = load("a.stl", format!("solid a\n{facet}"), None).unwrap();
+    assert_eq!(corners(&mesh), [FIRST]);
+    let note = "line 9: the file ends inside of a solid; \"endsolid\" is missing; the facets up to there are used";
+    assert_eq!(mesh.notes, [note]);
+}
+
+#[test]
 fn nothing_but_damage_is_an_error() {
     for (text, message) in [
         ("v 0 0 nan\nf 1 1 1\n", "a.obj:1: z: NaN must be from -1e9 to 1e9"),

@@ -168,6 +168,53 @@ fn what_cannot_be_a_scene_is_named() {
 }
 
 #[test]
+fn models_of_all_sizes_are_framed_or_refused_by_their_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.obj");
+    for (size, is_framed) in [("1e-12", false), ("1e-6", true), ("1e7", true), ("9e8", false)] {
+        fs::write(&path, format!("v 0 0 0\nv {size} 0 0\nv 0 {size} 0\nf 1 2 3\n")).unwrap();
+        for ground in [false, true] {
+            let overrides = Overrides {
+                size: Some((8, 8)),
+                pixel_samples: Some(1),
+                background: Some("none".parse().unwrap()),
+                presentation: Presentation {
+                    ground,
+                    ..Presentation::default()
+                },
+                ..Overrides::default()
+            };
+            match Scene::load_with(&path, &overrides) {
+                Ok(scene) => assert!(is_framed && coverage(&scene) > 0.1, "{size}"),
+                Err(error) => {
+                    let rule = "units; the automatic camera needs 1e-8 to 4e8: scale the model";
+                    assert!(!is_framed && error.to_string().ends_with(rule), "{size}: {error}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn files_with_names_in_another_case_are_found_or_suggested() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write("RED.mtl", "newmtl red\nKd 1 0 0\n");
+    write(
+        "a.obj",
+        "mtllib Red.MTL\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n",
+    );
+    let (scene, _) = load(&folder.path().join("a.obj")).unwrap();
+    assert_eq!(scene.notes, Vec::<String>::new());
+    assert_eq!(scene.material_names, ["red"]);
+    let text = "image = { width = 4, height = 4 }\ncamera = { position = [0, -5, 0], look_at = [0, 0, 0], fov = 40 }\n\
+                [render]\nintegrator = 'path'\n[environment]\nfile = 'red.MTL'\n";
+    write("s.toml", text);
+    let told = load(&folder.path().join("s.toml")).unwrap_err();
+    assert!(told.ends_with("; did you mean \"RED.mtl\"?"), "{told}");
+}
+
+#[test]
 fn strict_refuses_damage() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.obj");
@@ -233,7 +280,7 @@ fn a_model_without_lights_needs_the_path_tracer() {
                 ..Overrides::default()
             };
             let message = Scene::load_with(&path, &overrides).map_or_else(|error| error.to_string(), |_| String::new());
-            let rule = "integrator: phong does not support environment maps";
+            let rule = "integrator: phong does not support environment light";
             assert_eq!(message.starts_with(rule), is_refused, "{name}: {message}");
         }
     }

@@ -53,7 +53,8 @@ pub fn run(args: Args, start: Instant) -> anyhow::Result<ExitCode> {
                 skipped += 1;
                 continue;
             }
-            let name = part.display();
+            let file = outputs.files().find(|(_, _, path)| *path == part);
+            let name = file.map_or(part.to_string_lossy(), |(_, name, _)| name.into());
             let message =
                 format!("{name}: is damaged, or belongs to another scene or other options; rendering it again");
             job.log.log(Level::Note, &message);

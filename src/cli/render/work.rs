@@ -146,8 +146,11 @@ fn render(
                     }
                 }
                 Ok(_) => break,
-                Err(RenderError::Cancelled) if plan.checkpoint.is_none() && bands.passed_samples() > 0 => {
-                    if let Some(partial) = save_pass(plan, renderer, &mut bands, previews, layout)? {
+                Err(RenderError::Cancelled) if plan.checkpoint.is_none() => {
+                    if bands.passed_samples() == 0 {
+                        let note = "no sample of every pixel was complete, so there is no image yet";
+                        plan.log.log(Level::Note, note);
+                    } else if let Some(partial) = save_pass(plan, renderer, &mut bands, previews, layout)? {
                         let time = totals.time;
                         *totals = RenderTotals { time, ..partial };
                     }

@@ -10,6 +10,7 @@ use serde::de::{Deserializer, Error, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use crate::scene::limits::MOST;
 use crate::scene::schema::kinds::{Clamp, Count, Depth, FilterRadius, MostSamples, Rgb, Seed, ShadowEpsilon, Share};
 use crate::scene::{Integrator, Shadows};
 
@@ -121,7 +122,10 @@ impl<'de> Deserialize<'de> for SamplesDescription {
             type Value = SamplesDescription;
 
             fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str("a whole number or a table, such as { pattern = \"grid\", count = 16 }")
+                write!(
+                    f,
+                    "a whole number from 1 to {MOST}, or a table such as {{ pattern = \"grid\", count = 16 }}"
+                )
             }
 
             fn visit_i64<E: Error>(self, count: i64) -> Result<Self::Value, E> {

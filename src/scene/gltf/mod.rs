@@ -11,6 +11,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::error::{Problem, SceneError};
+use super::framing::check_extent;
 use super::load::{Overrides, folder_of};
 use super::model::{self, SIDE};
 use super::{CameraDescription, Description, Framing, GltfDescription, Scene, Selection, View, framed};
@@ -169,7 +170,15 @@ pub(super) fn describe(
             Some(_) => with_horizontal_orbit(camera.description.clone()),
             None => camera.description.clone(),
         },
-        None => framed(points.iter().copied(), framing).into(),
+        None => {
+            check_extent(points.iter().copied()).map_err(|rule| {
+                SceneError::Gltf(GltfError::File {
+                    path: path.to_owned(),
+                    message: rule,
+                })
+            })?;
+            framed(points.iter().copied(), framing).into()
+        }
     };
     let mut description = model::scene(overrides, (width, height), camera, shape, &points);
     if imported.lights.is_empty() {

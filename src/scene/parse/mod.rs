@@ -444,7 +444,6 @@ fn read_keys<T>(
     read: impl Fn(Table) -> Result<T, ReadError>,
 ) -> Read<T> {
     let mut problems: Option<Problems> = None;
-    let mut removed = BTreeSet::new();
     loop {
         let error = match (read(table.clone()), problems) {
             (Ok(value), None) => return Ok(value),
@@ -460,20 +459,17 @@ fn read_keys<T>(
             Some(Segment::Key(key)) => Some(key.clone()),
             _ => None,
         };
-        let found = match problems {
-            // Missing, because it was removed.
-            Some(found) if key.as_ref().is_some_and(|key| removed.contains(key)) => return Err(found),
+        let had_value = key.is_some_and(|key| table.remove(&key).is_some());
+        problems = match problems {
+            // A missing key was removed, or may be one of the unknown keys.
+            Some(found) if !had_value => return Err(found),
             Some(mut found) => {
                 found.add(problem);
-                found
+                Some(found)
             }
-            None => problem.into(),
+            None if !had_value => return Err(problem.into()),
+            None => Some(problem.into()),
         };
-        match key {
-            Some(key) if table.remove(&key).is_some() => removed.insert(key),
-            _ => return Err(found),
-        };
-        problems = Some(found);
     }
 }
 

@@ -179,7 +179,7 @@ fn bad_text_is_told_with_its_line() {
         (
             "[render]\npixel_samples = ['grid', 4]",
             2,
-            "render.pixel_samples: [\"grid\", 4] must be a whole number or a table, such as { pattern = \"grid\", count = 16 }",
+            "render.pixel_samples: [\"grid\", 4] must be a whole number from 1 to 65536, or a table such as { pattern = \"grid\", count = 16 }",
         ),
         (
             "path = ['linear', [[1]]]",
@@ -447,23 +447,23 @@ fn a_number_of_samples_stands_for_a_table() {
         ),
         (
             "pixel_samples = 1.5",
-            "s.toml:4: render.pixel_samples: 1.5 must be a whole number or a table, such as {",
+            "s.toml:4: render.pixel_samples: 1.5 must be a whole number from 1 to 65536, or a table such as {",
         ),
         (
             "pixel_samples = -4",
-            "s.toml:4: render.pixel_samples: -4 must be a whole number or a table, such as {",
+            "s.toml:4: render.pixel_samples: -4 must be a whole number from 1 to 65536, or a table such as {",
         ),
         (
             "pixel_samples = 4294967296",
-            "s.toml:4: render.pixel_samples: 4294967296 must be a whole number or a",
+            "s.toml:4: render.pixel_samples: 4294967296 must be a whole number from 1 to 65536, or a",
         ),
         (
             "pixel_samples = '9'",
-            "s.toml:4: render.pixel_samples: \"9\" must be a whole number or a table, such as {",
+            "s.toml:4: render.pixel_samples: \"9\" must be a whole number from 1 to 65536, or a table such as {",
         ),
         (
             "pixel_samples = [4]",
-            "s.toml:4: render.pixel_samples: [4] must be a whole number or a table, such as {",
+            "s.toml:4: render.pixel_samples: [4] must be a whole number from 1 to 65536, or a table such as {",
         ),
         (
             "pixel_samples = { count = 4, pattrn = 'grid' }",

@@ -725,6 +725,47 @@ fn files_are_not_read_for_a_scene_with_invalid_settings() {
 }
 
 #[test]
+fn all_keys_of_a_table_with_errors_are_reported() {
+    let text = "\
+[render]
+seed = -5
+max_depth = 'deep'
+colour = 1
+pixel_samples = -3
+[[shapes]]
+type = 'sphere'
+size = 3
+center = [0, 0]
+material = 7
+radius = 1
+";
+    assert_eq!(
+        errors(&format!("{SMALL}{text}")),
+        [
+            "s.toml:4: render.seed: -5 must be a whole number from 0 to 4294967295",
+            "s.toml:5: render.max_depth: \"deep\" must be a whole number from 1 to 64",
+            "s.toml:6: render.colour: unknown key; expected one of \"integrator\", \"ambient\", \"background\", \"shadow_epsilon\", \
+             \"shadows\", \"max_depth\", \"rr_depth\", \"clamp\", \"alpha\", \"ray_differentials\", \"seed\", \"pixel_samples\", \
+             \"light_samples\", \"filter\", \"adaptive\"",
+            "s.toml:7: render.pixel_samples: -3 must be a whole number from 1 to 65536, or a table such as { pattern = \"grid\", count = 16 }",
+            "s.toml:10: shapes[0].size: unknown key; expected one of \"type\", \"material\", \"center\", \"radius\"",
+            "s.toml:11: shapes[0].center: [0, 0] must be a list of 3 numbers",
+            "s.toml:12: shapes[0].material: 7 must be a string",
+        ]
+    );
+    // A key that is missing may be one that is unknown.
+    assert_eq!(
+        errors(&format!(
+            "{SMALL}[[shapes]]\ntype = 'sphere'\ncentre = [0, 0, 0]\nradius = 'x'\nmaterial = 'm'\n"
+        )),
+        [
+            "s.toml:5: shapes[0].centre: unknown key; did you mean \"center\"?",
+            "s.toml:6: shapes[0].radius: \"x\" must be a number",
+        ]
+    );
+}
+
+#[test]
 fn of_many_errors_the_first_are_reported() {
     let shape = "[[shapes]]\ntype = 'sphere'\nmaterial = 'none'\ncenter = [0, 0, 0]\nradius = 1\n";
     for (count, last) in [
