@@ -41,7 +41,15 @@ const WITHOUT_TWIN: &[(&str, &str)] = &[
 ];
 
 /// Files of `src/cpu` that are no file's twin.
-const NO_TWIN: &[&str] = &["mod.rs", "renderer.rs", "integrators", "lobes.rs", "samples.rs", "walk"];
+const NO_TWIN: &[&str] = &[
+    "ewa.rs",
+    "mod.rs",
+    "renderer.rs",
+    "integrators",
+    "lobes.rs",
+    "samples.rs",
+    "walk",
+];
 
 /// Functions and records that only one side has, or that differ, and why: file, name, reason.
 const ONE_SIDED: &[(&str, &str, &str)] = &[

@@ -143,7 +143,7 @@ const MAX_SEARCHED_BYTES: usize = 1 << 20;
 
 /// Returns column and length of the value that breaks a rule, or of the unknown key, if it is on this line.
 fn mark_of(layout: &Layout, text: &str, line: usize, problem: &Problem) -> Option<(usize, usize)> {
-    let range = match (problem.message.starts_with("unknown key"), problem.key.0.last()) {
+    let range = match (problem.is_unknown_key, problem.key.0.last()) {
         (true, Some(Segment::Key(key))) => layout.extent(&problem.key).map(|all| all.start..all.start + key.len()),
         _ => layout.value(&problem.key),
     }?;

@@ -51,6 +51,18 @@ pub enum GltfError {
         /// The value and the rule.
         message: String,
     },
+    /// The file does not have the chosen scene, animation or variant.
+    #[error("{}: {key}: {message}", path.display())]
+    Choice {
+        /// The file.
+        path: PathBuf,
+        /// The list: `scenes`, `animations` or `variants`.
+        key: &'static str,
+        /// The name of the option: `gltf_scene`, `animation`, `variant` or `time`.
+        option: &'static str,
+        /// The choice, and what the file has.
+        message: String,
+    },
     /// The file as a whole breaks a rule.
     #[error("{}: {message}", path.display())]
     File {
@@ -74,6 +86,10 @@ impl GltfError {
                 place.key = Some(key.clone());
                 path
             }
+            GltfError::Choice { path, key, .. } => {
+                place.key = Some((*key).to_owned());
+                path
+            }
             GltfError::Read { path, .. } | GltfError::Byte { path, .. } | GltfError::File { path, .. } => path,
         };
         place.file = Some(path.display().to_string());
@@ -87,6 +103,7 @@ impl GltfError {
             | GltfError::Syntax { path, .. }
             | GltfError::Byte { path, .. }
             | GltfError::Key { path, .. }
+            | GltfError::Choice { path, .. }
             | GltfError::File { path, .. } => *path = other.to_owned(),
         }
         self

@@ -22,7 +22,8 @@ impl Document {
             return Ok(named.or((!scenes.is_empty()).then_some(0)));
         };
         let names: Vec<Option<&str>> = scenes.iter().map(|scene| scene.name.as_deref()).collect();
-        self.selected("scene", wanted, &names).map(Some)
+        self.selected("scene", ("scenes", "gltf_scene"), wanted, &names)
+            .map(Some)
     }
 
     /// Returns the animations that are chosen: one, all if only a time is given, or none.
@@ -30,9 +31,12 @@ impl Document {
         let animations = &self.json.animations;
         let names: Vec<Option<&str>> = animations.iter().map(|animation| animation.name.as_deref()).collect();
         match (&choice.animation, choice.time) {
-            (Some(wanted), _) => Ok(vec![self.selected("animation", wanted, &names)?]),
+            (Some(wanted), _) => {
+                let list = ("animations", "animation");
+                Ok(vec![self.selected("animation", list, wanted, &names)?])
+            }
             (None, None) => Ok(Vec::new()),
-            (None, Some(_)) if animations.is_empty() => Err(self.fault("animations", STILL)),
+            (None, Some(_)) if animations.is_empty() => Err(self.not_found(("animations", "time"), STILL.to_owned())),
             (None, Some(_)) => Ok((0..animations.len()).collect()),
         }
     }
@@ -47,12 +51,29 @@ impl Document {
         let name = |variant: &'_ Value| variant.get("name").and_then(Value::as_str).map(str::to_owned);
         let names: Vec<Option<String>> = variants.into_iter().flatten().map(name).collect();
         let names: Vec<Option<&str>> = names.iter().map(Option::as_deref).collect();
-        self.selected("variant", wanted, &names).map(Some)
+        self.selected("variant", ("variants", "variant"), wanted, &names)
+            .map(Some)
     }
 
-    fn selected(&self, what: &str, wanted: &Selection, names: &[Option<&str>]) -> Result<usize, GltfError> {
+    /// Returns the index of a selection. `place` is the list in the file and the option.
+    fn selected(
+        &self,
+        what: &str,
+        place: (&'static str, &'static str),
+        wanted: &Selection,
+        names: &[Option<&str>],
+    ) -> Result<usize, GltfError> {
         let found = wanted.among(names);
-        found.ok_or_else(|| self.fault(format!("{what}s"), unknown(what, wanted, names)))
+        found.ok_or_else(|| self.not_found(place, unknown(what, wanted, names)))
+    }
+
+    fn not_found(&self, (key, option): (&'static str, &'static str), message: String) -> GltfError {
+        GltfError::Choice {
+            path: self.path.clone(),
+            key,
+            option,
+            message,
+        }
     }
 
     /// The maps of a node's mesh to the node's coordinates: one without a change, or those of EXT_mesh_gpu_instancing.

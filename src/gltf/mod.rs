@@ -64,7 +64,7 @@ const MOST_INSTANCES: usize = 1 << 20;
 const LONGEST_AXIS: f64 = 1e6;
 
 /// The message about a time of a file without animations.
-pub const STILL: &str = "the file has no animations";
+const STILL: &str = "the file has no animations";
 
 /// The rotation from the file's coordinates to the scene's: +Y becomes +Z.
 pub const UPRIGHT: DAffine3 = DAffine3 {

@@ -46,7 +46,7 @@ impl Draft {
     pub(crate) fn finish(self) -> Result<Option<Mesh>, String> {
         match finish::finish(self, None) {
             Ok(mesh) => Ok(Some(mesh)),
-            Err(fault) if fault.message.starts_with(finish::NO_TRIANGLES) => Ok(None),
+            Err(fault) if fault.is_empty => Ok(None),
             Err(fault) => Err(fault.message),
         }
     }

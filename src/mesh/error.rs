@@ -83,6 +83,8 @@ impl MeshError {
 pub(crate) struct Fault {
     pub place: Place,
     pub message: String,
+    /// True if the file has no triangle to render.
+    pub is_empty: bool,
 }
 
 /// A place in a file.
@@ -101,11 +103,20 @@ impl Place {
         Fault {
             place: self,
             message: message.into(),
+            is_empty: false,
         }
     }
 }
 
 impl Fault {
+    /// Returns the fault of a file without triangles. `reason` continues the message.
+    pub fn empty(reason: &str) -> Fault {
+        Fault {
+            is_empty: true,
+            ..Place::File.fault(format!("has no triangles{reason}"))
+        }
+    }
+
     pub fn of(self, path: &Path) -> MeshError {
         let (path, message) = (path.to_owned(), self.message);
         match self.place {

@@ -9,9 +9,6 @@ use super::error::{Fault, Place};
 use super::neighbours::Neighbours;
 use super::{MAX_COLOR, MOST, Mesh, Normals, polygon};
 
-/// How the message begins where nothing is left to be seen.
-pub(super) const NO_TRIANGLES: &str = "has no triangles";
-
 /// Makes the mesh.
 pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh, Fault> {
     polygon::triangulate(&mut draft);
@@ -28,10 +25,8 @@ pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh,
     };
     let count = mesh.triangles.len();
     if count == 0 {
-        return Err(Place::File.fault(match draft.without_triangles {
-            Some(reason) => format!("{NO_TRIANGLES}: {reason}"),
-            None => NO_TRIANGLES.to_owned(),
-        }));
+        let reason = draft.without_triangles.map(|reason| format!(": {reason}"));
+        return Err(Fault::empty(&reason.unwrap_or_default()));
     }
     if mesh.groups.len() > 1 {
         let ends = draft.runs.iter().skip(1).map(|(start, _)| *start).chain([count]);
@@ -52,7 +47,7 @@ pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh,
     });
     let count = mesh.triangles.len();
     if count == 0 {
-        return Err(Place::File.fault(NO_TRIANGLES));
+        return Err(Fault::empty(""));
     }
     round(&mut mesh, &draft.positions);
     drop(draft.positions);
@@ -60,7 +55,7 @@ pub(super) fn finish(mut draft: Draft, normals: Option<Normals>) -> Result<Mesh,
     drop_unused(&mut mesh);
     let dropped = count - mesh.triangles.len();
     if mesh.triangles.is_empty() {
-        return Err(Place::File.fault(format!("{NO_TRIANGLES} but {dropped} without an area")));
+        return Err(Fault::empty(&format!(" but {dropped} without an area")));
     }
     if dropped > 0 {
         mesh.notes.push(removed(

@@ -339,7 +339,7 @@ fn read(bytes: &[u8], format: Format, normals: Option<Normals>) -> Result<(Mesh,
     let (damage, notes) = std::mem::take(&mut draft.damages).into_parts();
     draft.notes.splice(0..0, notes);
     let mesh = finish::finish(draft, normals).map_err(|fault| match damage.first() {
-        Some(first) if fault.message.starts_with(finish::NO_TRIANGLES) => first.clone(),
+        Some(first) if fault.is_empty => first.clone(),
         _ => fault,
     })?;
     Ok((mesh, libraries, damage))

@@ -142,6 +142,8 @@ pub struct Problem {
     pub message: String,
     /// True if it is damage to a file that the scene names, for which a stand-in exists ([`Assets::strict`](super::Assets::strict)).
     pub(crate) is_damage: bool,
+    /// True if the key is unknown.
+    pub(crate) is_unknown_key: bool,
     /// True if the key is the subject of the message, as in `camera.fov is missing`.
     pub(super) is_predicate: bool,
 }
@@ -168,6 +170,7 @@ impl Problem {
             key: KeyPath::default(),
             message: cut_to(MAX_MESSAGE_LEN, &message.into()).into_owned(),
             is_damage: false,
+            is_unknown_key: false,
             is_predicate: false,
         }
     }

@@ -15,7 +15,7 @@ use super::framing::check_extent;
 use super::load::{Overrides, folder_of};
 use super::model::{self, SIDE};
 use super::{CameraDescription, Description, Framing, GltfDescription, Scene, Selection, View, framed};
-use crate::gltf::{Choice, GltfError, Imported, ImportedCamera, ModelContents, STILL, UPRIGHT, load};
+use crate::gltf::{Choice, GltfError, Imported, ImportedCamera, ModelContents, UPRIGHT, load};
 
 pub(super) use self::expand::Expanded;
 
@@ -54,33 +54,19 @@ impl GltfChoice {
         chosen.map(|(_, name)| name)
     }
 
-    /// An error of the file, or a problem of what is chosen of it.
+    /// Returns an error of the file, or of the option that chooses something that it does not have.
     fn told(&self, error: GltfError) -> SceneError {
-        let GltfError::Key { key, message, .. } = &error else {
-            return SceneError::Gltf(error);
+        let given = |option: &str| match option {
+            "gltf_scene" => self.scene.is_some(),
+            "animation" => self.animation.is_some(),
+            "variant" => self.variant.is_some(),
+            _ => self.time.is_some(),
         };
-        let chosen = [
-            ("scenes", "gltf_scene", &self.scene),
-            ("animations", "animation", &self.animation),
-            ("variants", "variant", &self.variant),
-        ];
-        let is_still = message.starts_with(STILL);
-        if key == "animations" && is_still && self.time.is_some() && self.animation.is_none() {
-            return SceneError::Override(Problem::of("time", message.as_str()));
-        }
-        let is_it = |list: &str, wanted: &Option<Selection>| {
-            let what = list.trim_end_matches('s');
-            let start = wanted
-                .as_ref()
-                .map(|wanted| format!("the file has no {what} {wanted};"));
-            start.is_some_and(|start| message.starts_with(&start))
-        };
-        match chosen
-            .iter()
-            .find(|(list, _, wanted)| list == key && is_it(list, wanted))
-        {
-            Some((_, option, _)) => SceneError::Override(Problem::of(option, message.as_str())),
-            None => SceneError::Gltf(error),
+        match error {
+            GltfError::Choice { option, message, .. } if given(option) => {
+                SceneError::Override(Problem::of(option, message))
+            }
+            error => SceneError::Gltf(error),
         }
     }
 }

@@ -245,10 +245,10 @@ fn with_section(problem: Problem) -> Problem {
         ("image", has_key::<ImageDescription>(name)),
     ];
     let section = sections.iter().find(|(_, has_key)| *has_key);
-    match section.filter(|_| problem.message.starts_with("unknown key")) {
+    match section.filter(|_| problem.is_unknown_key) {
         Some((section, _)) => Problem {
-            key: problem.key.clone(),
-            ..Problem::new(format!("unknown key; did you mean {section}.{name}?"))
+            message: format!("unknown key; did you mean {section}.{name}?"),
+            ..problem
         },
         None => problem,
     }
@@ -548,7 +548,8 @@ fn explain(error: ReadError, table: &Table, tagged: bool, integrator: Integrator
             .map(str::to_owned)
             .collect::<Vec<_>>()
     };
-    let message = if message.starts_with("unknown field") {
+    let is_unknown_key = message.starts_with("unknown field");
+    let message = if is_unknown_key {
         // The first name is the key, which is in the path already.
         let names = quoted(message).into_iter().skip(1);
         let tag = (tagged && path.len() == 1).then(|| "type".to_owned());
@@ -600,6 +601,7 @@ fn explain(error: ReadError, table: &Table, tagged: bool, integrator: Integrator
     };
     Problem {
         key: KeyPath(path),
+        is_unknown_key,
         ..Problem::new(message)
     }
 }
