@@ -89,6 +89,7 @@ pub mod job;
 #[doc(hidden)]
 pub mod memory;
 pub mod mesh;
+mod note;
 #[doc(hidden)]
 pub mod pack;
 mod picture;

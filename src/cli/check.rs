@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use wgray::scene::Note;
 
 use clap::ValueHint;
 #[cfg(feature = "gpu")]
@@ -85,8 +86,9 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 fn check(path: &Path, overrides: &Overrides, #[cfg(feature = "gpu")] shaders: &Shaders) -> anyhow::Result<String> {
     let scene = super::load(path, overrides)?;
-    for note in scene.notes.iter().chain(&scene.visibility_warnings()) {
-        log::say(Level::Warning, &super::located(path, note));
+    let invisible = scene.visibility_warnings().into_iter().map(Note::from);
+    for note in scene.notes.iter().cloned().chain(invisible) {
+        log::say(Level::Warning, &super::located(path, &note));
     }
     let frames = check_path(&scene)?;
     let packed = pack(&scene);

@@ -31,6 +31,7 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
+use wgray::scene::Note;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use serde_json::Value;
@@ -233,10 +234,10 @@ fn load(path: &Path, overrides: &Overrides) -> anyhow::Result<Scene> {
 }
 
 /// Returns a warning about a scene with its file, and with its line where it has one, as errors are located.
-fn located(path: &Path, note: &str) -> String {
-    match note.strip_prefix("line ") {
-        Some(line) => format!("{}:{line}", path.display()),
-        None => format!("{}: {note}", path.display()),
+fn located(path: &Path, note: &Note) -> String {
+    match (&note.file, note.line) {
+        (None, Some(line)) => format!("{}:{line}: {}", path.display(), note.message),
+        _ => format!("{}: {note}", path.display()),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Damage to mesh files for which a stand-in exists: it is reported, and the rest of the file is used.
 
 use super::error::{Fault, Place};
+use crate::note::Note;
 
 pub(super) const VERTEX: &str = "faces with this vertex were removed";
 pub(super) const FACE: &str = "the face was removed";
@@ -36,7 +37,7 @@ impl Damages {
     }
 
     /// Returns the first fault of each kind, and all of them as notes.
-    pub fn into_parts(self) -> (Vec<Fault>, Vec<String>) {
+    pub fn into_parts(self) -> (Vec<Fault>, Vec<Note>) {
         let notes = self.0.iter().map(Damage::note).collect();
         (self.0.into_iter().map(|damage| damage.first).collect(), notes)
     }
@@ -48,16 +49,19 @@ impl Damages {
 }
 
 impl Damage {
-    fn note(&self) -> String {
-        let place = match self.first.place {
-            Place::File => String::new(),
-            Place::Line(line) => format!("line {line}: "),
-            Place::Byte(offset) => format!("byte {offset}: "),
+    fn note(&self) -> Note {
+        let (line, place) = match self.first.place {
+            Place::File => (None, String::new()),
+            Place::Line(line) => (Some(line), String::new()),
+            Place::Byte(offset) => (None, format!("byte {offset}: ")),
         };
         let more = match self.count {
             1 => String::new(),
             count => format!(" ({} more like this)", count - 1),
         };
-        format!("{place}{}; {}{more}", self.first.message, self.stand_in)
+        Note {
+            line,
+            ..Note::from(format!("{place}{}; {}{more}", self.first.message, self.stand_in))
+        }
     }
 }

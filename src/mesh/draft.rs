@@ -1,5 +1,6 @@
 //! What the readers of all formats make: triangles as the file has them, in the file's coordinates.
 
+use crate::note::Note;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::damage::Damages;
@@ -28,7 +29,7 @@ pub(crate) struct Draft {
     /// The first triangles of runs of one group each, and their groups.
     pub runs: Vec<(usize, u32)>,
     /// What a user should know.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// Why the file may have no triangles.
     pub(super) without_triangles: Option<&'static str>,
     pub(super) damages: Damages,
@@ -74,8 +75,8 @@ impl Draft {
 }
 
 /// A number of things for a note: as one thing is told, or as several are.
-pub(super) fn counted(count: usize, one: &str, several: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { several })
+pub(super) fn counted(count: usize, one: &str, several: &str) -> Note {
+    format!("{count} {}", if count == 1 { one } else { several }).into()
 }
 
 /// Checks a coordinate of a position. Zero loses its sign, so that equal coordinates have equal bits. The error is the

@@ -1,5 +1,6 @@
 //! From what a file says to a mesh: 32-bit positions around a centre, triangles that have an area, normals.
 
+use crate::note::Note;
 use glam::{DVec3, DVec4, Vec3, Vec4};
 use rayon::prelude::*;
 use robust::{Coord, orient2d};
@@ -227,13 +228,13 @@ fn drop_repeated(mesh: &mut Mesh, repeated: &[u32]) {
 }
 
 /// Returns the note that some of all triangles were removed, and why.
-fn removed(count: usize, all: usize, one: &str, several: &str) -> String {
+fn removed(count: usize, all: usize, one: &str, several: &str) -> Note {
     let (why, were) = match count {
         1 => (one, "was"),
         _ => (several, "were"),
     };
     let triangles = if all == 1 { "triangle" } else { "triangles" };
-    format!("{count} of {all} {triangles} {why} and {were} removed")
+    format!("{count} of {all} {triangles} {why} and {were} removed").into()
 }
 
 /// Normals of the vertices by the triangles around, weighted by their angles: Thürmer and Wüthrich, "Computing Vertex

@@ -17,6 +17,7 @@ mod stl;
 mod tangents;
 mod words;
 
+use crate::note::Note;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Read as _};
@@ -79,7 +80,7 @@ pub struct Mesh {
     /// says nothing else.
     pub libraries: Vec<Library>,
     /// Warnings about the file, with the action taken: `1 of 12 triangles is a duplicate and was removed`.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// Damage to the file, as the errors that it is where damage is refused.
     pub(crate) damage: Vec<Fault>,
     /// The mesh as it is rendered, once that was asked for.
@@ -276,7 +277,7 @@ impl Mesh {
                         1 => "; 1 more line cannot be read".to_owned(),
                         count => format!("; {count} more lines cannot be read"),
                     };
-                    self.notes.push(format!("{name}:{problem}{others}"));
+                    self.notes.push(format!("{name}:{problem}{others}").into());
                 }
             }
             Err(why) => library.problem = Some(why),

@@ -264,7 +264,7 @@ fn read_faces(element: &Element, values: &mut impl Values, vertices: usize, draf
     };
     if element.properties.iter().any(|property| property.name == "texcoord") {
         let note = "texture coordinates per face corner (\"texcoord\") are not supported and were ignored; use those per vertex";
-        draft.notes.push(note.to_string());
+        draft.notes.push(note.into());
     }
     draft.triangles.reserve_exact(element.count.min(MOST));
     let mut corners = Vec::new();

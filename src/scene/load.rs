@@ -1,5 +1,6 @@
 //! From a scene file to a checked [`Scene`], with other values in place of some of the file's.
 
+use crate::note::Note;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, Read as _};
@@ -275,9 +276,12 @@ fn load_gltf(
     let assets = overrides.assets(folder_of(path), folder_of(path));
     let mut scene = overrides.finish(description.validate_and_list(&assets, files), invalid, |_| {})?;
     for note in &mut scene.notes {
-        *note = own(note);
+        *note = std::mem::take(note).of_loaded(&name);
+        note.message = own(&note.message);
     }
-    scene.notes.extend(overrides.presentation.hiding_ground(&scene));
+    scene
+        .notes
+        .extend(overrides.presentation.hiding_ground(&scene).map(Note::from));
     Ok((scene, description))
 }
 
@@ -296,16 +300,13 @@ fn load_mesh(
     let assets = overrides.assets(folder_of(path), folder_of(path));
     let checked = description.validate_and_list(&assets, files);
     let mut scene = overrides.finish(checked, |problems| model::error_of(path, problems.first), |_| {})?;
-    // Whose name stands before the notes.
-    let place = format!("{}: ", path.file_name().unwrap_or_default().to_string_lossy());
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
     for note in &mut scene.notes {
-        if let Some(own) = note.strip_prefix(&place) {
-            *note = own.to_owned();
-        } else if let Some(line) = note.strip_prefix(place.trim_end()) {
-            *note = format!("line {line}");
-        }
+        *note = std::mem::take(note).of_loaded(&name);
     }
-    scene.notes.extend(overrides.presentation.hiding_ground(&scene));
+    scene
+        .notes
+        .extend(overrides.presentation.hiding_ground(&scene).map(Note::from));
     Ok((scene, description))
 }
 
@@ -453,8 +454,8 @@ impl Overrides {
         }
         // The count may be the default, and yet somebody asked for it.
         let is_asked = self.light_samples.is_some() && scene.render.integrator == Integrator::Path;
-        if is_asked && !scene.notes.iter().any(|note| note == LIGHT_SAMPLES) {
-            scene.notes.push(LIGHT_SAMPLES.to_owned());
+        if is_asked && !scene.notes.iter().any(|note| note.message == LIGHT_SAMPLES) {
+            scene.notes.push(LIGHT_SAMPLES.into());
         }
         Ok(scene)
     }

@@ -47,6 +47,7 @@ use crate::gltf::Imported;
 pub use crate::gltf::ModelContents;
 use crate::mesh::Mesh;
 
+pub use crate::note::Note;
 pub use around::Background;
 pub use bounds::Bounds;
 pub use camera_path::CameraPath;
@@ -115,7 +116,7 @@ pub struct Scene {
     /// The files that the scene is made of, in order: its textures' images, meshes, and what these name.
     pub files: Vec<PathBuf>,
     /// Warnings about the scene and its meshes: `rock.ply: 1 of 12 triangles is a duplicate and was removed`.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// The glTF files, as long as what was made of them is in use.
     pub(crate) imported: Vec<Arc<Imported>>,
 }

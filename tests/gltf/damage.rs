@@ -59,7 +59,7 @@ fn a_missing_texture_leaves_the_factor() {
         assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
         let note = &scene.notes[0];
         assert!(
-            note.starts_with(why) && note.ends_with("; the texture is replaced by its factor"),
+            note.message.starts_with(why) && note.message.ends_with("; the texture is replaced by its factor"),
             "{note}"
         );
         let Reflection::Principled(principled) = &scene.materials[0].reflection else {
@@ -121,7 +121,10 @@ fn triangles_without_a_position_are_left_out() {
                 continue;
             }
             let note = &scene.notes[0];
-            assert!(note.starts_with(&what) && note.ends_with(" left out"), "{context}");
+            assert!(
+                note.message.starts_with(&what) && note.message.ends_with(" left out"),
+                "{context}"
+            );
             assert_eq!(strict.unwrap_err(), format!("{}: {what}", file.display()));
         }
     }

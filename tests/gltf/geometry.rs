@@ -206,7 +206,12 @@ fn points_and_lines_are_left_out_and_said() {
         builder.root_node(json!({ "mesh": mesh }));
         let scene = scene(&builder, &format!("mode-{mode}"));
         assert_corners(&scene, &QUAD_CORNERS);
-        let notes = scene.notes.join("\n");
+        let notes = scene
+            .notes
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join("\n");
         assert!(notes.contains(word) && notes.contains(".glb"), "{notes:?}");
         // Without a triangle there is nothing to see.
         builder.get("meshes")[0]["primitives"] = json!([other]);

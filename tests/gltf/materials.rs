@@ -352,7 +352,7 @@ fn what_is_required_but_unknown_is_refused_and_what_is_used_is_said() {
     builder.uses("EXT_of_nobody");
     let scene = scene(&builder, "used-unknown");
     assert!(
-        scene.notes.iter().any(|note| note.contains("EXT_of_nobody")),
+        scene.notes.iter().any(|note| note.message.contains("EXT_of_nobody")),
         "{:?}",
         scene.notes
     );

@@ -88,7 +88,7 @@ fn what_a_scale_flattens_is_there() {
         let scene = flattened(scale);
         assert_corners(&scene, &quad_by(|p| p * by + 2.0 * DVec3::Z));
         assert!(
-            scene.notes.iter().all(|note| !note.contains("left out")),
+            scene.notes.iter().all(|note| !note.message.contains("left out")),
             "{:?}",
             scene.notes
         );
@@ -101,7 +101,7 @@ fn what_a_scale_flattens_is_there() {
             scene
                 .notes
                 .iter()
-                .any(|note| note.contains("1 of 1 instances of meshes are left out"))
+                .any(|note| note.message.contains("1 of 1 instances of meshes are left out"))
         );
     }
 }

@@ -121,7 +121,8 @@ fn a_ground_that_hides_the_model_is_noted() {
         panic!("{:?}", notes(true, View::Bottom))
     };
     assert!(
-        note.starts_with("the camera is below the ground, which hides the model"),
+        note.message
+            .starts_with("the camera is below the ground, which hides the model"),
         "{note}"
     );
     for (ground, view) in [(false, View::Bottom), (true, View::Top), (true, View::Front)] {

@@ -237,7 +237,7 @@ fn what_lacks_its_coordinates_is_told_of() {
     builder.root_node(json!({ "mesh": mesh }));
     let notes = scene(&builder, "no-coordinates").notes;
     let told = "meshes[0].primitives[0] has no TEXCOORD_1, which its material needs";
-    assert!(notes.iter().any(|note| note.contains(told)), "{notes:?}");
+    assert!(notes.iter().any(|note| note.message.contains(told)), "{notes:?}");
 }
 
 /// The scene of a picture of four colors whose texture is transformed.
@@ -510,7 +510,7 @@ fn occlusion_is_ignored_and_said() {
     let scene = scene(&builder, "occlusion");
     assert_all(&scene, [0.25, 0.5, 0.75]);
     assert!(
-        scene.notes.iter().any(|note| note.contains("occlusion")),
+        scene.notes.iter().any(|note| note.message.contains("occlusion")),
         "{:?}",
         scene.notes
     );

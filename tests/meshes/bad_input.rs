@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use wgray::mesh::{Mesh, MeshError, Normals};
-use wgray::scene::{Color, Reflection, Scene};
+use wgray::scene::{Color, Note, Reflection, Scene};
 
 use super::load;
 use super::readers::in_all_formats;
@@ -365,7 +365,7 @@ fn check(name: &str, result: Result<Mesh, String>) -> bool {
             for normal in &mesh.normals {
                 assert!((normal.length() - 1.0).abs() < 1e-5, "{normal}");
             }
-            let is_damage = |note: &String| note.starts_with("line ") || note.starts_with("byte ");
+            let is_damage = |note: &Note| note.line.is_some() || note.message.starts_with("byte ");
             !mesh.notes.iter().any(is_damage)
         }
         Err(message) => {
@@ -425,11 +425,15 @@ fn check_mtl(folder: &std::path::Path, mtl: &[u8]) -> bool {
                 }
                 assert!((1e-6..=1e6).contains(shininess), "{material:?}");
             }
-            assert!(scene.notes.iter().all(|note| note.len() < 500), "{:?}", scene.notes);
+            assert!(
+                scene.notes.iter().all(|note| note.message.len() < 500),
+                "{:?}",
+                scene.notes
+            );
             !scene
                 .notes
                 .iter()
-                .any(|note| note.ends_with("a gray material is used instead"))
+                .any(|note| note.message.ends_with("a gray material is used instead"))
         }
         Err(error) => panic!("{error}"),
     }

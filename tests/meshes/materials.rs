@@ -25,7 +25,8 @@ fn material(mtl: &str) -> (Material, Vec<String>) {
     write(folder.path(), mtl);
     let mut scene = Scene::load(folder.path().join("a.obj")).unwrap();
     assert_eq!(scene.material_names, ["m"]);
-    (scene.materials.remove(0), scene.notes)
+    let notes = scene.notes.iter().map(ToString::to_string).collect();
+    (scene.materials.remove(0), notes)
 }
 
 fn principled(material: &Material) -> &Principled {
@@ -151,7 +152,7 @@ fn strict_refuses_missing_materials() {
     assert!(
         notes
             .iter()
-            .any(|note| note.ends_with("; a gray material is used instead")),
+            .any(|note| note.message.ends_with("; a gray material is used instead")),
         "{notes:?}"
     );
     let message = load(true).unwrap_err().to_string();

@@ -222,7 +222,7 @@ fn duplicate_triangles_are_dropped_and_counted() {
     assert_eq!(corners(&mesh), TWO_TRIANGLES);
     assert_eq!(
         (mesh.positions.len(), &mesh.notes[..]),
-        (4, &["1 of 3 triangles is a duplicate and was removed".to_string()][..])
+        (4, &["1 of 3 triangles is a duplicate and was removed".into()][..])
     );
     // Not those of another group, nor those that look the other way.
     let mesh = load("a.obj", text.replace("f 2 3 5", "g b\nf 2 3 5"), None).unwrap();
@@ -462,7 +462,7 @@ fn normals_of_a_file_without_any_are_an_error() {
         let result = load(name, bytes, Some(Normals::File));
         if name.to_lowercase().ends_with("stl") {
             // STL files always have a place for them; here all are zero.
-            assert!(result.unwrap().notes[0].contains("no normal"));
+            assert!(result.unwrap().notes[0].message.contains("no normal"));
         } else {
             let rest = "has no normals; \"smooth\" and \"flat\" ones are made from the triangles";
             assert_eq!(result.unwrap_err(), format!("{name}: {rest}"));

@@ -57,8 +57,11 @@ fn the_factor_alone_stands_in_for_an_image_that_cannot_be_read() {
         let scene = load(folder.path(), &text, false).unwrap();
         assert_eq!(scene.notes.len(), 1, "once for each file: {:?}", scene.notes);
         let note = &scene.notes[0];
-        assert!(note.starts_with(&format!("{file:?} {why}")), "{note}");
-        assert!(note.ends_with("; the texture is replaced by its factor"), "{note}");
+        assert!(note.message.starts_with(&format!("{file:?} {why}")), "{note}");
+        assert!(
+            note.message.ends_with("; the texture is replaced by its factor"),
+            "{note}"
+        );
         let material = &scene.materials[0];
         let Reflection::Diffuse {
             color: Color::Texture(texture),
@@ -92,7 +95,7 @@ fn bad_texels_are_clamped_and_counted() {
     for (text, key) in [(texture, "7: textures.t.file"), (environment, "6: environment.file")] {
         let scene = load(folder.path(), text, false).unwrap();
         assert!(
-            scene.notes.contains(&format!("{damage}; they are clamped")),
+            scene.notes.contains(&format!("{damage}; they are clamped").into()),
             "{:?}",
             scene.notes
         );

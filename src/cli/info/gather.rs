@@ -226,7 +226,9 @@ impl Info {
                 backend: plan.info.interface.clone(),
                 why: plan.why.clone(),
             },
-            notes: scene.notes.iter().cloned().chain(scene.visibility_warnings()).collect(),
+            notes: (scene.notes.iter().map(ToString::to_string))
+                .chain(scene.visibility_warnings())
+                .collect(),
             files: scene.files.iter().map(|file| file.display().to_string()).collect(),
         }
     }

@@ -10,6 +10,7 @@ mod work;
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::Instant;
+use wgray::scene::Note;
 
 use anyhow::Context as _;
 use tracing::info;
@@ -150,10 +151,10 @@ fn read(args: &Args, log: &OnceLog) -> anyhow::Result<Scene> {
     };
     let moves = scene.camera_path.is_some() || args.fps(&scene)?.is_some();
     let still = (args.frames.is_some() && !moves).then_some(still);
-    let invisible = scene.visibility_warnings();
-    let warnings = scene.notes.iter().chain(&invisible).map(String::as_str);
-    for note in warnings.chain(still) {
-        log.log_once(Level::Warning, &located(path, note));
+    let others = scene.visibility_warnings().into_iter().map(Note::from);
+    let others = others.chain(still.map(Note::from));
+    for note in scene.notes.iter().cloned().chain(others) {
+        log.log_once(Level::Warning, &located(path, &note));
     }
     Ok(scene)
 }

@@ -315,7 +315,7 @@ impl Painter {
                 }
                 let known = self.loaded.as_ref().map_or(&[][..], |old| &old.scene.notes);
                 for note in loaded.scene.notes.iter().filter(|note| !known.contains(note)) {
-                    (self.report)(Report::Note(note.clone()));
+                    (self.report)(Report::Note(note.to_string()));
                 }
                 let known = self.loaded.as_ref();
                 shown_otherwise = known.is_some_and(|old| old.scene.view != loaded.scene.view);

@@ -1,6 +1,7 @@
 //! Shapes of type `gltf` as what they stand for: meshes in memory and their instances, textures of images in memory, materials
 //! and lights. What is behind this knows nothing of glTF.
 
+use crate::note::Note;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -25,7 +26,7 @@ pub struct Expanded {
     pub description: Description,
     pub assets: Assets,
     /// What a user should know of the files.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// The files as they were read, which are kept as long as the scene is.
     pub imported: Vec<Arc<Imported>>,
     origins: Vec<Origin>,
@@ -77,9 +78,10 @@ impl Expanded {
         if let Some((longest, bytes)) = fitting {
             expanded.assets.longest_side = Some(longest);
             let gib = bytes as f64 / f64::from(1 << 30);
-            expanded.notes.push(format!(
+            let note = format!(
                 "images of glTF files take {gib:.1} GiB: those with more than {longest} texels along a side are halved until they have no more, so that all fit 1 GiB"
-            ));
+            );
+            expanded.notes.push(note.into());
         }
         let is_gltf = |shape: &ShapeDescription| matches!(shape, ShapeDescription::Gltf(_));
         expanded.description.shapes.retain(|shape| !is_gltf(shape));
@@ -183,12 +185,18 @@ impl Expanded {
         let first_light = self.description.lights.len();
         let lights = imported.lights.iter().filter(|_| gltf.lights);
         (self.description.lights).extend(lights.map(|light| moved(light, &transform)));
-        let notes = imported.notes.iter().map(|note| format!("{}: {note}", gltf.file));
+        let notes = imported
+            .notes
+            .iter()
+            .map(|note| Note::from(note.as_str()).in_file(&gltf.file));
         self.notes.extend(notes);
         for damage in &imported.damage {
-            let what = Problem::damage(format!("{}: {}", gltf.file, damage.what));
-            let note = self.assets.tolerate(what, damage.stand_in).at("file")?;
-            self.notes.push(note);
+            if self.assets.strict {
+                let what = Problem::damage(format!("{}: {}", gltf.file, damage.what));
+                return Err(what.at("file"));
+            }
+            let note = Note::from(format!("{}; {}", damage.what, damage.stand_in));
+            self.notes.push(note.in_file(&gltf.file));
         }
         self.origins.push(Origin {
             shape,

@@ -104,7 +104,7 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
         let scene = load("", &overrides);
         assert_eq!((scene.render.integrator, scene.render.max_depth), (Integrator::Path, 0));
         assert!(
-            scene.notes[0].starts_with("render.integrator is not set; "),
+            scene.notes[0].message.starts_with("render.integrator is not set; "),
             "{:?}",
             scene.notes
         );
@@ -125,12 +125,13 @@ materials.red = { type = 'phong', color = [1, 0, 0] }
         assert_eq!(emissive.render.integrator, Integrator::Path);
         assert!(
             emissive.notes[0]
+                .message
                 .starts_with("render.integrator is not set; using \"path\", which materials.red.emission requires")
         );
         // An integrator that is named is kept, without a note.
         let named = load("environment.color = [1, 1, 1]\n", &define("render.integrator=path"));
         assert!(
-            !named.notes.iter().any(|note| note.contains("integrator: ")),
+            !named.notes.iter().any(|note| note.message.contains("integrator: ")),
             "{:?}",
             named.notes
         );

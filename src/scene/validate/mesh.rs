@@ -1,5 +1,6 @@
 //! The rules of meshes.
 
+use crate::note::Note;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
@@ -122,7 +123,7 @@ pub(super) fn notes(
     descriptions: &[ShapeDescription],
     shapes: &[Shape],
     meshes: &BTreeMap<&str, NamedMesh>,
-) -> Vec<String> {
+) -> Vec<Note> {
     let of_shapes = descriptions.iter().zip(shapes).filter_map(|pair| match pair {
         (
             ShapeDescription::Mesh(description),
@@ -134,19 +135,11 @@ pub(super) fn notes(
         _ => None,
     });
     let named = (meshes.values()).filter_map(|named| Some((&named.description.file, named.mesh.as_ref()?)));
-    let of_mesh = |(file, mesh): (&String, &Arc<Mesh>)| -> Vec<String> {
-        mesh.notes.iter().map(|note| located(file, note)).collect()
+    let of_mesh = |(file, mesh): (&String, &Arc<Mesh>)| -> Vec<Note> {
+        mesh.notes.iter().map(|note| note.clone().in_file(file)).collect()
     };
-    let notes: BTreeSet<String> = of_shapes.chain(named).flat_map(of_mesh).collect();
+    let notes: BTreeSet<Note> = of_shapes.chain(named).flat_map(of_mesh).collect();
     notes.into_iter().collect()
-}
-
-/// Returns a note of a mesh with its file, as errors are located: `box.obj:8: …`.
-fn located(file: &str, note: &str) -> String {
-    match note.strip_prefix("line ") {
-        Some(line) => format!("{file}:{line}"),
-        None => format!("{file}: {note}"),
-    }
 }
 
 /// Returns a mesh; `None` if no files are read.

@@ -13,6 +13,7 @@ mod mtl;
 mod path;
 mod principled;
 
+use crate::note::Note;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -98,7 +99,7 @@ impl Description {
                 scene
             }
         };
-        let chosen = integrator::note(self);
+        let chosen = integrator::note(self).map(Note::from);
         scene.notes.splice(0..0, chosen);
         Ok(scene)
     }
@@ -192,13 +193,10 @@ impl Description {
         let materials = std::mem::take(&mut looks.materials);
         let textures = std::mem::take(&mut looks.textures);
         let files = looks.files.iter().cloned().collect();
-        notes.extend(looks.notes());
-        notes.extend(path::notes(
-            (&self.render, integrator),
-            (&material_names, &materials),
-            &textures,
-        ));
-        notes.extend(environment::note(self, environment.as_ref()));
+        notes.extend(looks.notes().map(Note::from));
+        let of_paths = path::notes((&self.render, integrator), (&material_names, &materials), &textures);
+        notes.extend(of_paths.into_iter().map(Note::from));
+        notes.extend(environment::note(self, environment.as_ref()).map(Note::from));
         let Settings {
             width,
             height,

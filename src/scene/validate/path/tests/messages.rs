@@ -291,7 +291,7 @@ fn what_only_paths_have_is_refused_under_phong() {
         let note = format!(
             "render.integrator is not set; using \"path\", which {key} requires. Set it in the scene to silence this warning"
         );
-        assert_eq!(scene.notes.first(), Some(&note));
+        assert_eq!(scene.notes[0], note);
         // It is the integrator that counts, wherever it is from.
         let overrides = |integrator| Overrides {
             integrator: Some(integrator),

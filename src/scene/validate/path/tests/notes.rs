@@ -2,9 +2,10 @@
 
 use super::super::LIGHT_SAMPLES;
 use super::*;
+use crate::note::Note;
 
 fn notes(text: &str) -> Vec<String> {
-    parse(text).unwrap().notes
+    parse(text).unwrap().notes.iter().map(Note::to_string).collect()
 }
 
 #[test]

@@ -1,0 +1,98 @@
+//! Warnings about scenes and the files that they name.
+
+use std::fmt;
+
+/// A warning about a scene or one of its files, as in `rock.ply:8: face 3: must have 3 vertices or more; it has 2; the face was removed`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub struct Note {
+    /// The file by the name that the scene has for it; `None` for the file that was loaded.
+    pub file: Option<String>,
+    /// The line of that file, counted from 1.
+    pub line: Option<usize>,
+    /// The message.
+    pub message: String,
+}
+
+impl Note {
+    /// Returns the note about a file that the loaded one names.
+    pub(crate) fn in_file(self, file: &str) -> Note {
+        Note {
+            file: Some(file.to_owned()),
+            ..self
+        }
+    }
+
+    /// Returns the note of a scene that consists of the file of this name.
+    pub(crate) fn of_loaded(mut self, name: &str) -> Note {
+        self.file = self.file.filter(|file| file != name);
+        self
+    }
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match (&self.file, self.line) {
+            (Some(file), Some(line)) => write!(f, "{file}:{line}: ")?,
+            (Some(file), None) => write!(f, "{file}: ")?,
+            (None, Some(line)) => write!(f, "line {line}: ")?,
+            (None, None) => {}
+        }
+        f.write_str(&self.message)
+    }
+}
+
+/// Compares the displayed text.
+impl PartialEq<str> for Note {
+    fn eq(&self, other: &str) -> bool {
+        self.to_string() == other
+    }
+}
+
+/// Compares the displayed text.
+impl PartialEq<&str> for Note {
+    fn eq(&self, other: &&str) -> bool {
+        self == *other
+    }
+}
+
+/// Compares the displayed text.
+impl PartialEq<String> for Note {
+    fn eq(&self, other: &String) -> bool {
+        self == other.as_str()
+    }
+}
+
+impl From<String> for Note {
+    fn from(message: String) -> Note {
+        Note {
+            message,
+            ..Note::default()
+        }
+    }
+}
+
+impl From<&str> for Note {
+    fn from(message: &str) -> Note {
+        message.to_owned().into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notes_begin_with_their_place() {
+        let note = Note {
+            line: Some(8),
+            ..Note::from("the face was removed")
+        };
+        assert_eq!(note.to_string(), "line 8: the face was removed");
+        let inside = note.in_file("a.obj");
+        assert_eq!(inside.to_string(), "a.obj:8: the face was removed");
+        assert_eq!(inside.clone().of_loaded("b.obj"), inside);
+        assert_eq!(inside.of_loaded("a.obj").to_string(), "line 8: the face was removed");
+        assert_eq!(Note::from("x").in_file("a.obj").to_string(), "a.obj: x");
+    }
+}
