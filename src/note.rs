@@ -45,7 +45,7 @@ impl fmt::Display for Note {
 /// Compares the displayed text.
 impl PartialEq<str> for Note {
     fn eq(&self, other: &str) -> bool {
-        self.to_string() == other
+        self.to_string().as_str() == other
     }
 }
 

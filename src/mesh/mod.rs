@@ -381,22 +381,37 @@ pub(crate) fn file_beside(folder: &Path, name: &str) -> PathBuf {
     let last = slashes.rsplit('/').next().unwrap_or(&slashes);
     let tried = [name, &slashes, last].map(|name| folder.join(name));
     let [_, plain, _] = &tried;
-    match tried.iter().find(|path| path.is_file()) {
-        Some(path) => path.clone(),
-        None => in_other_case(&folder.join(last)).unwrap_or_else(|| plain.clone()),
-    }
+    let found = tried.iter().find(|path| path.is_file()).cloned();
+    let found = found.or_else(|| in_other_case(folder, &slashes));
+    found
+        .or_else(|| in_other_case(folder, last))
+        .unwrap_or_else(|| plain.clone())
 }
 
-/// Returns an existing file whose name differs from that of a path in the case of letters only.
-pub(crate) fn in_other_case(path: &Path) -> Option<PathBuf> {
-    let (folder, name) = (path.parent()?, path.file_name()?);
+/// Returns an existing file in a folder whose path differs in the case of letters only.
+pub(crate) fn in_other_case(folder: &Path, path: &str) -> Option<PathBuf> {
+    let (parents, name) = path.rsplit_once('/').unwrap_or(("", path));
+    let mut folder = folder.to_owned();
+    for parent in parents.split('/').filter(|parent| !parent.is_empty()) {
+        let exact = folder.join(parent);
+        folder = match exact.is_dir() {
+            true => exact,
+            false => entry_in_other_case(&folder, parent, Path::is_dir)?,
+        };
+    }
+    entry_in_other_case(&folder, name, Path::is_file)
+}
+
+fn entry_in_other_case(folder: &Path, name: &str, is_wanted: fn(&Path) -> bool) -> Option<PathBuf> {
     let folder = if folder.as_os_str().is_empty() {
         Path::new(".")
     } else {
         folder
     };
-    let entries = fs::read_dir(folder).ok()?;
-    let names = entries.filter_map(|entry| Some(entry.ok()?.file_name()));
-    let found = names.filter(|other| other.eq_ignore_ascii_case(name)).min()?;
-    Some(path.with_file_name(found)).filter(|path| path.is_file())
+    let name = name.to_lowercase();
+    let entries = fs::read_dir(folder).ok()?.filter_map(Result::ok);
+    let same = entries.filter(|entry| entry.file_name().to_string_lossy().to_lowercase() == name);
+    same.map(|entry| folder.join(entry.file_name()))
+        .filter(|path| is_wanted(path))
+        .min()
 }

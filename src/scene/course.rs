@@ -10,7 +10,7 @@ use serde_json::value::RawValue;
 use toml::Value;
 
 use super::define::Defines;
-use super::error::{At, KeyPath, Problem, Problems, SceneError, Segment, cut};
+use super::error::{At, Collector, KeyPath, Problem, Problems, SceneError, Segment, cut};
 use super::validate::{light, point};
 use super::{
     ColorDescription, ConductorDescription, Description, DiffuseDescription, Integrator, LightDescription,
@@ -108,10 +108,9 @@ pub(super) fn asset_root(folder: &Path) -> PathBuf {
 pub(super) fn read(text: &str, origin: &str, defines: &mut Defines) -> Result<Description, SceneError> {
     let course = read_json(text, defines).map_err(|broken| match broken {
         Broken::Values(problems) => {
-            let of_define = problems.iter().find(|problem| defines.brought(&problem.key)).cloned();
             let error = |at, problem: Problem| syntax_error(origin, place(text, at), problem.to_string());
-            match of_define {
-                Some(problem) => SceneError::Override(problem.at("define")),
+            match problems.of_define(defines) {
+                Some(error) => error,
                 None => problems.into_error(|problem| begin(text, &problem.key), error),
             }
         }
@@ -121,8 +120,9 @@ pub(super) fn read(text: &str, origin: &str, defines: &mut Defines) -> Result<De
             syntax_error(origin, (1, 1), rule)
         }
     })?;
-    let description = check(&course).and_then(|()| description(&course));
-    description.map_err(|problem| invalid(text, origin, problem.into(), defines))
+    let checked = check(&course);
+    checked.map_err(|problems| invalid(text, origin, problems, defines))?;
+    Ok(description(&course))
 }
 
 /// Returns the error of a text whose description has problems, or which has them itself.
@@ -133,8 +133,8 @@ pub(super) fn invalid(text: &str, origin: &str, problems: Problems, defines: &De
         message: problem.message.replace("\"conductor\"", "\"specular\""),
         ..problem
     });
-    if let Some(problem) = problems.iter().find(|problem| defines.brought(&problem.key)) {
-        return SceneError::Override(problem.clone().at("define"));
+    if let Some(error) = problems.of_define(defines) {
+        return error;
     }
     let invalid = |at: usize, problem: Problem| SceneError::Invalid {
         origin: origin.to_owned(),
@@ -222,7 +222,7 @@ fn read_json(text: &str, defines: &mut Defines) -> Result<Course, Broken> {
 }
 
 /// Checks what is not told in the file's own numbers once it is turned.
-fn check(course: &Course) -> Result<(), Problem> {
+fn check(course: &Course) -> Result<(), Problems> {
     let Course {
         cam_config,
         light_config,
@@ -231,10 +231,11 @@ fn check(course: &Course) -> Result<(), Problem> {
         ..
     } = course;
     // +z, which the file may name, is not the default `up` here.
-    camera(cam_config).validate_frame().at("camera")?;
-    light(&self::rectangle(light_config).into()).at(0).at("lights")?;
+    let mut found = Collector::default();
+    found.values(camera(cam_config).validate_frame().map_err(Problems::from).at("camera"));
+    found.value(light(&self::rectangle(light_config).into()).at(0).at("lights"));
     for (i, object) in objects.iter().enumerate() {
-        point(object.translate).at("translate").at(i).at("shapes")?;
+        found.value(point(object.translate).at("translate").at(i).at("shapes"));
     }
     let mut names = BTreeMap::new();
     for (i, material) in materials.iter().enumerate() {
@@ -243,10 +244,10 @@ fn check(course: &Course) -> Result<(), Problem> {
                 "{:?} is defined twice, first in materials[{first}]",
                 cut(&material.name)
             );
-            return Err(Problem::new(message).at("name").at(i).at("materials"));
+            found.value(Err::<(), _>(Problem::new(message).at("name").at(i).at("materials")));
         }
     }
-    Ok(())
+    found.end(())
 }
 
 /// A camera in the file's coordinates.
@@ -267,7 +268,7 @@ fn turned(v: DVec3) -> DVec3 {
     DVec3::new(v.x, -v.z, v.y)
 }
 
-fn description(course: &Course) -> Result<Description, Problem> {
+fn description(course: &Course) -> Description {
     let Course {
         spp,
         max_depth,
@@ -314,7 +315,7 @@ fn description(course: &Course) -> Result<Description, Problem> {
             ..MeshDescription::new(&object.material_name, &object.obj_file_path)
         });
     }
-    Ok(scene)
+    scene
 }
 
 /// The path in the file of a value that is at a path of its description. A path of the file stays.

@@ -7,7 +7,7 @@ use toml::{Table, Value};
 use toml_parser::Source;
 use toml_parser::lexer::TokenKind;
 
-use super::error::{KeyPath, Problem, Segment, cut};
+use super::error::{At as _, KeyPath, Problem, Problems, SceneError, Segment, cut};
 use super::parse::list;
 use super::suggest;
 
@@ -79,6 +79,14 @@ fn about(key: &KeyPath, message: String) -> Problem {
 fn unreadable(text: &str) -> Problem {
     let rule = "must be KEY=VALUE, such as render.seed=3 or shapes[2].radius=0.5";
     Problem::new(format!("{} {rule}", cut(text)))
+}
+
+impl Problems {
+    /// Returns the error of the first value that a define brought.
+    pub(super) fn of_define(&self, defines: &Defines) -> Option<SceneError> {
+        let problem = self.iter().find(|problem| defines.brought(&problem.key))?;
+        Some(SceneError::Override(problem.clone().at("define")))
+    }
 }
 
 impl FromStr for KeyPath {

@@ -228,6 +228,11 @@ impl Problems {
         }
     }
 
+    /// Returns true if further problems are only counted.
+    pub fn is_full(&self) -> bool {
+        self.others.len() + 1 >= MAX_PROBLEMS
+    }
+
     /// Adds a problem, or only counts it if there are enough.
     pub fn add(&mut self, problem: Problem) {
         match self.others.len() + 1 < MAX_PROBLEMS {

@@ -241,8 +241,10 @@ impl Assets {
         }
         let path = self.folder.join(file).canonicalize();
         let path = path.map_err(|error| {
-            let other = in_other_case(&self.folder.join(file));
-            let other = other.as_deref().and_then(Path::file_name);
+            let other = in_other_case(&self.folder, file);
+            let other = other
+                .as_deref()
+                .map(|other| other.strip_prefix(&self.folder).unwrap_or(other));
             let hint = other.map_or_else(String::new, |name| format!("; did you mean {name:?}?"));
             Problem::damage(unreadable(self.shown(file), &error) + &hint)
         })?;

@@ -252,8 +252,8 @@ fn load_gltf(
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<(Scene, Description), SceneError> {
     let (mut description, _kept) = describe(path, overrides, files)?;
+    let mut defines = Defines::new(&overrides.define);
     if !overrides.define.is_empty() {
-        let mut defines = Defines::new(&overrides.define);
         description = description.defined(&mut defines).map_err(SceneError::Override)?;
     }
     overrides.apply(&mut description).map_err(SceneError::Override)?;
@@ -264,7 +264,11 @@ fn load_gltf(
         let message = message.strip_prefix(&place).unwrap_or(message);
         message.replace(&format!("\"{name}/"), "\"")
     };
-    let invalid = |Problems { first, .. }: Problems| {
+    let invalid = |problems: Problems| {
+        if let Some(error) = problems.of_define(&defines) {
+            return error;
+        }
+        let first = problems.first;
         SceneError::Gltf(GltfError::File {
             path: path.to_owned(),
             message: match first.key.to_string() == "shapes[0].file" {
@@ -292,14 +296,18 @@ fn load_mesh(
     files: &mut BTreeSet<PathBuf>,
 ) -> Result<(Scene, Description), SceneError> {
     let (mut description, _mesh) = model::describe(path, overrides)?;
+    let mut defines = Defines::new(&overrides.define);
     if !overrides.define.is_empty() {
-        let mut defines = Defines::new(&overrides.define);
         description = description.defined(&mut defines).map_err(SceneError::Override)?;
     }
     overrides.apply(&mut description).map_err(SceneError::Override)?;
     let assets = overrides.assets(folder_of(path), folder_of(path));
     let checked = description.validate_and_list(&assets, files);
-    let mut scene = overrides.finish(checked, |problems| model::error_of(path, problems.first), |_| {})?;
+    let invalid = |problems: Problems| match problems.of_define(&defines) {
+        Some(error) => error,
+        None => model::error_of(path, problems.first),
+    };
+    let mut scene = overrides.finish(checked, invalid, |_| {})?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     for note in &mut scene.notes {
         *note = std::mem::take(note).of_loaded(&name);

@@ -490,6 +490,18 @@ fn bad_defines_are_told() {
         "bad.toml:22: shapes[0].radius: -1 must",
     );
     quietly(&place, &["bad.toml", "-o", "x.png", "-D", "shapes[0].radius=1"]);
+    // Of a model too.
+    place.write("tri.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    for (define, told) in [
+        (
+            "camera.fov=1000",
+            "--define camera.fov: 1000 must be from 0.001 to 179.999",
+        ),
+        ("image.width=0", "--define image.width: 0 must be from 1 to 65536"),
+    ] {
+        let ran = place.run(&["check", "tri.obj", "-D", define]);
+        assert_eq!((ran.code, ran.stderr), (2, format!("error: {told}\n")));
+    }
 }
 
 #[test]

@@ -133,7 +133,15 @@ fn strict_refuses_missing_maps() {
         "{}: a.mtl:2: material \"m\": map_Kd: \"none.png\" cannot be read: ",
         path.display()
     );
-    assert!(message.starts_with(&start), "{message}");
+    assert!(message.starts_with(&start) && !message.contains("ignored"), "{message}");
+    // Images that exist and cannot be used.
+    fs::create_dir(folder.path().join("folder.png")).unwrap();
+    for (map, rule) in [("folder.png", "must be a file"), ("../none.png", "cannot be read")] {
+        write(folder.path(), &format!("map_Kd {map}\n"));
+        let message = Scene::load_with(&path, &overrides).unwrap_err().to_string();
+        assert!(message.contains(rule), "{message}");
+        assert_eq!(Scene::load(&path).unwrap().notes.len(), 1, "{map}");
+    }
 }
 
 #[test]

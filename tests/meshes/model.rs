@@ -207,6 +207,15 @@ fn files_with_names_in_another_case_are_found_or_suggested() {
     let (scene, _) = load(&folder.path().join("a.obj")).unwrap();
     assert_eq!(scene.notes, Vec::<String>::new());
     assert_eq!(scene.material_names, ["red"]);
+    // The same in a folder whose name differs too, beside a folder of the wanted name.
+    fs::create_dir_all(folder.path().join("Sub/M.mtl")).unwrap();
+    write("Sub/m.mtl", "newmtl red\nKd 1 0 0\n");
+    write(
+        "b.obj",
+        "mtllib sub/M.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n",
+    );
+    let (scene, _) = load(&folder.path().join("b.obj")).unwrap();
+    assert_eq!(scene.notes, Vec::<String>::new());
     let text = "image = { width = 4, height = 4 }\ncamera = { position = [0, -5, 0], look_at = [0, 0, 0], fov = 40 }\n\
                 [render]\nintegrator = 'path'\n[environment]\nfile = 'red.MTL'\n";
     write("s.toml", text);

@@ -270,6 +270,31 @@ fn overrides_stand_in_for_the_files_values() {
 }
 
 #[test]
+fn all_errors_are_reported() {
+    let errors = |changes: &[(&str, &str)]| {
+        let change = |text: String, (from, to): &(&str, &str)| text.replacen(from, to, 1);
+        let text = changes.iter().fold(GOOD.to_owned(), change);
+        let error = load("a.json", &text, &Overrides::default()).unwrap_err();
+        let lines = error
+            .each()
+            .0
+            .iter()
+            .map(|error| error.place().line.unwrap_or_default());
+        lines.collect::<Vec<_>>()
+    };
+    // Keys and types, also in an object.
+    let types = [
+        ("256", "\"many\""),
+        ("[0, 1, 6.8]", "[0, 1]"),
+        ("19.5", "\"wide\""),
+        ("\"size\"", "\"sizes\""),
+    ];
+    assert_eq!(errors(&types), [2, 6, 9, 14]);
+    let ranges = [("19.5", "200"), ("[0.5, 0.25]", "[0, -1]"), ("\"red\"", "\"grey\"")];
+    assert_eq!(errors(&ranges), [9, 14, 19]);
+}
+
+#[test]
 fn defines_have_the_files_own_keys() {
     let load = |define: &str| {
         let overrides = Overrides {

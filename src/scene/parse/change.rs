@@ -56,7 +56,7 @@ impl Description {
             .cloned()
             .unwrap_or_default();
         let read = read_camera(camera).at("camera");
-        read.map_err(|problem| invalid(text, origin, problem.into(), &Defines::new(&[])))
+        read.map_err(|problem| invalid(text, origin, problem, &Defines::new(&[])))
     }
 }
 
@@ -107,7 +107,7 @@ fn read_changed_part(
         _ => None,
     };
     let done = there.map(|read| {
-        read.map_err(|problem| problem.at(step.clone()).at(part.kind.name()).into())
+        read.map_err(|problem| problem.at(step.clone()).at(part.kind.name()))
             .map(|()| after)
     });
     Ok(done)

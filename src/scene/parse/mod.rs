@@ -82,8 +82,8 @@ impl Description {
 
 /// Returns the error of invalid values, of the text or of a define.
 pub(super) fn invalid(text: &str, origin: &str, problems: Problems, defines: &Defines) -> SceneError {
-    if let Some(problem) = problems.iter().find(|problem| defines.brought(&problem.key)) {
-        return SceneError::Override(problem.clone().at("define"));
+    if let Some(error) = problems.of_define(defines) {
+        return error;
     }
     let keys = Keys::of(text);
     let invalid = |at: usize, problem: Problem| SceneError::Invalid {
@@ -189,7 +189,7 @@ struct Sections {
 }
 
 fn read_file(file: Table) -> Result<Description, Problems> {
-    let sections: Sections = read(file).map_err(|problems: Problems| problems.map(with_section))?;
+    let (sections, outside) = read_sections(file)?;
     let view = both(
         read(sections.image).at("image"),
         read_camera(sections.camera).at("camera"),
@@ -210,8 +210,8 @@ fn read_file(file: Table) -> Result<Description, Problems> {
         read_map(sections.meshes, read).at("meshes"),
         read_list(sections.instances, read).at("instances"),
     );
-    let ((view, settings), (appearance, (objects, meshes))) =
-        both(both(view, settings), both(appearance, both(objects, meshes)))?;
+    let sections = both(both(view, settings), both(appearance, both(objects, meshes)));
+    let (((view, settings), (appearance, (objects, meshes))), ()) = both(sections, outside)?;
     let ((image, camera), (render, environment)) = (view, settings);
     let ((textures, materials), (lights, shapes), (meshes, instances)) = (appearance, objects, meshes);
     Ok(Description {
@@ -226,6 +226,22 @@ fn read_file(file: Table) -> Result<Description, Problems> {
         meshes,
         instances,
     })
+}
+
+/// Returns the sections of a file, and the problems of its other keys.
+fn read_sections(file: Table) -> Result<(Sections, Result<(), Problems>), Problems> {
+    let problems = match read(file.clone()) {
+        Ok(sections) => return Ok((sections, Ok(()))),
+        Err(problems) => problems.map(with_section),
+    };
+    let mut rest = file;
+    for problem in problems.iter() {
+        remove(&mut rest, &problem.key.0[..problem.key.0.len().min(1)]);
+    }
+    match read(rest) {
+        Ok(sections) => Ok((sections, Err(problems))),
+        Err(_) => Err(problems),
+    }
 }
 
 /// Adds the section that has a key to the problem of this key outside of a section.
@@ -435,8 +451,8 @@ fn read_tagged<T: Tagged>(mut table: Table, default: Option<&str>) -> Read<T> {
     }
 }
 
-/// Parses a table, whose key `type` was removed if it is `tagged`. serde stops at the first error, so its key is removed and the table parsed
-/// again, for the errors of the other keys.
+/// Parses a table, whose key `type` was removed if it is `tagged`. serde stops at the first error, so the value there is removed and the
+/// table parsed again, for the errors of the other keys.
 fn read_keys<T>(
     mut table: Table,
     tagged: bool,
@@ -455,22 +471,55 @@ fn read_keys<T>(
         };
         let error = with_names(error, &table, |table| read(table).err());
         let problem = explain(error, &table, tagged, integrator);
-        let key = match problem.key.0.first() {
-            Some(Segment::Key(key)) => Some(key.clone()),
-            _ => None,
-        };
-        let had_value = key.is_some_and(|key| table.remove(&key).is_some());
-        problems = match problems {
-            // A missing key was removed, or may be one of the unknown keys.
-            Some(found) if !had_value => return Err(found),
+        let path = problem.key.0.clone();
+        let is_missing = find(&table, &path).is_none();
+        let is_removed = !is_missing && remove(&mut table, &path) || remove(&mut table, &path[..path.len().min(1)]);
+        let found = match problems {
+            Some(found) if is_missing && found.iter().any(|other| explains(&other.key.0, &path)) => found,
             Some(mut found) => {
                 found.add(problem);
-                Some(found)
+                found
             }
-            None if !had_value => return Err(problem.into()),
-            None => Some(problem.into()),
+            None => problem.into(),
         };
+        if !is_removed || found.is_full() {
+            return Err(found);
+        }
+        problems = Some(found);
     }
+}
+
+/// Returns true if a key is missing because of an error at another one: that was removed, or may be the misspelled key.
+fn explains(other: &[Segment], missing: &[Segment]) -> bool {
+    let table = &missing[..missing.len().saturating_sub(1)];
+    other.starts_with(missing) || other.split_last().is_some_and(|(_, others)| others == table)
+}
+
+/// Returns the value at a path.
+fn find<'a>(table: &'a Table, path: &[Segment]) -> Option<&'a Value> {
+    let (Segment::Key(key), path) = path.split_first()? else {
+        return None;
+    };
+    path.iter().try_fold(table.get(key)?, |value, segment| match segment {
+        Segment::Key(key) => value.get(key),
+        Segment::Index(index) => value.get(*index),
+    })
+}
+
+/// Removes the key at a path from its table, if it has one.
+fn remove(table: &mut Table, path: &[Segment]) -> bool {
+    let Some((Segment::Key(key), path)) = path.split_last() else {
+        return false;
+    };
+    let Some((Segment::Key(first), path)) = path.split_first() else {
+        return table.remove(key).is_some();
+    };
+    let inner = path.iter().fold(table.get_mut(first), |value, segment| match segment {
+        Segment::Key(key) => value?.get_mut(key),
+        Segment::Index(index) => value?.get_mut(*index),
+    });
+    let inner = inner.and_then(Value::as_table_mut);
+    inner.is_some_and(|inner| inner.remove(key).is_some())
 }
 
 /// Maximum number of keys in a message, which no table exceeds.
@@ -532,13 +581,7 @@ const NAMES_EXPECTED: &str = ", expected string only";
 /// Converts serde's error about `table`, whose key `type` was removed if it is `tagged`.
 fn explain(error: ReadError, table: &Table, tagged: bool, integrator: Integrator) -> Problem {
     let mut path = segments(error.path());
-    let value = match path.split_first() {
-        Some((Segment::Key(key), path)) => path.iter().fold(table.get(key), |value, segment| match segment {
-            Segment::Key(key) => value?.get(key),
-            Segment::Index(index) => value?.get(*index),
-        }),
-        _ => None,
-    };
+    let value = find(table, &path);
     let message = error.inner().message();
     // serde has the name and the rule only as text.
     let quoted = |text: &str| {

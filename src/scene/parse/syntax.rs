@@ -45,7 +45,7 @@ fn hint(line: &str, before: &str, rest: &str) -> &'static str {
         "; comments start with #"
     } else if before.ends_with('\\') {
         "; write \\\\ for a backslash, use / in paths, or put the string in ' '"
-    } else if before.ends_with('.') || rest.starts_with('.') {
+    } else if before.ends_with('.') || rest.trim_start_matches(['-', '+']).starts_with('.') {
         "; a number has digits on both sides of the decimal point"
     } else if follows_digit && rest.starts_with(',') {
         "; the decimal separator is a point"

@@ -249,14 +249,18 @@ impl<'a> Looks<'a> {
         for Warning {
             keyword,
             message,
+            stand_in,
             is_damage,
         } in warnings.0
         {
             let line = own.lines.get(&keyword).unwrap_or(&own.line);
             let place = format!("{}:{line}: material {:?}", self.shown(file).display(), cut(&own.name));
-            let message = format!("{place}: {keyword}: {message}");
+            let mut message = format!("{place}: {keyword}: {message}");
             if is_damage && is_strict {
                 self.damage.get_or_insert_with(|| Problem::damage(&*message));
+            }
+            if let Some(stand_in) = stand_in {
+                message = format!("{message}; {stand_in}");
             }
             let known = self.warnings.entry((file.to_owned(), keyword));
             known.or_insert((message, 0)).1 += 1;
@@ -269,12 +273,16 @@ impl<'a> Looks<'a> {
             return Err(Problem::new("the mesh has no texture coordinates"));
         }
         let file = self.shown(path).to_string_lossy().into_owned();
-        let place = self.images.assets.find(&file)?;
+        let damaged = |problem: Problem| Problem {
+            is_damage: true,
+            ..problem
+        };
+        let place = self.images.assets.find(&file).map_err(damaged)?;
         if let Some(texture) = self.maps.get(&(place.clone(), part)) {
             return Ok(*texture);
         }
         let image = ImageTextureDescription::new(file);
-        let texture = image_texture(&image, part, &mut self.images)?;
+        let texture = image_texture(&image, part, &mut self.images).map_err(damaged)?;
         self.textures.push(texture);
         self.maps.insert((place, part), self.textures.len() - 1);
         Ok(self.textures.len() - 1)
@@ -289,6 +297,8 @@ impl<'a> Looks<'a> {
 struct Warning {
     keyword: String,
     message: String,
+    /// What is rendered instead of a map.
+    stand_in: Option<&'static str>,
     /// True for a damaged or missing file, which can be refused.
     is_damage: bool,
 }
@@ -299,16 +309,17 @@ struct Warnings(Vec<Warning>);
 
 impl Warnings {
     fn add(&mut self, keyword: impl Into<String>, message: impl Into<String>) {
-        self.push(keyword.into(), message.into(), false);
+        self.push(Warning {
+            keyword: keyword.into(),
+            message: message.into(),
+            stand_in: None,
+            is_damage: false,
+        });
     }
 
-    fn push(&mut self, keyword: String, message: String, is_damage: bool) {
-        if !self.0.iter().any(|known| known.keyword == keyword) {
-            self.0.push(Warning {
-                keyword,
-                message,
-                is_damage,
-            });
+    fn push(&mut self, warning: Warning) {
+        if !self.0.iter().any(|known| known.keyword == warning.keyword) {
+            self.0.push(warning);
         }
     }
 
@@ -320,11 +331,15 @@ impl Warnings {
     }
 
     /// Returns the texture of a map. A map that cannot be used is a warning.
-    fn of_map(&mut self, keyword: &str, found: Checked<usize>, stand_in: &str) -> Option<usize> {
+    fn of_map(&mut self, keyword: &str, found: Checked<usize>, stand_in: &'static str) -> Option<usize> {
         found
             .map_err(|problem| {
-                let why = cut_to(MAX_MAP_MESSAGE, &problem.message);
-                self.push(keyword.to_owned(), format!("{why}; {stand_in}"), problem.is_damage);
+                self.push(Warning {
+                    keyword: keyword.to_owned(),
+                    message: cut_to(MAX_MAP_MESSAGE, &problem.message).into_owned(),
+                    stand_in: Some(stand_in),
+                    is_damage: problem.is_damage,
+                });
             })
             .ok()
     }

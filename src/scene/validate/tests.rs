@@ -753,6 +753,10 @@ radius = 1
             "s.toml:12: shapes[0].material: 7 must be a string",
         ]
     );
+    // Also beside a section that is unknown.
+    let found = errors(&format!("{SMALL}{text}[shape]\n[environment]\nrotate = 'x'\n"));
+    assert_eq!(found.len(), 9, "{found:#?}");
+    assert_eq!(found[7], "s.toml:14: shape: unknown key; did you mean \"shapes\"?");
     // A key that is missing may be one that is unknown.
     assert_eq!(
         errors(&format!(
