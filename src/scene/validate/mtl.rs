@@ -297,7 +297,7 @@ impl<'a> Looks<'a> {
 struct Warning {
     keyword: String,
     message: String,
-    /// What is rendered instead of a map.
+    /// The stand-in for a map that cannot be used.
     stand_in: Option<&'static str>,
     /// True for a damaged or missing file, which can be refused.
     is_damage: bool,
