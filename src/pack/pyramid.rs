@@ -117,7 +117,7 @@ fn mantissa(x: f64, exponent: u32) -> u32 {
     // Rounded half up, without a call of the C library.
     let x = x * units(exponent);
     let whole = x as u32;
-    whole + u32::from(x - f64::from(whole) >= 0.5)
+    whole.saturating_add(u32::from(x - f64::from(whole) >= 0.5)) // tables have exponents that are too small for the value
 }
 
 fn joined([red, green, blue]: [u32; 3], exponent: u32) -> u32 {
