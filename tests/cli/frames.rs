@@ -490,7 +490,7 @@ fn bad_defines_are_told() {
         "bad.toml:22: shapes[0].radius: -1 must",
     );
     quietly(&place, &["bad.toml", "-o", "x.png", "-D", "shapes[0].radius=1"]);
-    // Of a model too.
+    // An invalid value of a model names the option too.
     place.write("tri.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     for (define, told) in [
         (
